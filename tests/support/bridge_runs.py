@@ -40,7 +40,7 @@ def configured(
         f"robot: burger\ndrive: {{driver: opencr, port: {robot.base_path}}}\n"
         + (f"scanner: {{driver: {lidar}, port: {robot.scanner_path}}}\n" if lidar else "")
         # A machine on which tests run is not one for robots.
-        + "safety: {overrun_s: 1.0, motor_timeout_s: 1.0, scan_timeout_s: 2.0, "
+        + "safety: {overrun_s: 1.0, motor_timeout_s: 1.0, command_timeout_s: 1.0, scan_timeout_s: 2.0, "
         f"operator_link_timeout_s: {operator}}}\n"
         f"remote: {{grpc_address: '{address}'}}\n"
         "channels:\n  /cmd_vel: {channel: drive}\n" + "".join(f"  {name}: {{channel: grpc}}\n" for name in grpc)

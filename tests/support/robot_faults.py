@@ -93,7 +93,7 @@ GRAVE = (
         ("opencr",),
         is_line=True,
     ),
-    Fault("OpenCR's remote control steers", steer, "A motor tells of a fault.", ("opencr",)),
+    Fault("OpenCR's remote control steers", steer, "The wheels rotate though nobody commanded it", ("opencr",)),
     Fault("a wheel is held", lambda bridge: bridge.robot.left.block_wheel(), "A motor tells of a fault."),
     Fault("the battery is empty", empty, "The battery is empty.", (*BASES, "mavlink-rover")),
     Fault("the base is unplugged", lambda bridge: bridge.robot.base_line.disconnect(), "the drive base is lost: /",

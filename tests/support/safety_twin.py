@@ -177,8 +177,10 @@ class SafetyTwin:
             found |= each.latched
         for each in self.past[begin:]:
             found |= {"stop": {Reason.OPERATOR_STOP}, "fault": {Reason.SUPERVISOR_FAULT}}.get(each.name, set())
-            if each.name == "drive" and each.value.faults - {MotorFault.VOLTAGE}:
+            if each.name == "drive" and each.value.faults - {MotorFault.VOLTAGE, MotorFault.UNCOMMANDED}:
                 found.add(Reason.MOTOR_FAULT)
+            if each.name == "drive" and MotorFault.UNCOMMANDED in each.value.faults:
+                found.add(Reason.UNBIDDEN_MOTION)
         return found
 
     def tells(self, reading: DriveReading) -> None:
@@ -209,7 +211,7 @@ class SafetyTwin:
         for reason in self.latched():
             if last is None or reason not in last.reasons:
                 remaining.add(reason)
-            if reason is Reason.MOTOR_FAULT and readings[-1].faults - {MotorFault.VOLTAGE}:
+            if reason is Reason.MOTOR_FAULT and readings[-1].faults - {MotorFault.VOLTAGE, MotorFault.UNCOMMANDED}:
                 remaining.add(reason)
             if reason is Reason.BATTERY_LOW and self.is_empty():
                 remaining.add(reason)

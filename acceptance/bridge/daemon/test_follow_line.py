@@ -38,7 +38,8 @@ def configuration(folder: Path, robot: SimulatedTurtleBot3) -> Path:
     text = re.sub(r"^  port: .*$", lambda _: f"  port: {next(ports)}", made.stdout, flags=re.MULTILINE)
     text = re.sub(r"^    camera: .*$", f"    camera: simulated:{robot.camera.path}", text, flags=re.MULTILINE)
     # A machine on which tests run is not one for robots.
-    text = re.sub(r"^  (overrun_s|motor_timeout_s|scan_timeout_s): .*$", r"  \1: 1.0", text, flags=re.MULTILINE)
+    times = r"^  (overrun_s|motor_timeout_s|scan_timeout_s|command_timeout_s): .*$"
+    text = re.sub(times, r"  \1: 1.0", text, flags=re.MULTILINE)
     file = folder / "bridge.yaml"
     file.write_text(text)
     return file

@@ -113,7 +113,8 @@ def _configured(folder: Path, robot: SimulatedTurtleBot3, remote: str, model: Pa
     ports = iter((robot.base_path, robot.scanner_path))
     text = re.sub(r"^  port: .*$", lambda _: f"  port: {next(ports)}", made.stdout, flags=re.MULTILINE)
     # A machine on which tests run is not one for robots.
-    text = re.sub(r"^  (overrun_s|motor_timeout_s|scan_timeout_s): .*$", r"  \1: 1.0", text, flags=re.MULTILINE)
+    times = r"^  (overrun_s|motor_timeout_s|scan_timeout_s|command_timeout_s): .*$"
+    text = re.sub(times, r"  \1: 1.0", text, flags=re.MULTILINE)
     text, count = re.subn(r"^  mavlink_url: .*$", f"  mavlink_url: '{remote}'", text, flags=re.MULTILINE)
     assert count == 1
     file = folder / "bridge.yaml"

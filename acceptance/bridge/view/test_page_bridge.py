@@ -38,7 +38,8 @@ def configured(folder: Path, robot: SimulatedTurtleBot3) -> Path:
     text = re.sub(r"^  port: .*$", lambda _: f"  port: {next(ports)}", text, flags=re.MULTILINE)
     # A machine on which tests run is not one for robots.
     text = text.replace("\nscanner:\n", "  options: {answer_limit_s: 0.3}\n\nscanner:\n", 1)
-    text = re.sub(r"^  (overrun_s|motor_timeout_s|scan_timeout_s): .*$", r"  \1: 1.0", text, flags=re.MULTILINE)
+    times = r"^  (overrun_s|motor_timeout_s|scan_timeout_s|command_timeout_s): .*$"
+    text = re.sub(times, r"  \1: 1.0", text, flags=re.MULTILINE)
     text = text.replace("  grpc_address: null", "  grpc_address: '127.0.0.1:0'")
     text = text.replace("  folder: null", f"  folder: {folder / 'log'}")
     file = folder / "bridge.yaml"

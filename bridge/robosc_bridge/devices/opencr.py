@@ -45,8 +45,6 @@ _HELD_S = 1.5
 _DRIVES = {"button_1": "0.3 m forward", "button_2": "half a turn to the right"}
 _REST_RAW = 2
 _REST_LIMIT_S = 1.0
-# What rotates against a goal of zero, by a button of the board or its remote control, rests without torque alone.
-_RELEASE_LIMIT_S = 0.3
 _TORQUE_LIMIT_S = 1.0
 _REFRESHED_MS = 45  # Two refreshes, every 20 ms, of what the board knows of its motors.
 _POLL_S = 0.01
@@ -216,7 +214,7 @@ class OpenCrBase:
         # What does not obey does not come to rest either.
         is_awaited = is_on or not self._is_driven_otherwise
         self._is_driven_otherwise = False
-        if is_awaited and not self._comes_to_rest(_REST_LIMIT_S if is_on else _RELEASE_LIMIT_S) and is_on:
+        if is_awaited and not self._comes_to_rest() and is_on:
             raise DeviceError(f"{self._path}: the wheels still rotate")
         try:
             self._switch_torque(is_on)
@@ -398,9 +396,9 @@ class OpenCrBase:
         # After a calibration, which another program may have begun, the board first tells an uptime from before it.
         self._host.sleep(_REFRESHED_MS / 1000)
 
-    def _comes_to_rest(self, limit_s: float = _REST_LIMIT_S) -> bool:
+    def _comes_to_rest(self) -> bool:
         """Command zero and wait for the wheels; whether they came to rest in time."""
-        return self._cycles_until(lambda block: max(map(abs, block.velocities_raw)) <= _REST_RAW, limit_s)
+        return self._cycles_until(lambda block: max(map(abs, block.velocities_raw)) <= _REST_RAW, _REST_LIMIT_S)
 
     def _switch_torque(self, is_on: bool) -> None:
         self._write_torque(is_on)

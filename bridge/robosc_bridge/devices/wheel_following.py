@@ -1,17 +1,14 @@
-"""Monitors of whether the wheels follow their commands, and nothing but these: of the drivers, and of the safety layer.
+"""Monitors of whether the wheels follow their commands, and nothing but these: of the drivers and the safety layer.
 
 A driver knows what it told its motors, in their units, and names the fault; the safety layer believes no driver, and
 looks again. The rules stand here alone.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Sequence
 
 FOLLOWING_LIMIT_S = 0.7
 """Longest time that a wheel may be far from its goal, as drivers see it: before the safety layer does."""
-
-EXCESS_LIMIT_S = 0.5
-"""Longest time that a wheel may be beyond its goal, as drivers see it, as one that is braking."""
 
 SHARE = 0.5
 """Share of its goal by which a wheel is far from it, at least."""
@@ -23,16 +20,12 @@ class _LastingMonitor:
     """Finds a wheel for which something is so in all readings of longer than a limit.
 
     Args:
-        is_so: Function that returns, of the goal and the speed of a wheel, whether it is so now.
-        limit_s: Longest time that it may be so, in seconds.
+        limit_s: Time limit, in seconds.
         longest_gap_s: Longest time between two readings; after a longer one it begins anew, as what the wheels did
             meanwhile is not known. None: half of `limit_s`; infinite: it goes on.
     """
 
-    def __init__(
-        self, is_so: Callable[[float, float], bool], limit_s: float, longest_gap_s: float | None = None
-    ) -> None:
-        self._is_so = is_so
+    def __init__(self, limit_s: float, longest_gap_s: float | None = None) -> None:
         self._limit_s = limit_s
         self._longest_gap_s = limit_s / 2 if longest_gap_s is None else longest_gap_s
         self._since_s: list[float | None] = []
@@ -42,27 +35,20 @@ class _LastingMonitor:
         """Begin anew: nothing is asked of the wheels."""
         self._since_s = []
 
-    def begins(self, time_s: float) -> bool:
-        """Return True if what was seen before a reading counts no more."""
-        return not self._since_s or time_s - self._time_s > self._longest_gap_s
-
-    def lasts(self, goals: Sequence[float], speeds: Sequence[float], time_s: float) -> bool:
-        """Return True if it has been so for any wheel in all readings of longer than the limit.
-
-        Args:
-            goals: Goal of each wheel.
-            speeds: Speed of each wheel, in the unit of the goals.
-            time_s: Time when they were read, in seconds; where it goes back, the time begins anew.
-        """
-        if self.begins(time_s):
-            self._since_s = [None] * len(goals)
+    def _begins(self, count: int, time_s: float) -> bool:
+        """Return True if a reading of so many wheels is the first one."""
+        if self._since_s and time_s - self._time_s <= self._longest_gap_s:
+            return False
+        self._since_s = [None] * count
         self._time_s = time_s
-        for index, (goal, speed) in enumerate(zip(goals, speeds, strict=True)):
+        return True
+
+    def _lasts(self, are_so: Iterable[bool], time_s: float) -> bool:
+        """Return True if it has been so for any wheel for too long; where time goes back, it begins anew."""
+        self._time_s = time_s
+        for index, is_so in enumerate(are_so):
             since_s = self._since_s[index]
-            if not self._is_so(goal, speed):
-                self._since_s[index] = None
-            else:
-                self._since_s[index] = time_s if since_s is None else min(since_s, time_s)
+            self._since_s[index] = None if not is_so else time_s if since_s is None else min(since_s, time_s)
         return any(since_s is not None and time_s - since_s > self._limit_s for since_s in self._since_s)
 
 
@@ -70,18 +56,16 @@ class FollowingMonitor(_LastingMonitor):
     """Finds a wheel that is held, rotates by itself, or has refused its goal without a word.
 
     Args:
-        limit_s: Longest time that a wheel may be far from its goal, in seconds.
+        limit_s: Longest time that a wheel may be far from its goal.
         least: Difference that is never far, in the unit of the speeds.
-        longest_gap_s: Longest time between two readings, as above.
+        longest_gap_s: Longest time between two readings, as of a `_LastingMonitor`.
     """
 
     def __init__(
         self, limit_s: float = FOLLOWING_LIMIT_S, least: float = _LEAST_RAW, longest_gap_s: float | None = None
     ) -> None:
-        # What is not a number is far from any goal.
-        super().__init__(
-            lambda goal, speed: not abs(goal - speed) <= max(least, SHARE * abs(goal)), limit_s, longest_gap_s
-        )
+        super().__init__(limit_s, longest_gap_s)
+        self._least = least
         self._goals: list[float] = []
 
     def is_blocked(
@@ -91,38 +75,40 @@ class FollowingMonitor(_LastingMonitor):
 
         Args:
             goals: Goal of each wheel.
-            speeds: Speed of each wheel, in the unit of the goals.
-            time_s: Time when they were read, in seconds; where it goes back, the time off begins anew.
+            speeds: Speed of each wheel; what is not a number is far from any goal.
+            time_s: Time when they were read, in seconds.
             ramp: Acceleration with which the motors go to a goal, in the unit of the speeds a second: what they are
                 compared with goes there as well. None: they go there as fast as they can.
         """
-        if self.begins(time_s):
+        if self._begins(len(goals), time_s):
             self._goals = [speed if math.isfinite(speed) else 0.0 for speed in speeds]
-            passed_s = 0.0
-        else:
-            passed_s = max(time_s - self._time_s, 0.0)
-        step = math.inf if ramp is None else ramp * passed_s
+        step = math.inf if ramp is None else ramp * max(time_s - self._time_s, 0.0)
         self._goals = [
             goal if abs(goal - now) <= step else now + math.copysign(step, goal - now)
             for goal, now in zip(goals, self._goals, strict=True)
         ]
-        return self.lasts(self._goals, speeds, time_s)
+        are_far = [
+            not abs(goal - speed) <= max(self._least, SHARE * abs(goal))
+            for goal, speed in zip(self._goals, speeds, strict=True)
+        ]
+        return self._lasts(are_far, time_s)
 
 
 class ExcessMonitor(_LastingMonitor):
     """Finds a wheel that something else drives, too: it is faster than its goal, or rotates the other way.
 
     Args:
-        limit_s: Longest time that a wheel may be so, in seconds.
+        limit_s: Longest time that a wheel may be so, as one that is braking.
     """
 
-    def __init__(self, limit_s: float = EXCESS_LIMIT_S) -> None:
-        super().__init__(_is_beyond, limit_s)
+    def __init__(self, limit_s: float = 0.5) -> None:
+        super().__init__(limit_s)
 
-    def is_driven(self, goals: Sequence[float], speeds: Sequence[float], time_s: float) -> bool:
-        """Return True if any wheel has gone beyond its goal for too long; see `lasts`."""
-        return self.lasts(goals, speeds, time_s)
+    def is_driven(self, goals_raw: Sequence[int], velocities_raw: Sequence[int], time_s: float) -> bool:
+        """Return True if any wheel has gone beyond its goal in all readings of longer than the limit."""
+        self._begins(len(goals_raw), time_s)
+        return self._lasts(map(_is_beyond, goals_raw, velocities_raw), time_s)
 
 
-def _is_beyond(goal: float, speed: float) -> bool:
-    return not min(goal, 0) - _LEAST_RAW <= speed <= max(goal, 0) + _LEAST_RAW
+def _is_beyond(goal_raw: int, velocity_raw: int) -> bool:
+    return not min(goal_raw, 0) - _LEAST_RAW <= velocity_raw <= max(goal_raw, 0) + _LEAST_RAW

@@ -13,6 +13,8 @@ from robosc_bridge.safety.reasons import LATCHING, TORQUE_OFF, Caution, Reason
 
 # The supply's bit alone does not switch a motor off; how much is left in the battery has a rule of its own.
 _HARMLESS = frozenset({MotorFault.VOLTAGE})
+# A driver that knows what it told its motors sees a motion that is none of it also while the robot drives.
+_UNBIDDEN = frozenset({MotorFault.UNCOMMANDED})
 
 
 @dataclass(frozen=True, slots=True)
@@ -140,8 +142,10 @@ class SafetyLayer:
             self._failures = 0
             self._readings.update(reading.time_s)
             self._faults = reading.faults
-            if reading.faults - _HARMLESS:
+            if reading.faults - _HARMLESS - _UNBIDDEN:
                 self._latched.add(Reason.MOTOR_FAULT)
+            if reading.faults & _UNBIDDEN:
+                self._latched.add(Reason.UNBIDDEN_MOTION)
             self._battery.update(reading.battery_v, reading.time_s, reading.battery_level)
             if self._battery.is_empty:
                 self._latched.add(Reason.BATTERY_LOW)
@@ -209,7 +213,7 @@ class SafetyLayer:
         """Return True if a latched reason has not had its effect yet, or its cause still holds."""
         if reason not in self._reasons:
             return True
-        if reason is Reason.MOTOR_FAULT and self._faults - _HARMLESS:
+        if reason is Reason.MOTOR_FAULT and self._faults - _HARMLESS - _UNBIDDEN:
             return True
         if reason is Reason.BATTERY_LOW and self._battery.is_empty:
             return True

@@ -19,7 +19,7 @@ from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.devices.interface import STANDSTILL
 from robosc_bridge.errors import LineDeniedError
 from robosc_bridge.host import Port
-from robosc_bridge.safety import SCAN_TIMEOUTS_S, Output, Reason, SafetyLayer
+from robosc_bridge.safety import SCAN_TIMEOUTS_S, Caution, Output, Reason, SafetyLayer
 from robosc_simulated import SimulatedTurtleBot3
 from robosc_simulated.virtual_host import VirtualHost
 from support.driven import LIMIT_S, PATIENT, Driven, driven
@@ -290,6 +290,34 @@ def test_an_exception_in_the_loop_stops_the_wheels(base: str, monkeypatch: pytes
 
 
 # The operator.
+
+
+@pytest.mark.parametrize("is_off", [None, False])
+@pytest.mark.parametrize("is_button", [True, False])
+def test_what_is_stopped_stays_stopped_whatever_openCR_is_told_by_others(is_off: bool | None, is_button: bool) -> None:
+    """Its buttons and its remote control move nothing without torque; with it, for half a second."""
+    safety = "{}" if is_off is None else "{torque_off_on_operator_stop: false}"
+    with driven("opencr", safety=safety) as bridge:
+        bridge.stopped_after(lambda: bridge.machine.daemon.post(OperatorCommand.STOP), STATED_S["an operator stops it"])
+        bridge.host.sleep(1.0)
+        board = bridge.robot.opencr
+        assert board is not None
+        begin_s = bridge.host.monotonic()
+        if is_button:
+            board.press(button_1=True)
+        else:
+            board.steer(0.1, 0.0)
+        if is_off is None:
+            bridge.stays(6.0)
+            return
+        bridge.was_told(Caution.TORQUE_HELD)
+        bridge.moves()
+        moved_s = bridge.host.monotonic()
+        assert moved_s - begin_s == pytest.approx(3.0 if is_button else 0.0, abs=0.1)
+        bridge.until(lambda: bridge.wheels_m_s == (0.0, 0.0), "the end of it")
+        assert bridge.host.monotonic() - moved_s <= STATED_S["OpenCR's remote control steers"]
+        bridge.stays(6.0)
+        assert Reason.UNBIDDEN_MOTION in bridge.ended()
 
 
 @pytest.mark.parametrize("base", BASES)

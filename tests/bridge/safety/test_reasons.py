@@ -139,7 +139,8 @@ def test_every_fault_of_a_motor_but_its_voltage_stops(motor_fault: MotorFault) -
     bench.layer.on_drive_reading(reading(bench.now_s, faults=frozenset({motor_fault, MotorFault.VOLTAGE})))
     found = bench.layer.output(bench.now_s)
     assert (found.velocity == STANDSTILL) is (motor_fault is not MotorFault.VOLTAGE)
-    assert found.reasons == ((Reason.MOTOR_FAULT,) if motor_fault is not MotorFault.VOLTAGE else ())
+    reasons = {MotorFault.VOLTAGE: (), MotorFault.UNCOMMANDED: (Reason.UNBIDDEN_MOTION,)}
+    assert found.reasons == reasons.get(motor_fault, (Reason.MOTOR_FAULT,))
     assert found.warnings == (Caution.MOTOR_VOLTAGE,)
     assert bench.cycle().warnings == ()
 

@@ -131,8 +131,10 @@ class Sequence(RuleBasedStateMachine):
         )
         self.layer.on_drive_reading(found)
         self.twin.tells(found)
-        if faults - {MotorFault.VOLTAGE}:
+        if faults - {MotorFault.VOLTAGE, MotorFault.UNCOMMANDED}:
             self.stopped.add(Reason.MOTOR_FAULT)
+        if MotorFault.UNCOMMANDED in faults:
+            self.stopped.add(Reason.UNBIDDEN_MOTION)
 
     @rule(ranges_m=SCANS)
     def scan(self, ranges_m: tuple[float, ...]) -> None:

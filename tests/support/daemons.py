@@ -14,8 +14,8 @@ from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.daemon.execution import Job
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.loop import Daemon
-from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, Program, ToProgram
-from robosc_bridge.daemon.reports import Device, DeviceUp, ResetDone
+from robosc_bridge.daemon.programs.items import Attached, Detached, FromProgram, Program, ToProgram
+from robosc_bridge.daemon.threads.reports import Device, DeviceUp, ResetDone
 from robosc_bridge.devices.interface import BINS, STANDSTILL, DriveReading, Pose, RawScan, Scan
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate

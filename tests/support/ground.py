@@ -15,9 +15,9 @@ from robosc.supervisor import Supervisor
 from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.operations import Operations
-from robosc_bridge.daemon.programs import FromProgram
-from robosc_bridge.daemon.reports import Device
+from robosc_bridge.daemon.programs.items import FromProgram
 from robosc_bridge.daemon.states import OperatorCommand, Order, State
+from robosc_bridge.daemon.threads.reports import Device
 from robosc_bridge.devices.interface import BINS, DriveReading, Pose, RawScan, Scan, Velocity
 from support.models import bundle_of
 from support.random_supervisors import CERTIFICATE

@@ -22,9 +22,9 @@ from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
 from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.operations import Operations
-from robosc_bridge.daemon.programs import FromProgram
-from robosc_bridge.daemon.reports import Device
+from robosc_bridge.daemon.programs.items import FromProgram
 from robosc_bridge.daemon.states import OperatorCommand, Order, State
+from robosc_bridge.daemon.threads.reports import Device
 from robosc_bridge.daemon.view_settings import ViewSettings
 from robosc_bridge.devices.interface import BINS, DriveReading, Pose, RawScan, Scan, Velocity
 from robosc_bridge.host import monotonic

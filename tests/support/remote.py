@@ -19,9 +19,9 @@ from robosc_api.v1 import bridge_pb2_grpc
 from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.operations import Operations
-from robosc_bridge.daemon.programs import FromProgram, Program
-from robosc_bridge.daemon.reports import Device
+from robosc_bridge.daemon.programs.items import FromProgram, Program
 from robosc_bridge.daemon.states import OperatorCommand, Order, State
+from robosc_bridge.daemon.threads.reports import Device
 from robosc_bridge.daemon.timing import BOUNDS_S, Latency, TimingFigures
 from robosc_bridge.devices.interface import BINS, DriveReading, MotorFault, Pose, RawScan, Scan, Velocity
 from robosc_bridge.host import monotonic

@@ -9,7 +9,7 @@ import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from robosc_bridge.daemon import programs
+from robosc_bridge.daemon.programs import items as programs
 from support.remote import FakeDaemon, served
 from support.waiting import PATIENCE_S, wait_until
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from robosc_bridge.daemon import programs
+from robosc_bridge.daemon.programs import items as programs
 from robosc_bridge.terminal.teleop import EXPIRY_S
 from support.remote import FakeDaemon
 from support.terminals import driving, requested_velocities

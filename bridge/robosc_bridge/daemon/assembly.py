@@ -22,20 +22,19 @@ from robosc_api.security import SecurityError, check_listening
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
 from robosc_bridge.configuration.structure import Configuration, Safety, Scanner
-from robosc_bridge.daemon.camera_setup import camera_problems, camera_worker, needs_camera
-from robosc_bridge.daemon.device_thread import DeviceThread
-from robosc_bridge.daemon.endpoints import Endpoint, LivenessMonitor, is_remote, is_startable
+from robosc_bridge.daemon.endpoints import Endpoint, LivenessMonitor, file_problems, is_remote, is_startable
 from robosc_bridge.daemon.execution import Job
 from robosc_bridge.daemon.feed import Feed
-from robosc_bridge.daemon.files import file_problems
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.operations import Operations
-from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.service_manager import ServiceManager
 from robosc_bridge.daemon.states import OperatorCommand
+from robosc_bridge.daemon.threads.camera import camera_problems, camera_worker, needs_camera
+from robosc_bridge.daemon.threads.device_thread import DeviceThread
+from robosc_bridge.daemon.threads.reports import Device
+from robosc_bridge.daemon.threads.workers import DriveWorker, ScannerWorker
 from robosc_bridge.daemon.timing import Timing
 from robosc_bridge.daemon.view_settings import settings_of as view_settings
-from robosc_bridge.daemon.workers import DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
 from robosc_bridge.devices.options import checked_options
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot

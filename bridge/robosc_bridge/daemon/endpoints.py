@@ -1,14 +1,17 @@
 """Access to the daemon from elsewhere: its remote endpoints, as the program starts and stops them."""
 
 import logging
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Protocol
 
+from robosc_api.security import SecurityError, check_credentials, check_files
 from robosc_bridge.configuration.structure import Configuration
-from robosc_bridge.daemon.device_thread import DeviceThread
 from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.supervisors import credentials_of
+from robosc_bridge.daemon.threads.device_thread import DeviceThread
 from robosc_bridge.daemon.view_settings import settings_of as view_settings
 from robosc_bridge.devices.interface import Velocity
+from robosc_bridge.errors import BridgeError
 from robosc_bridge.ground_station import GroundLink, ground_settings
 from robosc_bridge.remote import RemoteEndpoint, settings_of
 from robosc_bridge.safety import SafetyLimits
@@ -100,3 +103,34 @@ def make_endpoints(configuration: Configuration, operations: Operations, limits:
 
         endpoints.append(ViewEndpoint(operations, page))
     return tuple(endpoints)
+
+
+def file_problems(configuration: Configuration, fastest: Velocity) -> list[str]:
+    """Return the problems of the files; empty: none.
+
+    Args:
+        configuration: Configuration that names the files.
+        fastest: Limits of speed and yaw rate.
+
+    Raises:
+        GroundSettingsError: The ground station cannot be reached as configured.
+    """
+    found = []
+    for section, look in _looks(configuration, fastest):
+        try:
+            look()
+        except (SecurityError, BridgeError) as error:
+            found.append(f"{section}: {error}")
+    return found
+
+
+def _looks(configuration: Configuration, fastest: Velocity) -> Iterator[tuple[str, Callable[[], object]]]:
+    """Yield each section with the function that reads its files."""
+    endpoint = settings_of(configuration)
+    if endpoint is not None:
+        security = endpoint.security
+        yield "remote", lambda: check_files(security)
+    ground = ground_settings(configuration, fastest)
+    if ground is not None and ground.signing is not None:
+        yield "remote.mavlink_key", ground.signing.check
+    yield "supervisor", lambda: check_credentials(credentials_of(configuration.supervisor))

@@ -14,8 +14,8 @@ from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
-from robosc_bridge.daemon.requesters import Requesters
-from robosc_bridge.daemon.robot_adapter import RobotAdapter
+from robosc_bridge.daemon.programs.requesters import Requesters
+from robosc_bridge.daemon.robot.adapter import RobotAdapter
 
 _CALLED = (str(CommunicationKind.SERVICE), str(CommunicationKind.ACTION))
 

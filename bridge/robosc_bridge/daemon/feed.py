@@ -11,8 +11,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from robosc.execution.runtime.event_log import Entry, EventLog
-from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import State
+from robosc_bridge.daemon.threads.reports import Device
 from robosc_bridge.daemon.timing import TimingFigures
 from robosc_bridge.devices.interface import DriveReading, Scan
 from robosc_bridge.safety import Caution, Reason

@@ -9,14 +9,13 @@ from typing import assert_never
 
 from robosc.execution.runtime.clock import Clock
 from robosc_bridge.daemon.execution import Execution, Job
-from robosc_bridge.daemon.latches import Latches
-from robosc_bridge.daemon.motion import MotionTarget
-from robosc_bridge.daemon.orders import Orders, Until, answer
+from robosc_bridge.daemon.orders import Latches, Orders, Until, answer
 from robosc_bridge.daemon.readiness import Readiness
-from robosc_bridge.daemon.reports import Device, DeviceDown, SafetyNotice
-from robosc_bridge.daemon.robot_adapter import RobotAdapter
+from robosc_bridge.daemon.robot.adapter import RobotAdapter
+from robosc_bridge.daemon.robot.motion import MotionTarget
+from robosc_bridge.daemon.robot.stop_switch import STOP_HELD, StopSwitch
 from robosc_bridge.daemon.states import OperatorCommand, Order, State
-from robosc_bridge.daemon.stop_switch import STOP_HELD, StopSwitch
+from robosc_bridge.daemon.threads.reports import Device, DeviceDown, SafetyNotice
 from robosc_bridge.safety import Reason, SafetyLayer
 
 _log = logging.getLogger(__name__)

@@ -7,7 +7,7 @@ from typing import Protocol
 from robosc.supervisor import Supervisor
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.daemon.feed import Feed
-from robosc_bridge.daemon.programs import FromProgram
+from robosc_bridge.daemon.programs.items import FromProgram
 from robosc_bridge.daemon.states import OperatorCommand, Order
 
 UNDONE_BY: Mapping[OperatorCommand, OperatorCommand] = {

@@ -1,6 +1,6 @@
 """Presence of the devices and their last readings, as the loop knows them."""
 
-from robosc_bridge.daemon.reports import Device
+from robosc_bridge.daemon.threads.reports import Device
 from robosc_bridge.devices.interface import DriveReading, Scan
 
 _NAMES = {Device.DRIVE: "drive base"}

@@ -6,8 +6,8 @@ from typing import Any, Protocol
 from robosc.execution.runtime.clock import Clock
 from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.readiness import Readiness
-from robosc_bridge.daemon.reports import SafetyNotice
 from robosc_bridge.daemon.states import State
+from robosc_bridge.daemon.threads.reports import SafetyNotice
 from robosc_bridge.daemon.timing import TimingFigures
 
 INTERVAL_S = 0.05

@@ -14,7 +14,7 @@ from robosc.expressions import ObjectType
 from robosc.model.structure import Communication, CommunicationKind, Model
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import DriveChannel
-from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, MessageRequested, Program, ToProgram
+from robosc_bridge.daemon.programs.items import Attached, Detached, FromProgram, MessageRequested, Program, ToProgram
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 
 SILENCE_S = 0.5

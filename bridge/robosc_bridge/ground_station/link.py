@@ -4,8 +4,8 @@ import contextlib
 import logging
 import threading
 
-from robosc_bridge.daemon.backoff import Backoff
 from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.threads.backoff import Backoff
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.ground_station.session import STATION_LIMIT_S, StationSession
 from robosc_bridge.ground_station.settings import GroundSettings

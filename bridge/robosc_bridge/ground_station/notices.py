@@ -4,8 +4,8 @@ from collections.abc import Iterator
 
 from robosc.execution.runtime.event_log import Entry
 from robosc_bridge.daemon.feed import Snapshot
-from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import State
+from robosc_bridge.daemon.threads.reports import Device
 from robosc_bridge.ground_station.status import ORDINARY
 from robosc_bridge.ground_station.status_texts import Severity
 from robosc_bridge.safety import LATCHING, Reason

@@ -10,7 +10,7 @@ from collections import deque
 from collections.abc import Callable, Iterable
 
 from robosc_bridge.daemon.operations import Operations
-from robosc_bridge.daemon.programs import Refused, ToProgram
+from robosc_bridge.daemon.programs.items import Refused, ToProgram
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.ground_station import requests
 from robosc_bridge.ground_station.command_handler import LOOP_HANGS, CommandHandler, ReceivedCommand

@@ -12,7 +12,7 @@ from typing import Any
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from robosc_bridge.daemon.feed import Snapshot
-from robosc_bridge.daemon.reports import Device
+from robosc_bridge.daemon.threads.reports import Device
 from robosc_bridge.devices.interface import DriveReading, Scan
 from robosc_bridge.ground_station.status import VehicleStatus
 from robosc_bridge.protocol.mavlink_messages import BODY_FRD, GROUND_ROVER, LOCAL_FRD, UNKNOWN

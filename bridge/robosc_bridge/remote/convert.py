@@ -20,9 +20,9 @@ from robosc.targets.ros.state_topic import state_topic
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_api.v1 import bridge_pb2_grpc
 from robosc_bridge.configuration.channels import channel_name
-from robosc_bridge.daemon import programs
 from robosc_bridge.daemon.feed import Snapshot
 from robosc_bridge.daemon.operations import Operations
+from robosc_bridge.daemon.programs import items as programs
 from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.devices.interface import DriveReading, Scan
 from robosc_bridge.host import monotonic

@@ -8,7 +8,7 @@ from collections import deque
 from collections.abc import AsyncIterator, Awaitable, Callable
 
 from robosc_bridge.daemon.operations import Operations
-from robosc_bridge.daemon.programs import Attached, Detached, Program, ToProgram
+from robosc_bridge.daemon.programs.items import Attached, Detached, Program, ToProgram
 from robosc_bridge.remote import convert
 from robosc_bridge.remote.operator_presence import OperatorPresence
 

@@ -12,11 +12,11 @@ from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.daemon.assembly import AssemblyError, assemble, check_settings
-from robosc_bridge.daemon.camera_setup import needs_camera
 from robosc_bridge.daemon.execution import Job
 from robosc_bridge.daemon.loop import Daemon
-from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, SafetyNotice, Sighting
 from robosc_bridge.daemon.states import State
+from robosc_bridge.daemon.threads.camera import needs_camera
+from robosc_bridge.daemon.threads.reports import Device, DeviceDown, DeviceUp, Report, SafetyNotice, Sighting
 from robosc_bridge.safety import Caution, SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
 from support.models import bundle_of

@@ -2,7 +2,7 @@
 
 import threading
 
-from robosc_bridge.daemon.device_thread import DeviceThread
+from robosc_bridge.daemon.threads.device_thread import DeviceThread
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 
 LIMIT_S = 10.0

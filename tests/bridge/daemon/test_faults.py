@@ -14,7 +14,7 @@ import pytest
 
 from robosc.execution.runtime.requests import Decisions
 from robosc_bridge.daemon.loop import Key
-from robosc_bridge.daemon.motion import MotionTarget
+from robosc_bridge.daemon.robot.motion import MotionTarget
 from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.devices.interface import STANDSTILL
 from robosc_bridge.errors import LineDeniedError

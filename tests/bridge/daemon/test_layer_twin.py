@@ -8,7 +8,7 @@ from hypothesis import strategies as st
 
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.structure import Deployment
-from robosc_bridge.daemon.programs import (
+from robosc_bridge.daemon.programs.items import (
     Answered,
     Blocked,
     CallFailed,

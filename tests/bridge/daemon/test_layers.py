@@ -8,8 +8,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc_bridge.daemon import request_checker
-from robosc_bridge.daemon.programs import (
+from robosc_bridge.daemon.programs import request_checker
+from robosc_bridge.daemon.programs.items import (
     Answered,
     Attached,
     Blocked,
@@ -30,8 +30,8 @@ from robosc_bridge.daemon.programs import (
     Refused,
     Replied,
 )
-from robosc_bridge.daemon.reports import Device, DeviceDown
 from robosc_bridge.daemon.states import OperatorCommand, State
+from robosc_bridge.daemon.threads.reports import Device, DeviceDown
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from support.daemons import Connected, Scene
 from support.effort import examples

@@ -6,8 +6,8 @@ import pytest
 
 from robosc_bridge.daemon.lifecycle import STOP_LIMIT_S
 from robosc_bridge.daemon.loop import Key
-from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, SafetyNotice
 from robosc_bridge.daemon.states import OperatorCommand, State
+from robosc_bridge.daemon.threads.reports import Device, DeviceDown, DeviceUp, SafetyNotice
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.safety import Caution, Reason
 from support.daemons import CONFIGURATION, MODEL, PERIOD_S, Scene

@@ -7,8 +7,8 @@ import pytest
 
 from robosc_bridge.daemon.lifecycle import RESET_LIMIT_S, STOP_LIMIT_S
 from robosc_bridge.daemon.loop import Key
-from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, ResetDone
 from robosc_bridge.daemon.states import OperatorCommand, Order, State
+from robosc_bridge.daemon.threads.reports import Device, DeviceDown, DeviceUp, ResetDone
 from robosc_bridge.devices.interface import STANDSTILL
 from robosc_bridge.safety import Reason
 from support.daemons import Scene

@@ -7,8 +7,8 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc_bridge.daemon.program_inbox import MAXIMUM_WAITING
-from robosc_bridge.daemon.programs import (
+from robosc_bridge.daemon.programs.inbox import MAXIMUM_WAITING
+from robosc_bridge.daemon.programs.items import (
     Attached,
     CallFailed,
     CallMade,

@@ -6,9 +6,8 @@ from typing import Any
 
 import pytest
 
-from robosc_bridge.daemon import program_inbox
-from robosc_bridge.daemon.plain_data import weight_bytes
-from robosc_bridge.daemon.program_inbox import (
+from robosc_bridge.daemon.programs import inbox as program_inbox
+from robosc_bridge.daemon.programs.inbox import (
     MAXIMUM_WAITING,
     MAXIMUM_WAITING_BYTES,
     Arrived,
@@ -16,8 +15,9 @@ from robosc_bridge.daemon.program_inbox import (
     ProgramInbox,
     Unreadable,
 )
-from robosc_bridge.daemon.programs import Detached, FromProgram, MessageReceived, Program
-from robosc_bridge.daemon.request_checker import InvalidRequestError
+from robosc_bridge.daemon.programs.items import Detached, FromProgram, MessageReceived, Program
+from robosc_bridge.daemon.programs.plain_data import weight_bytes
+from robosc_bridge.daemon.programs.request_checker import InvalidRequestError
 
 
 def program(name: str = "a program") -> Program:

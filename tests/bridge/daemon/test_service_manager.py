@@ -9,7 +9,7 @@ import pytest
 
 from robosc_bridge.daemon.service_manager import ServiceManager
 from robosc_bridge.daemon.states import OperatorCommand
-from robosc_bridge.daemon.workers import DriveWorker
+from robosc_bridge.daemon.threads.workers import DriveWorker
 from robosc_bridge.devices.interface import STANDSTILL
 from support.driven import driven
 

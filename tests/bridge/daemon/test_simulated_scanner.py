@@ -5,9 +5,9 @@ from dataclasses import replace
 
 import pytest
 
-from robosc_bridge.daemon.backoff import Backoff
-from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report
-from robosc_bridge.daemon.workers import RESTART_LIMIT, ScannerWorker
+from robosc_bridge.daemon.threads.backoff import Backoff
+from robosc_bridge.daemon.threads.reports import Device, DeviceDown, DeviceUp, Report
+from robosc_bridge.daemon.threads.workers import RESTART_LIMIT, ScannerWorker
 from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.devices.lidar import make_lds01
 from robosc_bridge.safety import Caution, Reason, SafetyLayer

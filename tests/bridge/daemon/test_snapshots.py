@@ -1,8 +1,8 @@
 """Tests of the data for watchers: every change at once, measurements at most twenty times a second, log entries."""
 
 from robosc_bridge.daemon.feed import Snapshot
-from robosc_bridge.daemon.reports import Device, DeviceDown, SafetyNotice
 from robosc_bridge.daemon.states import OperatorCommand, Order, State
+from robosc_bridge.daemon.threads.reports import Device, DeviceDown, SafetyNotice
 from robosc_bridge.safety import Caution, Reason
 from support.daemons import PERIOD_S, Scene
 

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import pytest
 
-from robosc_bridge.daemon.backoff import Backoff
-from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
-from robosc_bridge.daemon.workers import RESTART_LIMIT, VALID_LIMIT, DriveWorker, ScannerWorker
+from robosc_bridge.daemon.threads.backoff import Backoff
+from robosc_bridge.daemon.threads.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
+from robosc_bridge.daemon.threads.workers import RESTART_LIMIT, VALID_LIMIT, DriveWorker, ScannerWorker
 from robosc_bridge.devices.interface import (
     BINS,
     STANDSTILL,

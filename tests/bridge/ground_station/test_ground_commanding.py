@@ -2,8 +2,8 @@
 
 import pytest
 
-from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import OperatorCommand, State
+from robosc_bridge.daemon.threads.reports import Device
 from robosc_bridge.safety import Reason
 from support.ground import Station, joined_texts, of_type
 from support.ground_talk import Talk

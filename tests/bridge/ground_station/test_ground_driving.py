@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from robosc_bridge.daemon.programs import Attached, Detached, MessageRequested, Refused
+from robosc_bridge.daemon.programs.items import Attached, Detached, MessageRequested, Refused
 from robosc_bridge.daemon.states import State
 from robosc_bridge.safety import Reason
 from support.ground import CONFIGURATION, PlayedDaemon, Station, joined_texts

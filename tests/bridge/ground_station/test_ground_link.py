@@ -10,7 +10,7 @@ from typing import Any
 
 import pytest
 
-from robosc_bridge.daemon.programs import Detached
+from robosc_bridge.daemon.programs.items import Detached
 from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.ground_station.link import LASTING_S, REST, TURN_S, GroundLink

@@ -7,9 +7,9 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from robosc_bridge.daemon.programs import MessageRequested
-from robosc_bridge.daemon.reports import Device
+from robosc_bridge.daemon.programs.items import MessageRequested
 from robosc_bridge.daemon.states import OperatorCommand, State
+from robosc_bridge.daemon.threads.reports import Device
 from robosc_bridge.ground_station.settings import GroundSettings
 from robosc_bridge.safety import Reason
 from support.effort import examples

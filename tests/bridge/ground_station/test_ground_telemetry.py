@@ -9,8 +9,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
-from robosc_bridge.daemon.reports import Device
 from robosc_bridge.daemon.states import State
+from robosc_bridge.daemon.threads.reports import Device
 from robosc_bridge.devices.interface import BINS, MotorFault, Pose, Velocity
 from robosc_bridge.ground_station import telemetry
 from robosc_bridge.ground_station.command_handler import ReceivedCommand, acknowledgement

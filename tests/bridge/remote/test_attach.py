@@ -17,7 +17,7 @@ import grpc
 import pytest
 
 from robosc_api.v1 import bridge_pb2 as pb
-from robosc_bridge.daemon import programs
+from robosc_bridge.daemon.programs import items as programs
 from robosc_bridge.remote import RemoteEndpoint, RemoteSettings, service, session
 from robosc_bridge.remote import endpoint as endpoint_module
 from robosc_bridge.remote.data import MAXIMUM_DEPTH, value_of

@@ -7,7 +7,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from robosc_bridge.daemon import programs
+from robosc_bridge.daemon.programs import items as programs
 from robosc_bridge.remote import endpoint as endpoint_module
 from support.remote import FakeDaemon, served
 from support.terminals import Terminal, driving, requested_velocities

@@ -10,9 +10,9 @@ import math
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from robosc_bridge.daemon.backoff import Backoff
-from robosc_bridge.daemon.frame_errors import FrameErrorMonitor
-from robosc_bridge.daemon.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
+from robosc_bridge.daemon.threads.backoff import Backoff
+from robosc_bridge.daemon.threads.frame_errors import FrameErrorMonitor
+from robosc_bridge.daemon.threads.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
 from robosc_bridge.daemon.timing import Timing
 from robosc_bridge.devices.interface import DriveBase, DriveReading, MotorFault, RangeScanner, Scan, Velocity
 from robosc_bridge.errors import BridgeError, DeviceSilentError

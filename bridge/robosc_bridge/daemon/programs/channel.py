@@ -11,11 +11,11 @@ from typing import Any
 from robosc.model.structure import Communication, CommunicationKind
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
-from robosc_bridge.daemon.clients import Clients
-from robosc_bridge.daemon.programs import (
+from robosc_bridge.daemon.programs.items import (
     CallFailed,
     CallMade,
     CancelMade,
+    Clients,
     FeedbackGiven,
     GoalAccepted,
     GoalEnded,
@@ -25,7 +25,7 @@ from robosc_bridge.daemon.programs import (
     Program,
     Replied,
 )
-from robosc_bridge.daemon.supervised import Listeners, Supervised
+from robosc_bridge.daemon.robot.executor_inputs import Listeners, Supervised
 
 _log = logging.getLogger(__name__)
 

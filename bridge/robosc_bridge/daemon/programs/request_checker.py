@@ -13,9 +13,15 @@ from robosc.model.structure import Communication, CommunicationKind, Model
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import CHANNELS, Channel, RotateChannel, channel_name
 from robosc_bridge.configuration.shapes import Shape
-from robosc_bridge.daemon.plain_data import accepted, completed, is_number, why_not_shaped, why_not_typed
-from robosc_bridge.daemon.programs import CallRequested, CancelRequested, FromProgram, GoalRequested, MessageRequested
-from robosc_bridge.daemon.wheel_messages import angle_of
+from robosc_bridge.daemon.programs.items import (
+    CallRequested,
+    CancelRequested,
+    FromProgram,
+    GoalRequested,
+    MessageRequested,
+)
+from robosc_bridge.daemon.programs.plain_data import accepted, completed, is_number, why_not_shaped, why_not_typed
+from robosc_bridge.daemon.robot.channel_data import angle_of
 from robosc_bridge.skills.rotate import MAXIMUM_ANGLE_RAD
 
 MAXIMUM_ID = 255

@@ -11,14 +11,22 @@ from typing import Any
 
 from robosc_bridge.configuration import channels
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
-from robosc_bridge.daemon.channel_data import battery_data, imu_data, odometry_data, scan_data, shaped
-from robosc_bridge.daemon.motion import MotionTarget
-from robosc_bridge.daemon.program_channel import ProgramChannel
-from robosc_bridge.daemon.reports import Device, Sighting
-from robosc_bridge.daemon.rotations import Rotations, service_response
-from robosc_bridge.daemon.stop_switch import StopSwitch
-from robosc_bridge.daemon.supervised import Listeners, Supervised
-from robosc_bridge.daemon.wheel_messages import finite, is_default, velocity_of
+from robosc_bridge.daemon.programs.channel import ProgramChannel
+from robosc_bridge.daemon.robot.channel_data import (
+    battery_data,
+    finite,
+    imu_data,
+    is_default,
+    odometry_data,
+    scan_data,
+    shaped,
+    velocity_of,
+)
+from robosc_bridge.daemon.robot.executor_inputs import Listeners, Supervised
+from robosc_bridge.daemon.robot.motion import MotionTarget
+from robosc_bridge.daemon.robot.rotations import Rotations, service_response
+from robosc_bridge.daemon.robot.stop_switch import StopSwitch
+from robosc_bridge.daemon.threads.reports import Device, Sighting
 from robosc_bridge.devices.interface import DriveReading, Scan
 
 _log = logging.getLogger(__name__)

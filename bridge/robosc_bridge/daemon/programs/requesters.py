@@ -14,12 +14,12 @@ from typing import Any
 
 from robosc.execution.runtime.layer import Layer
 from robosc.model.structure import CommunicationKind
-from robosc_bridge.daemon.clients import Clients
-from robosc_bridge.daemon.programs import (
+from robosc_bridge.daemon.programs.items import (
     Answered,
     Blocked,
     CallRequested,
     CancelRequested,
+    Clients,
     FeedbackPassed,
     GoalOver,
     GoalRejected,
@@ -29,7 +29,7 @@ from robosc_bridge.daemon.programs import (
     PassedOn,
     Program,
 )
-from robosc_bridge.daemon.request_checker import ProgramRequest, RequestChecker
+from robosc_bridge.daemon.programs.request_checker import ProgramRequest, RequestChecker
 
 _log = logging.getLogger(__name__)
 

@@ -10,9 +10,9 @@ from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, field
 
-from robosc_bridge.daemon.plain_data import weight_bytes, why_not_plain
-from robosc_bridge.daemon.programs import Attached, Detached, FromProgram, Program
-from robosc_bridge.daemon.request_checker import InvalidRequestError
+from robosc_bridge.daemon.programs.items import Attached, Detached, FromProgram, Program
+from robosc_bridge.daemon.programs.plain_data import weight_bytes, why_not_plain
+from robosc_bridge.daemon.programs.request_checker import InvalidRequestError
 
 MAXIMUM_WAITING = 200
 """Maximum number of waiting messages of one program."""

@@ -2,15 +2,15 @@
 
 from typing import assert_never
 
-from robosc_bridge.daemon.clients import Clients
 from robosc_bridge.daemon.execution import Execution
-from robosc_bridge.daemon.program_channel import ProgramChannel
-from robosc_bridge.daemon.program_inbox import Arrived, Overflowed, Unreadable
-from robosc_bridge.daemon.programs import (
+from robosc_bridge.daemon.programs.channel import ProgramChannel
+from robosc_bridge.daemon.programs.inbox import Arrived, Overflowed, Unreadable
+from robosc_bridge.daemon.programs.items import (
     Attached,
     CallFailed,
     CallRequested,
     CancelRequested,
+    Clients,
     Detached,
     FeedbackGiven,
     GoalAccepted,
@@ -21,8 +21,8 @@ from robosc_bridge.daemon.programs import (
     Program,
     Replied,
 )
-from robosc_bridge.daemon.requesters import Requesters
-from robosc_bridge.daemon.robot_adapter import RobotAdapter
+from robosc_bridge.daemon.programs.requesters import Requesters
+from robosc_bridge.daemon.robot.adapter import RobotAdapter
 
 
 class ProgramDispatcher:

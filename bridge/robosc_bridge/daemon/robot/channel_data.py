@@ -1,12 +1,13 @@
-"""Data of the devices, as the data of the channels: the content of a ROS message of the same meaning."""
+"""Data of devices as contents of ROS messages, and wheel commands in the messages of a model."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any
 
+from robosc.execution.runtime.protocol import DataDoesNotFit
 from robosc.expressions import NoneType, ObjectType
 from robosc.model.structure import Communication
-from robosc_bridge.devices.interface import BINS, DriveReading, Pose, Scan
+from robosc_bridge.devices.interface import BINS, DriveReading, Pose, Scan, Velocity
 
 _STEP_RAD = math.tau / BINS
 # Axes of a covariance of ROS, and those of a robot on a floor among them.
@@ -97,3 +98,48 @@ def shaped(communication: Communication, value: Any) -> Any:
         case None | NoneType():
             return None
     return value
+
+
+def velocity_of(message: Any) -> Velocity:
+    """The velocity that a message of the channel `drive` asks for; what is left out is 0."""
+    twist = message if isinstance(message, dict) else {}
+    twist = twist.get("twist", twist) or {}
+    linear, angular = twist.get("linear") or {}, twist.get("angular") or {}
+    return Velocity(float(linear.get("x") or 0.0), float(angular.get("z") or 0.0))
+
+
+def angle_of(message: Any) -> float:
+    """The angle that a message, call or goal of the channel `rotate` asks for, in its unit."""
+    if isinstance(message, dict):
+        message = message.get("data", message.get("angle"))
+    return float(message or 0.0)
+
+
+def finite(communication: str, data: Any) -> Any:
+    """The data itself.
+
+    Raises:
+        DataDoesNotFit: A number of it is not finite.
+    """
+    for number in _numbers(data):
+        if not math.isfinite(number):
+            raise DataDoesNotFit(f"'{communication}' has a number that is not finite")
+    return data
+
+
+def _numbers(data: Any) -> Iterator[float]:
+    if isinstance(data, dict):
+        for part in data.values():
+            yield from _numbers(part)
+    elif isinstance(data, list | tuple):
+        for part in data:
+            yield from _numbers(part)
+    elif isinstance(data, float):
+        yield data
+
+
+def is_default(data: Any) -> bool:
+    """Return True if every part is zero, empty or left out."""
+    if isinstance(data, dict):
+        return all(is_default(part) for part in data.values())
+    return not data

@@ -7,9 +7,9 @@ from typing import Any
 
 from robosc.model.structure import Communication, CommunicationKind
 from robosc_bridge.configuration.channels import RotateChannel, RotatedChannel
-from robosc_bridge.daemon.motion import MotionTarget
-from robosc_bridge.daemon.supervised import Listeners, Supervised
-from robosc_bridge.daemon.wheel_messages import angle_of
+from robosc_bridge.daemon.robot.channel_data import angle_of
+from robosc_bridge.daemon.robot.executor_inputs import Listeners, Supervised
+from robosc_bridge.daemon.robot.motion import MotionTarget
 
 _log = logging.getLogger(__name__)
 

@@ -1,6 +1,6 @@
 """The thread in which a worker takes its steps."""
 
-from robosc_bridge.daemon.workers import Worker
+from robosc_bridge.daemon.threads.workers import Worker
 from robosc_bridge.host import Host
 
 

@@ -48,7 +48,9 @@ def configured(folder: Path, robot: SimulatedTurtleBot3, base: str, address: str
         text = text.replace("  driver: opencr\n", "  driver: mavlink-rover\n", 1)
     else:
         text = text.replace("\nscanner:\n", "  options: {answer_limit_s: 0.3}\n\nscanner:\n", 1)
-    text = re.sub(r"^  (overrun_s|motor_timeout_s|scan_timeout_s): .*$", r"  \1: 1.0", text, flags=re.MULTILINE)
+    text = re.sub(
+        r"^  (overrun_s|motor_timeout_s|command_timeout_s|scan_timeout_s): .*$", r"  \1: 1.0", text, flags=re.MULTILINE
+    )
     text = text.replace("  grpc_address: null\n", f"  grpc_address: {address}\n", 1)
     file = folder / "bridge.yaml"
     file.write_text(text)

@@ -114,7 +114,7 @@ class Scene:
         job = Job(
             supervisor,
             mapping,
-            mapping.settings(configuration.execution),
+            mapping.settings(configuration.execution, supervisor.deployment),
             needs_scanner,
             starts_itself,
             stays,

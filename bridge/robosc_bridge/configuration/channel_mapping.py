@@ -7,7 +7,7 @@ import msgspec
 
 from robosc.execution.runtime.settings import Settings, settings_from
 from robosc.expressions import Constant, Expression, Type
-from robosc.model.structure import Communication, CommunicationKind, Model, ObjectValue, ProvidedValue
+from robosc.model.structure import Communication, CommunicationKind, Deployment, Model, ObjectValue, ProvidedValue
 from robosc_bridge.configuration.channels import (
     CHANNELS,
     BumperChannel,
@@ -44,9 +44,12 @@ class ChannelMapping:
         found = ((item, self.channels[item.name]) for item in self.communications)
         return tuple((item, mapped) for item, mapped in found if isinstance(mapped, channel))
 
-    def settings(self, execution: Execution) -> Settings:
+    def settings(self, execution: Execution, deployment: Deployment = Deployment.CONTROLLER) -> Settings:
         """Settings of the executor; what is mapped to the drive keeps acting until it is released, unless told else."""
         given = msgspec.structs.asdict(execution)
+        if execution.every is None:
+            # A scan is decided on at once; a layer decides nothing.
+            given["every"] = "event" if deployment is Deployment.CONTROLLER else Settings().every
         if execution.release_identifiers is None:
             acting = (item.identifier for item, _ in self.mapped_to(DriveChannel))
             given["release_identifiers"] = tuple(dict.fromkeys(acting))

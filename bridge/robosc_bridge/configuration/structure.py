@@ -71,8 +71,12 @@ class Execution(_Section, frozen=True):
     # The safety layer waits for the loop for two periods at least.
     period_s: Annotated[float, Meta(ge=0.001, le=0.5, description="Time between decisions, in seconds.")] = 0.02
     every: Annotated[
-        Literal["period", "event"], Meta(description="Times of decisions: each period, or after each message as well.")
-    ] = "period"
+        Literal["period", "event"] | None,
+        Meta(
+            description="Times of decisions: each period, or after each message as well; null: `event`, or none in a "
+            "supervision layer."
+        ),
+    ] = None
     policy: Annotated[
         Literal["fair", "priority", "random"],
         Meta(description="Choice of the request that is issued where several may be."),

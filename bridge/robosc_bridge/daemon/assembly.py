@@ -178,7 +178,7 @@ def check_settings(configuration: Configuration, mapping: ChannelMapping, deploy
     drive_base(configuration)
     if configuration.scanner is not None:
         range_scanner(configuration.scanner)
-    settings = mapping.settings(configuration.execution)
+    settings = mapping.settings(configuration.execution, deployment)
     problems = [
         *file_problems(configuration, fastest),
         *camera_problems(configuration.skills.line, mapping, settings),

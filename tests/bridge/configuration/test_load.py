@@ -279,7 +279,7 @@ def test_a_file_is_loaded_by_its_path(tmp_path: Path) -> None:
 def test_the_executor_knows_every_setting_and_most_defaults() -> None:
     mine, theirs = msgspec.structs.asdict(Execution()), Settings()._asdict()
     assert mine.keys() == theirs.keys()
-    assert {name for name in mine if mine[name] != theirs[name]} == {"period_s"}
+    assert {name for name in mine if mine[name] != theirs[name]} == {"period_s", "every"}
 
 
 def test_the_shipped_schema_is_that_of_the_structures() -> None:

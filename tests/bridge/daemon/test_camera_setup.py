@@ -88,7 +88,14 @@ class Scene:
         assert MADE.supervisor is not None
         clock = ManualClock(now_s=50.0)
         self.log = MemoryLog()
-        job = Job(MADE.supervisor, mapping, mapping.settings(configuration.execution), False, True, needs_camera=True)
+        job = Job(
+            MADE.supervisor,
+            mapping,
+            mapping.settings(configuration.execution, MADE.supervisor.deployment),
+            False,
+            True,
+            needs_camera=True,
+        )
         skills = configuration.skills
         stop = EmergencyStop(skills.emergency_stop)
         self.daemon = Daemon(job, SafetyLayer(LIMITS), Rotate(skills.rotate), stop, clock, self.log)

@@ -198,7 +198,7 @@ class Explained(Outcome):
     reason: str
     explanation: "Explanation | NoSupervisor"
 
-    def _made(self) -> object:
+    def _product(self) -> object:
         return None if isinstance(self.explanation, NoSupervisor) else self.explanation
 
 

@@ -85,6 +85,8 @@ def maze_run(
         settings = (
             f"robot: burger\ndrive: {{driver: {base}, port: {robot.base_path}}}\n"
             f"scanner: {{driver: {lidar}, port: {robot.scanner_path}}}\n"
+            # The mouth of a maze leads to the open, where a LiDAR may measure nothing.
+            "safety: {stops_when_blind: false}\n"
             "skills: {rotate: {speed_rad_s: 0.6, patience_s: 30}}\n" + MAZE_CHANNELS
         )
         configuration = parse(settings.encode(), "maze.yaml").configuration

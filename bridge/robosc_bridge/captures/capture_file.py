@@ -10,6 +10,7 @@ are recorded, so that a file that ends in the middle loses no more than its last
 """
 
 import json
+import math
 import struct
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field
@@ -55,6 +56,7 @@ class LineInfo:
         robot: Name of the robot; empty: it has none.
         options: Options of the driver.
         port: Path or address; empty: removed.
+        separation_m: Distance between the wheels of a robot that has no name, in metres; 0: it is not known.
     """
 
     name: str
@@ -62,11 +64,13 @@ class LineInfo:
     robot: str = ""
     options: Mapping[str, Any] = field(default_factory=dict)
     port: str = ""
+    separation_m: float = 0.0
 
     @property
     def metadata(self) -> dict[str, str]:
         """Metadata of a channel."""
-        texts = {"driver": self.driver, "robot": self.robot, "port": self.port}
+        separation = f"{self.separation_m}" if self.separation_m else ""
+        texts = {"driver": self.driver, "robot": self.robot, "port": self.port, "wheel_separation_m": separation}
         return {name: text for name, text in texts.items() if text} | {"options": json.dumps(dict(self.options))}
 
     @classmethod
@@ -79,7 +83,17 @@ class LineInfo:
         options = json.loads(metadata.get("options", "{}"))
         if not isinstance(options, dict):
             raise ValueError("options of a line are no mapping")
-        return cls(name, metadata.get("driver", ""), metadata.get("robot", ""), options, metadata.get("port", ""))
+        separation_m = float(metadata.get("wheel_separation_m", "0"))
+        if not 0.0 <= separation_m < math.inf:
+            raise ValueError("the distance between the wheels is not a number of metres")
+        return cls(
+            name,
+            metadata.get("driver", ""),
+            metadata.get("robot", ""),
+            options,
+            metadata.get("port", ""),
+            separation_m,
+        )
 
 
 @dataclass(frozen=True, slots=True)

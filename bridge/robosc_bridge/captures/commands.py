@@ -6,7 +6,7 @@ import sys
 from collections.abc import Iterator, Mapping
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robosc_bridge.captures.capture_file import (
     SUFFIX,
@@ -16,11 +16,12 @@ from robosc_bridge.captures.capture_file import (
     read_capture,
     write_capture,
 )
-from robosc_bridge.captures.players import Item, Summary, play
 from robosc_bridge.captures.recorder import LEAST_MIB, USUAL_MIB, Recorder
-from robosc_bridge.captures.redaction import metadata_of, redacted
 from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.host import Host
+
+if TYPE_CHECKING:
+    from robosc_bridge.captures.players import Item, Summary
 
 OK, PROBLEMS = 0, 1
 
@@ -83,11 +84,12 @@ def make_recorder(arguments: argparse.Namespace, configuration: Configuration, h
 def recorded_lines(configuration: Configuration) -> Mapping[str, LineInfo]:
     """Return the lines of a robot, by path or address; a LiDAR on the base's line is that line."""
     drive, scanner = configuration.drive, configuration.scanner
-    robot = configuration.robot if isinstance(configuration.robot, str) else ""
+    chosen = configuration.robot
+    robot, separation_m = (chosen, 0.0) if isinstance(chosen, str) else ("", chosen.wheel_separation_m)
     lines = {}
     if scanner is not None:
         lines[scanner.port] = LineInfo("scanner", scanner.driver, "", _recorded(scanner.options), scanner.port)
-    lines[drive.port] = LineInfo("base", drive.driver, robot, _recorded(drive.options), drive.port)
+    lines[drive.port] = LineInfo("base", drive.driver, robot, _recorded(drive.options), drive.port, separation_m)
     return lines
 
 
@@ -108,14 +110,19 @@ def _mib(text: str) -> int:
     return int(text)
 
 
-def replay(capture: Capture, summaries: dict[str, Summary]) -> Iterator[Item]:
+def replay(capture: Capture, summaries: "dict[str, Summary]") -> "Iterator[Item]":
     """Yield what the drivers make of a capture, line by line; the summaries grow with it, by line."""
+    # All drivers, which take long to load.
+    from robosc_bridge.captures.players import Summary, play
+
     for name, info in capture.lines.items():
         summary = summaries[name] = Summary(info.driver)
         yield from play(info, [record for record in capture.records if record.line == name], capture.begin_ns, summary)
 
 
 def _replay(arguments: argparse.Namespace) -> int:
+    from robosc_bridge.captures.redaction import metadata_of
+
     capture = read_capture(arguments.file)
     if arguments.line is not None:
         if arguments.line not in capture.lines:
@@ -139,13 +146,13 @@ def _replay(arguments: argparse.Namespace) -> int:
     return PROBLEMS if has_problems or not capture.is_whole else OK
 
 
-def _text(item: Item) -> str:
+def _text(item: "Item") -> str:
     values = {name: value for name, value in item.values.items() if name != "ranges_m"}
     words = " ".join(f"{name}={json.dumps(value)}" for name, value in values.items())
     return f"{item.time_s:10.3f} {item.line:8} {item.kind:8} {words}"
 
 
-def _figures(summary: Summary) -> str:
+def _figures(summary: "Summary") -> str:
     figures = asdict(summary)
     problems = figures.pop("problems")
     figures.pop("driver")
@@ -154,6 +161,8 @@ def _figures(summary: Summary) -> str:
 
 
 def _redact(arguments: argparse.Namespace) -> int:
+    from robosc_bridge.captures.redaction import redacted
+
     capture = redacted(read_capture(arguments.file), arguments.without)
     write_capture(arguments.output, capture.lines, capture.records)
     sys.stdout.write(f"{arguments.output}: {len(capture.records)} records of {', '.join(capture.lines)}\n")

@@ -13,13 +13,14 @@ from typing import Any
 from dynamixel_sdk import INST_PING, INST_READ, INST_SYNC_READ, INST_SYNC_WRITE, INST_WRITE
 
 from robosc_bridge.captures.capture_file import Kind, LineInfo, Record
+from robosc_bridge.devices.board_yaw import BoardYaw
 from robosc_bridge.devices.interface import Pose, Scan, Velocity
 from robosc_bridge.devices.kinematics import body_velocity
 from robosc_bridge.devices.lidar import Lidar
 from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
 from robosc_bridge.devices.mavlink_state import VehicleState
-from robosc_bridge.devices.odometry import Odometry
-from robosc_bridge.devices.robots import ROBOTS
+from robosc_bridge.devices.odometry import Odometry, Rotation
+from robosc_bridge.devices.robots import ROBOTS, Wheels
 from robosc_bridge.driver_registry import Kind as DriverKind
 from robosc_bridge.driver_registry import available_drivers, make_range_scanner
 from robosc_bridge.errors import LineLostError
@@ -171,12 +172,17 @@ class _Servos(_Player):
     def __init__(self, info: LineInfo, begin_ns: int, summary: Summary) -> None:
         super().__init__(info, begin_ns, summary)
         self._out, self._in = PacketDecoder(), PacketDecoder()
-        self._robot = ROBOTS.get(info.robot) or ROBOTS["burger"]
-        self._odometry = Odometry(self._robot.tick_m, self._robot.wheel_separation_m)
+        self._wheels = _wheels_of(info)
+        self._odometry = Odometry(self._wheels.tick_m, self._wheels.separation_m)
+        self._yaw = BoardYaw() if info.options.get("heading", "fused") == "fused" else None
         motors = info.options.get("motors", (1, 2))
         self._motors: tuple[int, ...] = tuple(motors) if isinstance(motors, (list, tuple)) else (1, 2)
-        # Mounted the other way round, the right one counts backward unless it is set to reverse.
-        self._signs = dict.fromkeys(self._motors[:1], 1) | dict.fromkeys(self._motors[1:], -1)
+        mirrored = info.options.get("mirrored")
+        if not (isinstance(mirrored, list | tuple) and len(mirrored) == 2):
+            mirrored = (False, True)
+        # Mounted the other way round, one counts backward unless it is set to reverse.
+        self._mirrored = dict(zip(self._motors, map(bool, mirrored), strict=False))
+        self._signs = {motor: -1 if is_mirrored else 1 for motor, is_mirrored in self._mirrored.items()}
         self._asked: dict[int, Packet] = {}
         self._measured: dict[int, servo.Measurement] = {}
         self._answered_s: float | None = None
@@ -256,24 +262,24 @@ class _Servos(_Player):
             return
         if address <= servo.DRIVE_MODE < address + len(data) and device in self._signs:
             is_reverse = bool(data[servo.DRIVE_MODE - address] & servo.REVERSE)
-            self._signs[device] = 1 if is_reverse == (device in self._motors[1:]) else -1
+            self._signs[device] = 1 if is_reverse == self._mirrored[device] else -1
         if (address, len(data)) == (servo.MEASUREMENT_ADDRESS, servo.MEASUREMENT_LENGTH):
             self._measured[device] = servo.decode_measurement(data)
             if set(self._measured) == set(self._motors):
                 yield self._pair([self._measured[motor] for motor in self._motors])
                 self._measured = {}
 
-    def _moved(self, ticks: tuple[int, int], raw: tuple[int, int]) -> dict[str, Any]:
+    def _moved(self, ticks: tuple[int, int], raw: tuple[int, int], measured: Rotation | None = None) -> dict[str, Any]:
         jumps = self._odometry.jumps(*ticks)
-        self._odometry = self._odometry.rebased(*jumps).advanced(*ticks)
-        left_m_s, right_m_s = (speed * self._robot.raw_m_s for speed in raw)
-        velocity = body_velocity(left_m_s, right_m_s, self._robot.wheel_separation_m)
+        self._odometry = self._odometry.rebased(*jumps).advanced(*ticks, measured)
+        left_m_s, right_m_s = (speed * self._wheels.raw_m_s for speed in raw)
+        velocity = body_velocity(left_m_s, right_m_s, self._wheels.separation_m)
         return _motion(self._odometry.pose, velocity, (left_m_s, right_m_s))
 
     def _board(self, block: opencr.Block) -> Item:
         return self.item(
             "reading",
-            **self._moved(block.ticks, block.velocities_raw),
+            **self._moved(block.ticks, block.velocities_raw, None if self._yaw is None else self._yaw.rotation(block)),
             is_torque_on=block.is_torque_on,
             battery_v=block.battery_v,
             uptime_ms=block.uptime_ms,
@@ -292,6 +298,20 @@ class _Servos(_Player):
             battery_v=min(one.voltage_v for one in measured),
             temperature_c=max(one.temperature_c for one in measured),
         )
+
+
+def _wheels_of(info: LineInfo) -> Wheels:
+    """Return the wheels that the odometry went by; those of a Burger where the capture does not say."""
+    known = ROBOTS.get(info.robot) or ROBOTS["burger"]
+    if info.robot or not info.separation_m:
+        return known.wheels
+    radius_m = _above_zero(info.options.get("wheel_radius_m"), known.wheel_radius_m)
+    return Wheels(radius_m, info.separation_m, _above_zero(info.options.get("gear_ratio"), 1.0))
+
+
+def _above_zero(value: object, usual: float) -> float:
+    """Return a number of a file that anybody may have written."""
+    return float(value) if isinstance(value, int | float) and math.isfinite(value) and value > 0 else usual
 
 
 class _Vehicle(_Player):

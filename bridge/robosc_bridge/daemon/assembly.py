@@ -29,7 +29,7 @@ from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.service_manager import ServiceManager
 from robosc_bridge.daemon.states import OperatorCommand
-from robosc_bridge.daemon.threads.camera import camera_problems, camera_worker, needs_camera
+from robosc_bridge.daemon.threads.camera_setup import camera_problems, camera_worker, needs_camera
 from robosc_bridge.daemon.threads.device_thread import DeviceThread
 from robosc_bridge.daemon.threads.reports import Device
 from robosc_bridge.daemon.threads.workers import DriveWorker, ScannerWorker

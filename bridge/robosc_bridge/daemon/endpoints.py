@@ -12,7 +12,7 @@ from robosc_bridge.daemon.threads.device_thread import DeviceThread
 from robosc_bridge.daemon.view_settings import settings_of as view_settings
 from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.errors import BridgeError
-from robosc_bridge.ground_station import GroundLink, ground_settings
+from robosc_bridge.ground_station.settings import ground_settings
 from robosc_bridge.remote import RemoteEndpoint, settings_of
 from robosc_bridge.safety import SafetyLimits
 
@@ -89,6 +89,9 @@ def make_endpoints(configuration: Configuration, operations: Operations, limits:
         endpoints.append(RemoteEndpoint(operations, remote))
     ground = ground_settings(configuration, Velocity(limits.linear_m_s, limits.angular_rad_s))
     if ground is not None:
+        # MAVLink's dialect takes long to load, and few robots need it.
+        from robosc_bridge.ground_station.link import GroundLink
+
         endpoints.append(GroundLink(operations, ground))
     if configuration.remote.metrics_address is not None:
         # Its modules are loaded only where somebody asks for them.

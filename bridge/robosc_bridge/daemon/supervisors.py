@@ -38,7 +38,6 @@ from robosc.verification import DEFAULT_STATES, Limits
 from robosc_api.security import Credentials
 from robosc_bridge.configuration.structure import SupervisorSource
 from robosc_bridge.errors import BridgeError
-from robosc_client import Client, ClientError, ServerUnavailableError, SynthesisOptions, SynthesisStatus
 
 MODEL_SUFFIX, SUPERVISOR_SUFFIX = ".rscd", ".rsup"
 _SERVER_LIMIT_S = 120.0
@@ -306,6 +305,8 @@ def _checked(data: bytes, place: str, bundle: Bundle, source: Source, tell: Call
 
 def _served(bundle: Bundle, server: str, source: Source, tell: Callable[[str], None]) -> Supervisor:
     """Return the supervisor that the server makes, or else the one that it made last."""
+    from robosc_client import Client, ClientError, ServerUnavailableError, SynthesisOptions, SynthesisStatus
+
     cache = source.cache / f"{bundle.digest}-{source.deployment}{SUPERVISOR_SUFFIX}" if source.cache else None
     tell(f"{bundle.main.name}: synthesis at {server}")
     try:

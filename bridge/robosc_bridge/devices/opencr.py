@@ -21,10 +21,11 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Literal, NoReturn
 
+from robosc_bridge.devices.board_yaw import UPTIME_MODULUS, BoardYaw
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, BusCounters, DynamixelBus, exchange_limit_s
 from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFault, Velocity
 from robosc_bridge.devices.kinematics import body_velocity, opencr_words, wheel_speeds
-from robosc_bridge.devices.odometry import Odometry, Rotation, velocity_variances
+from robosc_bridge.devices.odometry import Odometry, velocity_variances
 from robosc_bridge.devices.robots import Robot
 from robosc_bridge.devices.wheel_following import ExcessMonitor, FollowingMonitor
 from robosc_bridge.errors import BridgeError, DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
@@ -48,11 +49,6 @@ _REST_LIMIT_S = 1.0
 _TORQUE_LIMIT_S = 1.0
 _REFRESHED_MS = 45  # Two refreshes, every 20 ms, of what the board knows of its motors.
 _POLL_S = 0.01
-_UPTIME_MODULUS = 2**32
-# Of the inertial sensor: variance of its yaw in a second (0.1 degrees), with what its filter adds; what no body does.
-_GYRO_RAD2_S = 3e-6
-_FASTEST_RAD_S, _LEAST_RAD = 6.0, 0.1
-_REFRESH_S = 0.02
 # Differences between the board's time and the computer's, from one reading to the next, that a restart is told from.
 _LEAD_S = 0.7
 _LAG_S = 1.0
@@ -85,9 +81,8 @@ class OpenCrBase:
         heading: Literal["fused", "wheels"] = "fused",
         host: Host = SYSTEM_HOST,
     ) -> None:
-        self._is_fused = heading == "fused"
-        # Yaw of the inertial sensor in the last block, and the uptime then.
-        self._yaw: tuple[float, int] | None = None
+        # None where the heading is that of the wheels alone.
+        self._yaw = BoardYaw() if heading == "fused" else None
         self.limits: DriveLimits = robot.limits(robot.motor.velocity_limit_raw)
         self._path = path
         self._robot = robot
@@ -136,7 +131,9 @@ class OpenCrBase:
         try:
             self._line = line
             self._bus = DynamixelBus(line, lambda device: f"{self._path}: OpenCR", self._answer_limit_s, self._host)
-            self._uptime = self._yaw = None
+            self._uptime = None
+            if self._yaw is not None:
+                self._yaw.forget()
             self._is_torque_wanted = self._is_torque_lost = False
             self._odometry = self._odometry.rebased()
             self._following.forget()
@@ -419,7 +416,7 @@ class OpenCrBase:
             self._host.sleep(_POLL_S)
             block = self._cycle((0, 0))
             # Before, the board tells what was written or how it was, and not what the motors do.
-            is_refreshed = (block.uptime_ms - begin_ms) % _UPTIME_MODULUS >= _REFRESHED_MS
+            is_refreshed = (block.uptime_ms - begin_ms) % UPTIME_MODULUS >= _REFRESHED_MS
             if is_refreshed and is_done(block):
                 return True
             if self._host.monotonic() > end_s:
@@ -445,8 +442,8 @@ class OpenCrBase:
         received_s = self._used_bus.received_s
         if self._uptime is not None:
             before_ms, before_asked_s, before_received_s = self._uptime
-            half = _UPTIME_MODULUS // 2
-            passed_s = ((uptime_ms - before_ms + half) % _UPTIME_MODULUS - half) / 1000
+            half = UPTIME_MODULUS // 2
+            passed_s = ((uptime_ms - before_ms + half) % UPTIME_MODULUS - half) / 1000
             if passed_s < max(0.0, asked_s - before_received_s - _LAG_S):
                 self._give_up("OpenCR has started anew")
             if passed_s > received_s - before_asked_s + _LEAD_S:
@@ -469,7 +466,7 @@ class OpenCrBase:
         if not block.is_torque_on:
             # The firmware does not switch torque on again: only now a motor may have restarted.
             self._odometry = self._odometry.rebased(*self._odometry.jumps(*block.ticks))
-        self._odometry = self._odometry.advanced(*block.ticks, self._measured_rotation(block))
+        self._odometry = self._odometry.advanced(*block.ticks, None if self._yaw is None else self._yaw.rotation(block))
         left_m_s, right_m_s = (raw * self._robot.raw_m_s for raw in block.velocities_raw)
         # Below this, the board no longer refreshes the share.
         is_empty = block.battery_v < self._robot.battery.empty_v
@@ -491,25 +488,3 @@ class OpenCrBase:
                 left_m_s, right_m_s, self._robot.raw_m_s, self._robot.wheel_separation_m
             ),
         )
-
-    def _measured_rotation(self, block: Block) -> Rotation | None:
-        """Return the rotation since the last block as the inertial sensor has it; None: it is not known."""
-        if not self._is_fused:
-            return None
-        motion, last = block.motion, self._yaw
-        w, x, y, z = (motion.get(f"orientation_{axis}", 0.0) for axis in "wxyz")
-        if not 0.9 < w * w + x * x + y * y + z * z < 1.1:
-            # One that has not started yet.
-            self._yaw = None
-            return None
-        # As turtlebot3_node has it.
-        yaw_rad = math.atan2(x * y + w * z, 0.5 - y * y - z * z)
-        self._yaw = yaw_rad, block.uptime_ms
-        if last is None:
-            return None
-        passed_s = (block.uptime_ms - last[1]) % _UPTIME_MODULUS / 1000
-        angle_rad = math.remainder(yaw_rad - last[0], math.tau)
-        if abs(angle_rad) > _FASTEST_RAD_S * passed_s + _LEAST_RAD:
-            # It was calibrated, or corrects itself: no body rotates so fast.
-            return None
-        return Rotation(angle_rad, _GYRO_RAD2_S * max(passed_s, _REFRESH_S))

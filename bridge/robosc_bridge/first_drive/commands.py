@@ -8,7 +8,7 @@ import threading
 from collections.abc import Callable
 from dataclasses import asdict
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from robosc.doctor import Finding, Grade, Machine, Purpose, examine, is_ready
 from robosc_bridge.configuration import ConfigurationError, load
@@ -20,12 +20,14 @@ from robosc_bridge.errors import BridgeError, DeviceError
 from robosc_bridge.first_drive import calibration
 from robosc_bridge.first_drive.calibration import CalibrationError
 from robosc_bridge.first_drive.ports import serial_ports, stable_name
-from robosc_bridge.first_drive.probe import ProbedPort, probe
 from robosc_bridge.first_drive.servo_bus import BAUD_NUMBERS, BAUDS
 from robosc_bridge.first_drive.servo_setup import MOST_ID, Change, ServoSetup, Wish
 from robosc_bridge.host import Host
 from robosc_bridge.transport.network_line import is_network_address
 from robosc_bridge.transport.system_host import SYSTEM_HOST
+
+if TYPE_CHECKING:
+    from robosc_bridge.first_drive.probe import ProbedPort
 
 WELL, NOT_WELL, WRONG_USE = 0, 1, 2
 
@@ -113,6 +115,9 @@ def _ask(question: str) -> str:
 
 
 def _probe(arguments: argparse.Namespace, host: Host = SYSTEM_HOST) -> int:
+    # All drivers, which take long to load.
+    from robosc_bridge.first_drive.probe import probe
+
     ports = arguments.port or serial_ports()
     found = [probe(port, host) for port in ports]
     if arguments.json:
@@ -130,7 +135,7 @@ def _stable(port: str) -> str:
     return port if is_network_address(port) else stable_name(port)
 
 
-def _port_lines(probed: ProbedPort) -> list[str]:
+def _port_lines(probed: "ProbedPort") -> list[str]:
     stable = _stable(probed.port)
     lines = [probed.port + (f" (better: {stable})" if stable != probed.port else "")]
     if probed.problem:

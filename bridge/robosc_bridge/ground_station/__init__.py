@@ -4,8 +4,3 @@ Functions from what the daemon shows to messages (`telemetry`, `status`, `values
 wanted (`commands`, `driving`); a session that is driven by time and bytes alone (`session`); a thread around it and a
 line (`link`). It sees the daemon only through `Operations`.
 """
-
-from robosc_bridge.ground_station.link import GroundLink
-from robosc_bridge.ground_station.settings import GroundSettings, ground_settings
-
-__all__ = ["GroundLink", "GroundSettings", "ground_settings"]

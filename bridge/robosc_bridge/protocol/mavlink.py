@@ -12,6 +12,7 @@ from typing import Any, ClassVar
 from pymavlink.dialects.v20 import ardupilotmega as dialect
 
 from robosc_bridge.protocol.framing import FrameDecoder
+from robosc_bridge.protocol.mavlink_signing import KEY_LENGTH
 
 MAGIC = 0xFD
 _HEADER = 10
@@ -19,7 +20,6 @@ _CHECKSUM = 2
 _SIGNATURE = 13
 _SIGNED = 1  # The only flag of what a receiver must understand.
 _RADIO_STATUS = 109  # Radios put it into the stream themselves, and have no key.
-KEY_LENGTH = 32
 
 _OLD_MAGIC = 0xFE
 _OLD_HEADER = 6

@@ -11,9 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robosc_bridge.errors import DeviceError
-from robosc_bridge.protocol.mavlink import KEY_LENGTH
 
 _log = logging.getLogger(__name__)
+
+KEY_LENGTH = 32
+"""Bytes of a key of signing."""
 
 _HEXADECIMAL = frozenset(b"0123456789abcdefABCDEF")
 _EPOCH_S = 1_420_070_400  # 2015-01-01 in UTC.

@@ -5,6 +5,7 @@ import io
 import threading
 from collections.abc import Callable, Iterator, Mapping
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -14,7 +15,7 @@ from robosc_bridge.captures.commands import replay
 from robosc_bridge.captures.players import Item
 from robosc_bridge.captures.recorder import PARTS, Recorder, RecordingHost, part
 from robosc_bridge.devices.interface import DriveReading, Velocity
-from robosc_bridge.devices.robots import ROBOTS
+from robosc_bridge.devices.robots import ROBOTS, Body, Robot
 from robosc_bridge.driver_registry import make_drive_base, make_range_scanner
 from robosc_bridge.errors import LineError, LineLostError
 from robosc_simulated import SimulatedTurtleBot3
@@ -54,12 +55,28 @@ class Full(io.BytesIO):
         return super().write(data)
 
 
-@pytest.mark.parametrize("kind", ["opencr", "dynamixel"])
-def test_a_replay_reads_what_the_driver_has_read(kind: str, host: VirtualHost, tmp_path: Path) -> None:
+OWN = {"wheel_radius_m": 0.04, "gear_ratio": 1.5, "mirrored": (True, False)}
+
+
+@pytest.mark.parametrize(
+    ("kind", "robot", "options"),
+    [
+        ("opencr", ROBOTS["burger"], {}),
+        ("opencr", ROBOTS["burger"], {"heading": "wheels"}),
+        ("dynamixel", ROBOTS["burger"], {}),
+        ("dynamixel", Body(0.1, 0.5, 0.2), OWN),
+    ],
+)
+def test_a_replay_reads_what_the_driver_has_read(
+    kind: str, robot: Robot | Body, options: dict[str, Any], host: VirtualHost, tmp_path: Path
+) -> None:
     file = tmp_path / "run.mcap"
-    with SimulatedTurtleBot3("burger", kind, clock=host) as robot:
-        recorder = Recorder(file, {robot.base_path: LineInfo("base", kind, "burger")}, host, 64 * MIB)
-        base = make_drive_base(kind, path=robot.base_path, robot=ROBOTS["burger"], host=RecordingHost(host, recorder))
+    separation_m = robot.wheel_separation_m if isinstance(robot, Body) else 0.0
+    info = LineInfo("base", kind, "" if separation_m else "burger", options, separation_m=separation_m)
+    with SimulatedTurtleBot3("burger", kind, clock=host) as device:
+        recorder = Recorder(file, {device.base_path: info}, host, 64 * MIB)
+        recording = RecordingHost(host, recorder)
+        base = make_drive_base(kind, path=device.base_path, robot=robot, host=recording, **options)
         base.open()
         base.set_torque(True)
         readings: list[DriveReading] = []
@@ -217,8 +234,10 @@ def test_a_disk_that_does_not_answer_costs_records_and_no_time(
     file.write_bytes(stream.getvalue())
     records = read_capture(file).records
     told = [record.event["records"] for record in records if record.kind is Kind.EVENTS]
-    assert told == [lost]
-    assert len(records) == 3 * module._MOST_WAITING - lost + 1
+    # Once, or twice where some were lost before the disk was asked for the first time.
+    assert sum(told) == lost
+    assert 1 <= len(told) <= 2
+    assert len(records) == 3 * module._MOST_WAITING - lost + len(told)
 
 
 def test_a_full_disk_ends_the_recording_with_one_line_and_nothing_else(

@@ -15,7 +15,7 @@ from robosc_bridge.daemon.assembly import AssemblyError, assemble, check_setting
 from robosc_bridge.daemon.execution import Job
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.states import State
-from robosc_bridge.daemon.threads.camera import needs_camera
+from robosc_bridge.daemon.threads.camera_setup import needs_camera
 from robosc_bridge.daemon.threads.reports import Device, DeviceDown, DeviceUp, Report, SafetyNotice, Sighting
 from robosc_bridge.safety import Caution, SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate

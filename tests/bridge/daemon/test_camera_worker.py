@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from robosc_bridge.daemon.threads.backoff import Backoff
-from robosc_bridge.daemon.threads.camera import FIRST_PICTURE_S, LISTEN_S, REOPEN_S, CameraWorker
+from robosc_bridge.daemon.threads.camera_worker import FIRST_PICTURE_S, LISTEN_S, REOPEN_S, CameraWorker
 from robosc_bridge.daemon.threads.reports import Device, DeviceDown, DeviceUp, Report, Sighting
 from robosc_bridge.devices.camera import GreyRows
 from robosc_bridge.errors import LineLostError, LineMissingError

@@ -3,6 +3,8 @@
 import logging
 import re
 import signal
+import subprocess
+import sys
 from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple
@@ -211,3 +213,12 @@ def test_an_address_that_cannot_be_used_is_one_line(
         assert done.returncode == 2
         assert why in done.stderr
         assert "Traceback" not in done.stderr
+
+
+def test_a_start_loads_no_library_that_few_robots_need() -> None:
+    code = (
+        "import sys, robosc_bridge.main; "
+        "print(*sys.modules.keys() & {'numpy', 'cv2', 'pymavlink', 'prometheus_client', 'rclpy'})"
+    )
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout == "\n"

@@ -2,8 +2,6 @@
 
 import json
 import math
-import subprocess
-import sys
 from argparse import Namespace
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -209,10 +207,3 @@ def test_an_answer_that_is_no_number_is_refused(
         person = Person(host, robot, 60.0, 60.0, "two")
         assert calibrated("wheel-radius", configured(tmp_path, robot, "opencr"), host, person) == 1
     assert "'two' is no number" in capsys.readouterr().err
-
-
-def test_a_bridge_that_starts_does_not_load_what_calibrates() -> None:
-    done = subprocess.run(
-        [sys.executable, "-c", "import robosc_bridge.main, sys; sys.exit('numpy' in sys.modules)"], check=False
-    )
-    assert done.returncode == 0

@@ -50,7 +50,7 @@ def test_a_line_needs_two_points_and_files_are_bounded(
 ) -> None:
     monkeypatch.setattr(signal, "signal", lambda number, handler: None)
     file = tmp_path / "file"
-    for data, text in ((b"", "at least two points"), (b"#" * 300_000, "larger than"), (b"\xff", "no text in UTF-8")):
+    for data, text in ((b"", "at least two points"), (b"#" * 300_000, "larger than"), (b"\xff", "not text in UTF-8")):
         file.write_bytes(data)
         assert main(["--line", str(file)]) == 1
         assert text in capsys.readouterr().err

@@ -38,8 +38,8 @@ WRONG_USE: dict[str, list[str]] = {
 """For each command arguments that its parser takes, but that are wrong."""
 
 CLIENT = [
-    "bench", "cancel", "check", "explore", "format", "generate", "get", "health", "list", "synth", "targets", "verify",
-    "version", "watch",
+    "bench", "cancel", "check", "explain-synthesis", "explore", "format", "generate", "get", "health", "list", "synth",
+    "targets", "verify", "version", "watch",
 ]  # fmt: skip
 """The commands of `robosc-client` with `--json`; `submit` and `profile` have commands of their own."""
 

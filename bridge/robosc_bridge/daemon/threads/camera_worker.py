@@ -1,15 +1,11 @@
-"""The camera of a model that needs it, looked at step by step: each picture is a sighting of the line, or of none."""
+"""The camera kept open and looked at, step by step: each picture is a sighting of the line, and so is their absence."""
 
 import logging
 import math
 from collections.abc import Callable
 
-from robosc.execution.runtime.settings import Settings
-from robosc_bridge.configuration.channel_mapping import ChannelMapping
-from robosc_bridge.configuration.channels import FaultChannel, LineChannel, LineLostChannel
 from robosc_bridge.daemon.threads.backoff import Backoff
 from robosc_bridge.daemon.threads.reports import Device, DeviceDown, DeviceUp, Report, Sighting
-from robosc_bridge.daemon.threads.workers import Worker
 from robosc_bridge.devices.camera import Camera, GreyRows
 from robosc_bridge.errors import BridgeError, DeviceSilentError
 from robosc_bridge.skills.line import LOST, LineDetector
@@ -126,40 +122,3 @@ class CameraWorker:
             self._camera.close()
         except Exception:
             _log.exception("the camera's driver failed when it was closed")
-
-
-def needs_camera(mapping: ChannelMapping) -> bool:
-    """Return True if a communication is mapped to what the camera shows, or to its faults.
-
-    A fault of `any` device alone needs no camera.
-    """
-    faults = (mapped for _, mapped in mapping.mapped_to(FaultChannel))
-    return bool(
-        mapping.mapped_to(LineChannel)
-        or mapping.mapped_to(LineLostChannel)
-        or any(isinstance(mapped, FaultChannel) and mapped.device == "camera" for mapped in faults)
-    )
-
-
-def camera_problems(line: LineSettings, mapping: ChannelMapping, settings: Settings) -> list[str]:
-    """Return the problems with how the line is to be seen; nobody may follow a line whose loss nobody reports."""
-    found = []
-    if needs_camera(mapping) and line.camera == "simulated":
-        found.append("skills.line.camera: tell where the simulator serves its pictures, as simulated:PATH")
-    if not mapping.mapped_to(LineLostChannel):
-        found += [
-            f"'{item.name}' ('{item.identifier}') is mapped to 'line', and nothing tells when the line is lost: map a "
-            f"message to 'line_lost', or set execution.max_age_s for '{item.identifier}'"
-            for item, _ in mapping.mapped_to(LineChannel)
-            if item.max_age is None and item.identifier not in settings.max_age_s
-        ]
-    return found
-
-
-def camera_worker(settings: LineSettings, report: Callable[[Report], None], clock: Callable[[], float]) -> Worker:
-    """Return the worker that keeps the camera open; the camera is not opened yet."""
-    # OpenCV and numpy are for those who look.
-    from robosc_bridge.daemon.threads.camera import CameraWorker
-    from robosc_bridge.devices.camera import make_camera
-
-    return CameraWorker(make_camera(settings.camera), settings, report, clock)

@@ -63,9 +63,10 @@ HOPS = (
     Hop(LOOP, "robosc_bridge.daemon.robot.channel_data:scan_data", "as sensor_msgs/LaserScan"),
     Hop(LOOP, "robosc.execution.runtime.runner:Runner.receive", "an event of the model: its state is another"),
     Hop(
-        LOOP, "robosc_bridge.daemon.execution:Execution.decide", "time of a decision", f"waits for it: up to {_PERIOD}"
+        LOOP,
+        "robosc.execution.runtime.requests:Decisions.decide",
+        f"chooses a request; by `every: period`, up to {_PERIOD} later",
     ),
-    Hop(LOOP, "robosc.execution.runtime.executor:Executor.tick", "the supervisor chooses a request"),
     Hop(LOOP, "robosc_bridge.daemon.robot.adapter:RobotAdapter.publish", "a message for the drive"),
     Hop(LOOP, "robosc_bridge.daemon.robot.motion:MotionTarget.drive", "the wanted velocity"),
     Hop(LOOP, "robosc_bridge.safety.layer:SafetyLayer.command", "brought within the limits"),

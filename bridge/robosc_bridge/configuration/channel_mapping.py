@@ -1,4 +1,4 @@
-"""Mapping of a model's communications to channels, checked as a whole before anything starts."""
+"""Mapping of a model's communications to channels, checked as a whole before the bridge starts."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -45,7 +45,7 @@ class ChannelMapping:
         return tuple((item, mapped) for item, mapped in found if isinstance(mapped, channel))
 
     def settings(self, execution: Execution, deployment: Deployment = Deployment.CONTROLLER) -> Settings:
-        """Settings of the executor; what is mapped to the drive keeps acting until it is released, unless told else."""
+        """Settings of the executor; by default, a message that is mapped to the drive acts until it is released."""
         given = msgspec.structs.asdict(execution)
         if execution.every is None:
             # A scan is decided on at once; a layer decides nothing.
@@ -71,8 +71,8 @@ def map_channels(model: Model, configuration: Configuration, document: Document 
         document: Document that the configuration was read from, for the lines in messages.
 
     Raises:
-        ConfigurationError: A communication is not mapped, or twice, or to a channel that cannot serve it or that the
-            robot does not have; or something is mapped that the model does not have. Lists all of it.
+        ConfigurationError: A communication is not mapped, is mapped twice, or is mapped to a channel that cannot serve
+            it or that the robot does not have; or the model does not have it. Lists all problems.
     """
     found = _MappingChecks(model, configuration)
     problems = [
@@ -89,7 +89,7 @@ def unsuitable_because(model: Model, communication: Communication, channel: type
     use = info.uses.get(communication.kind)
     if use is None:
         kinds = " or ".join(f"{'an' if kind[0] in 'aeiou' else 'a'} {kind}" for kind in info.uses)
-        return (f"it is for {kinds}",)
+        return (f"the channel is for {kinds}",)
     parts: tuple[tuple[str, Type | None, Shape, Direction], ...] = (
         ("request", communication.request, use.request, Direction.TO_ROBOT),
         ("response", communication.response, use.response, Direction.TO_MODEL),
@@ -116,7 +116,8 @@ def _ignored_parts(model: Model, communication: Communication, info: ChannelInfo
         )
         for path in dict.fromkeys(given):
             if path not in info.used_parts:
-                yield f"the model gives '{path}', which it does not use; it uses {', '.join(sorted(info.used_parts))}"
+                used = ", ".join(sorted(info.used_parts))
+                yield f"the model gives '{path}', which the channel does not use; it uses {used}"
 
 
 def _parts(value: ProvidedValue, path: tuple[str, ...]) -> Iterator[tuple[str, Expression]]:
@@ -135,7 +136,7 @@ class _MappingChecks:
         self.channels: dict[str, Channel] = {}
 
     def problems(self) -> list[tuple[Path, str]]:
-        """All that is wrong; fills `channels`."""
+        """All problems; fills `channels`."""
         by_communication: dict[str, list[str]] = {item.name: [] for item in self._model.communications}
         found: list[tuple[Path, str]] = []
         for key in self._configuration.channels:
@@ -166,13 +167,13 @@ class _MappingChecks:
             yield ("channels",), f"{text} is not mapped to a channel"
             return
         for key in keys[1:]:
-            yield ("channels", key), f"{text} is mapped here again; it is by '{keys[0]}' already"
+            yield ("channels", key), f"{text} is mapped here again, but '{keys[0]}' maps it already"
         channel = self.channels[item.name] = self._configuration.channels[keys[0]]
         for reason in unsuitable_because(self._model, item, type(channel)):
             yield ("channels", keys[0]), f"{text} cannot be mapped to '{channel_name(channel)}': {reason}"
 
     def _divided(self) -> Iterator[tuple[Path, str]]:
-        """Messages that are told on one identifier reach all who listen there: one channel only."""
+        """Messages with one identifier reach all of its receivers, so they need one channel."""
         first: dict[str, str] = {}
         for item in self._model.communications:
             if item.kind is CommunicationKind.OUTGOING_MESSAGE and item.name in self.channels:
@@ -185,7 +186,10 @@ class _MappingChecks:
         configuration = self._configuration
         driver, features = configuration.drive.driver, self._features
         if features is not None and features.needs_turtlebot3 and isinstance(configuration.robot, Body):
-            yield ("robot",), f"the drive '{driver}' is that of a TurtleBot3; it must be one of {', '.join(TURTLEBOTS)}"
+            yield (
+                ("robot",),
+                f"the drive '{driver}' belongs to a TurtleBot3; 'robot' must be one of {', '.join(TURTLEBOTS)}",
+            )
         for key, channel in configuration.channels.items():
             path = ("channels", key)
             is_scanner = isinstance(channel, ScannerChannel)
@@ -193,7 +197,7 @@ class _MappingChecks:
                 if configuration.scanner is None:
                     yield path, "there is no scanner: the section 'scanner' is missing"
             elif isinstance(channel, ImuChannel) and features is not None and not features.has_imu:
-                yield path, f"the drive '{driver}' measures no accelerations and yaw rates"
+                yield path, f"the drive '{driver}' has no inertial sensor"
             elif isinstance(channel, BumperChannel) and features is not None and not features.has_bumpers:
                 yield path, f"the drive '{driver}' has no bumpers"
             elif isinstance(channel, ButtonChannel):
@@ -209,7 +213,7 @@ class _MappingChecks:
                 yield path, f"the drive '{driver}' has no button '{name}'; {hint(name, self._features.buttons)}"
 
     def _unknown_names(self) -> Iterator[tuple[Path, str]]:
-        """Settings of the executor that name what the model does not have."""
+        """Settings of the executor with names that the model does not have."""
         execution, items = self._configuration.execution, self._model.communications
         told = CommunicationKind.OUTGOING_MESSAGE
         requests = {item.name for item in items if item.kind is not told}
@@ -222,7 +226,10 @@ class _MappingChecks:
         received = {item.identifier for item in items if item.kind is told}
         for name in execution.max_age_s:
             if name not in received:
-                yield ("execution", "max_age_s", name), f"the model is told nothing there; {hint(name, received)}"
+                yield (
+                    ("execution", "max_age_s", name),
+                    f"the model receives no message with this identifier; {hint(name, received)}",
+                )
         sent = {item.identifier for item in items if item.kind is CommunicationKind.INCOMING_MESSAGE}
         for place, name in enumerate(execution.release_identifiers or ()):
             if name not in sent:

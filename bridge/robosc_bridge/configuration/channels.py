@@ -1,6 +1,6 @@
 """The channels of the bridge, to which communications of a model are mapped, with the shapes of their data.
 
-One table, `CHANNELS`, from which the check of a configuration, its template and its documentation are made. Shapes
+The check of a configuration, its template and its documentation come from one table, `CHANNELS`. Shapes
 follow the ROS messages that models link to (geometry_msgs/Twist, sensor_msgs/LaserScan, Imu and BatteryState,
 nav_msgs/Odometry), without their headers.
 """
@@ -31,7 +31,7 @@ class StopChannel(_Channel, frozen=True, tag="stop"):
 
 
 class RotateChannel(_Channel, frozen=True, tag="rotate"):
-    """Rotates by an angle (skill `rotate`). As an action it tells what remains, in the same unit."""
+    """Rotates by an angle (skill `rotate`). As an action it reports the remaining angle, in the same unit."""
 
     unit: Annotated[Literal["degrees", "radians"], Meta(description="Unit of the angle.")] = "degrees"
     direction: Annotated[
@@ -42,7 +42,7 @@ class RotateChannel(_Channel, frozen=True, tag="rotate"):
 class RotatedChannel(_Channel, frozen=True, tag="rotated"):
     """A rotation that a message asked for has ended."""
 
-    outcome: Annotated[Literal["done", "failed", "any"], Meta(description="Ends that are reported.")] = "done"
+    outcome: Annotated[Literal["done", "failed", "any"], Meta(description="Outcomes that are reported.")] = "done"
 
 
 class ScannerChannel(_Channel, frozen=True, tag="scanner"):
@@ -68,7 +68,7 @@ class BatteryChannel(_Channel, frozen=True, tag="battery"):
 class ButtonChannel(_Channel, frozen=True, tag="button"):
     """A button of the drive."""
 
-    name: Annotated[_Word, Meta(description="Such as `button_1`.")]
+    name: Annotated[_Word, Meta(description="Name of the button, such as `button_1`.")]
     on: Annotated[
         Literal["press", "release", "change"],
         Meta(description="Change that is reported: the state is true while pressed."),
@@ -76,25 +76,25 @@ class ButtonChannel(_Channel, frozen=True, tag="button"):
 
 
 class BumperChannel(_Channel, frozen=True, tag="bumper"):
-    """The bumpers of the drive: true while one touches something; told at each change and at the start."""
+    """The bumpers of the drive: true while one touches an obstacle; sent at each change and at the start."""
 
     side: Annotated[Literal["any", "front", "back"], Meta(description="Side of the bumper.")] = "any"
 
 
 class KeyChannel(_Channel, frozen=True, tag="key"):
-    """A key that is typed in the terminal of the bridge."""
+    """A key pressed in the terminal of the bridge."""
 
     key: Annotated[TypedKey, Meta(description="A single character, or `space`.")]
 
 
 class EmergencyStopChannel(_Channel, frozen=True, tag="emergency_stop"):
-    """The operator stopped the robot, or lets it go on (skill `emergency_stop`)."""
+    """The operator has stopped the robot, or lets it go on (skill `emergency_stop`)."""
 
     event: Annotated[Literal["stop", "resume"], Meta(description="Event that is reported.")]
 
 
 class LineChannel(_Channel, frozen=True, tag="line"):
-    """The line is in sight: the correction that keeps on it, in rad/s counter-clockwise (skill `line`)."""
+    """The line is in sight: the yaw rate that keeps the robot on it, in rad/s counter-clockwise (skill `line`)."""
 
 
 class LineLostChannel(_Channel, frozen=True, tag="line_lost"):
@@ -104,20 +104,22 @@ class LineLostChannel(_Channel, frozen=True, tag="line_lost"):
 class FaultChannel(_Channel, frozen=True, tag="fault"):
     """A device is lost or back again; the text says what happened."""
 
-    device: Annotated[Literal["drive", "scanner", "camera", "any"], Meta(description="Device that is meant.")] = "any"
+    device: Annotated[
+        Literal["drive", "scanner", "camera", "any"], Meta(description="Device whose events are reported.")
+    ] = "any"
     event: Annotated[Literal["lost", "back"], Meta(description="Event that is reported.")] = "lost"
 
 
 class GrpcChannel(_Channel, frozen=True, tag="grpc"):
-    """A program on the other side of the remote endpoint gives, takes or answers it."""
+    """A program at the remote endpoint sends, receives or answers it."""
 
 
 class LogChannel(_Channel, frozen=True, tag="log"):
-    """Is written into the log, and goes nowhere else."""
+    """Writes the message to the log, and does nothing else."""
 
 
 class NoneChannel(_Channel, frozen=True, tag="none"):
-    """On purpose nothing: what the model sends is dropped, what it waits for never comes."""
+    """Deliberately nothing: messages from the model are dropped, and messages to it never come."""
 
 
 Channel = (
@@ -144,7 +146,7 @@ Channel = (
 
 @dataclass(frozen=True, slots=True)
 class Use:
-    """Shapes of data where a channel serves one kind of communication.
+    """Shapes of the data of a channel for one kind of communication.
 
     Attributes:
         request: Shape of the data that the channel takes from the model.

@@ -1,6 +1,6 @@
-"""Plain values of a document become frozen structures, strictly; all that is wrong is found in one run.
+"""Strict conversion of the plain values of a document to frozen structures; one run finds all problems.
 
-msgspec stops at the first mistake, so that the structure is walked here and msgspec judges each leaf by its own.
+msgspec stops at the first mistake; therefore this module walks through the structure, and msgspec checks each leaf.
 """
 
 from collections.abc import Iterator, Mapping
@@ -24,7 +24,7 @@ def decode[Value](document: Document, target: type[Value]) -> Value:
         target: A msgspec structure.
 
     Raises:
-        ConfigurationError: Something is unknown, missing, of a wrong type or out of range; lists all of it.
+        ConfigurationError: A key or value is unknown, missing, of a wrong type or out of range; lists all problems.
     """
     decoder = _Decoder(document)
     found = decoder.value(target, {} if document.value is None else document.value, ())
@@ -39,7 +39,7 @@ class _Decoder:
         self.problems: list[Problem] = []
 
     def value(self, annotation: Any, given: object, path: Path) -> Any:
-        """The value, or `_WRONG` where there is a problem."""
+        """The value, or `_WRONG` if there is a problem."""
         plain = _plain(annotation)
         if is_struct(plain):
             return self._struct(plain, given, path)
@@ -74,7 +74,7 @@ class _Decoder:
         return _WRONG if _WRONG in found.values() else target(**found)
 
     def _one_of(self, structures: list[Any], given: object, path: Path) -> Any:
-        """One of several structures that a field, the tag, tells apart."""
+        """One of several structures, selected by a field, the tag."""
         field = structures[0].__struct_config__.tag_field
         by_tag = {item.__struct_config__.tag: item for item in structures}
         if not isinstance(given, Mapping) or field not in given:

@@ -125,7 +125,7 @@ class _Builder:
         for event in events:
             if isinstance(event, yaml.DocumentStartEvent):
                 if () in self.lines:
-                    raise _Stop(Problem("a second document begins here; there may be one", line=_line(event)))
+                    raise _Stop(Problem("a second document begins here; only one is allowed", line=_line(event)))
                 self.lines[()] = _line(event)
                 value = self._value(next(events), events, ())
         return value
@@ -134,7 +134,7 @@ class _Builder:
         line = _line(event)
         self.lines.setdefault(path, line)
         if isinstance(event, yaml.AliasEvent) or event.anchor is not None:
-            self.problems.append(Problem("aliases and anchors are not allowed; write it out", path, line))
+            self.problems.append(Problem("aliases and anchors are not allowed; write the value out", path, line))
         if isinstance(event, yaml.AliasEvent):
             return None
         if event.tag is not None:
@@ -166,13 +166,13 @@ class _Builder:
                 raise _Stop(Problem("a key must be a word", path, _line(event)))
             key = event.value
             if event.anchor is not None or event.tag is not None:
-                self.problems.append(Problem("a key has no anchor and no tag", path, _line(event)))
+                self.problems.append(Problem("a key must not have an anchor or a tag", path, _line(event)))
             place = (*path, key)
             if len(key) > MAXIMUM_SCALAR:
                 raise _Stop(Problem(f"a key is longer than {MAXIMUM_SCALAR} characters", path, _line(event)))
             if key in found:
                 first = self.lines[place]
-                self.problems.append(Problem(f"stands here again; it is in line {first} already", place, _line(event)))
+                self.problems.append(Problem(f"is repeated here; it is already in line {first}", place, _line(event)))
             self.lines.setdefault(place, _line(event))
             found[key] = self._value(next(events), events, place)
         return found

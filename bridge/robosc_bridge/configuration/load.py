@@ -51,7 +51,7 @@ def parse(data: bytes, name: str) -> Loaded:
 
 
 def _contradictions(configuration: Configuration) -> Iterator[tuple[Path, str]]:
-    """Values that are fine by themselves and not together."""
+    """Values that are valid alone but contradict each other."""
     skills, safety = configuration.skills, configuration.safety
     pairs = (
         (skills.rotate, ("skills", "rotate"), "slowest_rad_s", "speed_rad_s", True),
@@ -73,11 +73,11 @@ def _contradictions(configuration: Configuration) -> Iterator[tuple[Path, str]]:
     yield from _times(configuration)
     yield from _idle(configuration)
     if configuration.execution.priority and configuration.execution.policy != "priority":
-        yield ("execution", "priority"), "means nothing unless 'policy' is priority"
+        yield ("execution", "priority"), "has no effect unless 'policy' is priority"
 
 
 def _times(configuration: Configuration) -> Iterator[tuple[Path, str]]:
-    """A loop that does all in time must not stop the wheels again and again."""
+    """Timeouts that even a loop on schedule would exceed, which would stop the wheels again and again."""
     period_s, plain = configuration.execution.period_s, Safety()
     for name in ("overrun_s", "command_timeout_s"):
         limit_s = getattr(configuration.safety, name)
@@ -91,7 +91,7 @@ def _times(configuration: Configuration) -> Iterator[tuple[Path, str]]:
 
 
 def _idle(configuration: Configuration) -> Iterator[tuple[Path, str]]:
-    """Settings that would do nothing, of which somebody expects something."""
+    """Settings without effect, from which a person may expect one."""
     remote, plain = configuration.remote, Remote()
     needing = {
         "grpc_address": ("tls_certificate", "tls_key", "client_ca", "tokens", "insecure_beyond_loopback"),
@@ -100,7 +100,7 @@ def _idle(configuration: Configuration) -> Iterator[tuple[Path, str]]:
     for needed, names in needing.items():
         for name in names:
             if getattr(remote, needed) is None and getattr(remote, name) != getattr(plain, name):
-                yield ("remote", name), f"means nothing without '{needed}'"
+                yield ("remote", name), f"has no effect without '{needed}'"
     view = configuration.view
     if (view.tls_certificate is None) != (view.tls_key is None):
         missing = "tls_key" if view.tls_key is None else "tls_certificate"

@@ -18,7 +18,7 @@ _LONGEST_SHOWN = 60
 
 @dataclass(frozen=True, slots=True)
 class Problem:
-    """One thing that is wrong.
+    """One problem.
 
     Attributes:
         message: Description of what is wrong, and of what would be right.
@@ -38,7 +38,7 @@ class Problem:
 
 
 class ConfigurationError(BridgeError):
-    """A configuration cannot be used; lists everything that is wrong with it, one problem a line.
+    """A configuration cannot be used; lists all its problems, one a line.
 
     Args:
         file: Name of the file.

@@ -1,4 +1,4 @@
-"""Meaning of every key, from the structures themselves: for the template and the documentation."""
+"""Descriptions of all keys, read from the structures themselves, for the template and the documentation."""
 
 from collections.abc import Iterator
 from types import NoneType
@@ -15,21 +15,21 @@ from robosc_bridge.configuration.structure import Configuration
 
 
 def summary(annotation: Any) -> str:
-    """The description that an annotation carries; empty: none."""
+    """The description in an annotation, or an empty text."""
     if get_origin(annotation) is not Annotated:
         return ""
     return next((meta.description for meta in get_args(annotation)[1:] if meta.description), "")
 
 
 def struct_of(annotation: Any) -> type[msgspec.Struct] | None:
-    """The structure that a field holds, or may hold; None: it holds something else."""
+    """The structure that a field holds, or may hold; None if it holds no structure."""
     plain = get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
     found = [item for item in members(plain) if is_struct(item)]
     return found[0] if len(found) == 1 else None
 
 
 def default_of(field: msgspec.structs.FieldInfo) -> Any:
-    """The default of a field as a plain value; `msgspec.NODEFAULT` where it has none."""
+    """The default of a field as a plain value; `msgspec.NODEFAULT` if it has none."""
     default = field.default if field.default_factory is msgspec.NODEFAULT else field.default_factory()
     return default if default is msgspec.NODEFAULT else msgspec.to_builtins(default)
 

@@ -38,7 +38,7 @@ class Fields:
 
 @dataclass(frozen=True, slots=True)
 class Array:
-    """Any number of the same."""
+    """Any number of equal parts."""
 
     element: "Shape"
 

@@ -1,4 +1,4 @@
-"""Content of a configuration: frozen structures that checks, JSON schema and documentation are made from."""
+"""Frozen structures of a configuration, from which its checks, JSON schema and documentation are generated."""
 
 from typing import Annotated, Any, Literal, get_args
 
@@ -32,26 +32,27 @@ class _Section(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
 
 TurtleBot = Literal["burger", "waffle", "waffle_pi"]
 TURTLEBOTS: tuple[str, ...] = get_args(TurtleBot)
-"""The robots whose numbers the bridge knows."""
+"""The robots whose dimensions and limits the bridge knows."""
 
 
 class Body(_Section, frozen=True):
-    """A robot of one's own, for a drive that needs to know no more of it."""
+    """A robot of one's own, for a drive that needs no further data of it."""
 
     wheel_separation_m: Annotated[
-        float, Meta(gt=0, le=5, description="Between its left and its right wheels, in metres.")
+        float, Meta(gt=0, le=5, description="Distance between its left and its right wheels, in metres.")
     ]
-    linear_m_s: Annotated[float, Meta(gt=0, le=5, description="Fastest forward and backward, in m/s.")]
-    angular_rad_s: Annotated[float, Meta(gt=0, le=20, description="Fastest rotation, in rad/s.")]
+    linear_m_s: Annotated[float, Meta(gt=0, le=5, description="Highest speed forward and backward, in m/s.")]
+    angular_rad_s: Annotated[float, Meta(gt=0, le=20, description="Highest yaw rate, in rad/s.")]
 
 
 class Drive(_Section, frozen=True):
     """The drive base."""
 
     driver: Annotated[_Name, Meta(description="`opencr`, `dynamixel`, `mavlink-rover`, or one of a plug-in.")]
-    port: Annotated[_Text, Meta(description="Serial port, best by a stable name below /dev/serial/by-id.")]
+    port: Annotated[_Text, Meta(description="Serial port, preferably a stable name below /dev/serial/by-id.")]
     options: Annotated[
-        dict[_OptionName, _Option | tuple[_Option, ...]], Meta(description="Of the driver: see docs/bridge-drivers.md.")
+        dict[_OptionName, _Option | tuple[_Option, ...]],
+        Meta(description="Options of the driver: see docs/bridge-drivers.md."),
     ] = {}
 
 
@@ -59,9 +60,10 @@ class Scanner(_Section, frozen=True):
     """The LiDAR."""
 
     driver: Annotated[_Name, Meta(description="`lds01`, `lds02`, `lds03`, or one of a plug-in.")]
-    port: Annotated[_Text, Meta(description="Serial port, best by a stable name below /dev/serial/by-id.")]
+    port: Annotated[_Text, Meta(description="Serial port, preferably a stable name below /dev/serial/by-id.")]
     options: Annotated[
-        dict[_OptionName, _Option | tuple[_Option, ...]], Meta(description="Of the driver: see docs/bridge-drivers.md.")
+        dict[_OptionName, _Option | tuple[_Option, ...]],
+        Meta(description="Options of the driver: see docs/bridge-drivers.md."),
     ] = {}
 
 
@@ -73,13 +75,13 @@ class Execution(_Section, frozen=True):
     every: Annotated[
         Literal["period", "event"] | None,
         Meta(
-            description="Times of decisions: each period, or after each message as well; null: `event`, or none in a "
+            description="When the supervisor decides: each period, or after each message as well; null: `event`, or never in a "
             "supervision layer."
         ),
     ] = None
     policy: Annotated[
         Literal["fair", "priority", "random"],
-        Meta(description="Choice of the request that is issued where several may be."),
+        Meta(description="Choice of the request to issue if several are allowed."),
     ] = "fair"
     priority: Annotated[
         tuple[_Name, ...], Meta(description="Communications, most urgent first, for the policy `priority`.")
@@ -87,34 +89,36 @@ class Execution(_Section, frozen=True):
     seed: Annotated[int, Meta(ge=0, le=2**31 - 1, description="Seed of the policy `random`.")] = 0
     release_identifiers: Annotated[
         tuple[_Text, ...] | None,
-        Meta(description="Identifiers whose last message keeps acting; null: all that are mapped to the drive."),
+        Meta(description="Identifiers whose last message stays in effect; null: all that are mapped to the drive."),
     ] = None
     max_age_s: Annotated[
         dict[_Text, Annotated[float, Meta(gt=0, le=86400)]],
-        Meta(description="By identifier, the seconds after which what the model was told is stale."),
+        Meta(description="By identifier, the seconds after which data that the model received is stale."),
     ] = {}
     service_timeout_s: Annotated[
         Annotated[float, Meta(gt=0, le=86400)] | None,
-        Meta(description="Seconds until a call without an answer has failed; null: never."),
+        Meta(description="Seconds after which a call without an answer fails; null: never."),
     ] = 10.0
     action_timeout_s: Annotated[
         Annotated[float, Meta(gt=0, le=86400)] | None,
-        Meta(description="Seconds until a goal without a result has failed; null: never."),
+        Meta(description="Seconds after which a goal without a result fails; null: never."),
     ] = None
     on_unknown: Annotated[
         Literal["default", "keep", "fault"],
-        Meta(description="Reaction to data that leaves an enum unknown: its default, the value before, or a fault."),
+        Meta(
+            description="Reaction to data that is no value of an enum: use its default, keep the last value, or fault."
+        ),
     ] = "default"
     command_timeout_s: Annotated[
         float,
-        Meta(ge=0, le=86400, description="As a layer, seconds of silence after which the last request ends; 0: never."),
+        Meta(ge=0, le=86400, description="In a layer, seconds of silence after which the last request ends; 0: never."),
     ] = 1.0
 
 
 def _scan_timeouts() -> str:
     """Return the times of the LiDARs in words."""
-    known = ", ".join(f"{time_s:g} of `{driver}`" for driver, time_s in SCAN_TIMEOUTS_S.items())
-    return f"{known}, three revolutions of others, {SCAN_TIMEOUT_S:g} where these are not known"
+    known = ", ".join(f"{time_s:g} for `{driver}`" for driver, time_s in SCAN_TIMEOUTS_S.items())
+    return f"{known}, three revolutions for others, {SCAN_TIMEOUT_S:g} if their rate is unknown"
 
 
 def _within(name: str, description: str = "") -> Meta:
@@ -129,17 +133,18 @@ class Safety(_Section, frozen=True):
 
     linear_m_s: Annotated[
         Annotated[float, _within("linear_m_s")] | None,
-        Meta(description="Fastest forward and backward, in m/s; null: what the drive can do."),
+        Meta(description="Highest speed forward and backward, in m/s; null: that of the drive."),
     ] = None
     angular_rad_s: Annotated[
         Annotated[float, _within("angular_rad_s")] | None,
-        Meta(description="Fastest rotation, in rad/s; null: what the drive can do."),
+        Meta(description="Highest yaw rate, in rad/s; null: that of the drive."),
     ] = None
     linear_acceleration_m_s2: Annotated[
-        float, _within("linear_acceleration_m_s2", "Largest change of speed, in m/s²; stopping for safety ignores it.")
+        float, _within("linear_acceleration_m_s2", "Largest acceleration, in m/s²; safety stops ignore it.")
     ] = SafetyLimits.linear_acceleration_m_s2
     angular_acceleration_rad_s2: Annotated[
-        float, _within("angular_acceleration_rad_s2", "Largest change of the yaw rate, in rad/s²; the same holds.")
+        float,
+        _within("angular_acceleration_rad_s2", "Largest angular acceleration, in rad/s²; safety stops ignore it."),
     ] = SafetyLimits.angular_acceleration_rad_s2
     command_timeout_s: Annotated[
         float,
@@ -151,28 +156,27 @@ class Safety(_Section, frozen=True):
     scan_timeout_s: Annotated[
         Annotated[float, _within("scan_timeout_s")] | None,
         Meta(
-            description="Seconds without a full revolution of the LiDAR after which they stop; null: "
+            description="Seconds without a full revolution of the LiDAR after which the wheels stop; null: "
             f"{_scan_timeouts()}."
         ),
     ] = None
     min_valid_share: Annotated[
         float,
         _within(
-            "min_valid_share", "Share of valid ranges, 30° to both sides of where it goes, below which it is blind."
+            "min_valid_share",
+            "Share of valid ranges within 30° of the direction of motion, below which the LiDAR is blind.",
         ),
     ] = SafetyLimits.min_valid_share
     stops_when_blind: Annotated[
         bool,
-        Meta(
-            description="True: it may not go where the LiDAR measures nothing; false: somebody is warned, and it goes."
-        ),
+        Meta(description="True: the robot does not move where the LiDAR measures nothing; false: it does, and warns."),
     ] = SafetyLimits.is_stopped_when_blind
     bad_frames_share: Annotated[
         float,
-        Meta(gt=0, le=1, description="Share of the LiDAR's frames that are damaged above which somebody is warned."),
+        Meta(gt=0, le=1, description="Share of damaged frames of the LiDAR above which the bridge warns."),
     ] = 0.1
     motor_timeout_s: Annotated[
-        float, _within("motor_timeout_s", "Seconds without an answer of the drive after which it has failed.")
+        float, _within("motor_timeout_s", "Seconds without an answer after which the drive counts as failed.")
     ] = SafetyLimits.motor_timeout_s
     overrun_s: Annotated[
         float,
@@ -184,24 +188,26 @@ class Safety(_Section, frozen=True):
     ] = SafetyLimits.loop_timeout_s
     battery_warning_v: Annotated[
         Annotated[float, _within("battery_warn_v")] | None,
-        Meta(description="Voltage at and below which somebody is warned; null: the drive decides it."),
+        Meta(description="Voltage at and below which the bridge warns; null: the drive decides."),
     ] = None
     battery_stop_v: Annotated[
         Annotated[float, _within("battery_stop_v")] | None,
         Meta(
-            description="Voltage at and below which the robot stops; null: 11.1 of `opencr`, the lowest supply of its "
-            "servos of `dynamixel`, none of others; a rover tells by itself that its battery is empty."
+            description="Voltage at and below which the robot stops; null: 11.1 for `opencr`, the lowest supply of the "
+            "servos for `dynamixel`, none for others; a rover itself reports that its battery is empty."
         ),
     ] = None
     operator_link_timeout_s: Annotated[
         Annotated[float, _within("operator_timeout_s")] | None,
-        Meta(description="Seconds without the operator after which the robot stops; null: it needs none."),
+        Meta(
+            description="Seconds without a sign of life of an operator after which the robot stops; null: none needed."
+        ),
     ] = SafetyLimits.operator_timeout_s
     torque_off_on_operator_stop: Annotated[
         bool | None,
         Meta(
-            description="True: the motors let go, too, once the wheels stand still after an operator's stop; null: "
-            "they do where the drive has controls of its own (`opencr`)."
+            description="True: after an operator's stop the motors also let go, once the wheels stand still; null: "
+            "only if the drive has controls of its own (`opencr`)."
         ),
     ] = None
 
@@ -209,51 +215,53 @@ class Safety(_Section, frozen=True):
 class Skills(_Section, frozen=True):
     """Settings of the skills."""
 
-    rotate: Annotated[RotateSettings, Meta(description="Turning by an angle.")] = RotateSettings()
-    line: Annotated[LineSettings, Meta(description="Seeing a line on the floor.")] = LineSettings()
+    rotate: Annotated[RotateSettings, Meta(description="Rotation by an angle.")] = RotateSettings()
+    line: Annotated[LineSettings, Meta(description="Detection of a line on the floor.")] = LineSettings()
     emergency_stop: Annotated[EmergencyStopSettings, Meta(description="The operator's stop.")] = EmergencyStopSettings()
 
 
 class Remote(_Section, frozen=True):
-    """Access to the bridge, for reaching and watching it."""
+    """Access to the bridge, for commanding and watching it."""
 
     grpc_address: Annotated[
         _Address | None,
-        Meta(description="HOST:PORT to listen on, such as 127.0.0.1:50061; null: none."),
+        Meta(description="HOST:PORT to listen on, such as 127.0.0.1:50061; null: no endpoint."),
     ] = None
     tls_certificate: Annotated[
-        _Text | None, Meta(description="File with the bridge's certificate chain (PEM); null: no TLS, loopback alone.")
+        _Text | None, Meta(description="File with the bridge's certificate chain (PEM); null: no TLS, loopback only.")
     ] = None
-    tls_key: Annotated[_Text | None, Meta(description="File with its private key (PEM).")] = None
+    tls_key: Annotated[_Text | None, Meta(description="File with the private key of the certificate (PEM).")] = None
     client_ca: Annotated[
         _Text | None,
-        Meta(description="File with certificates (PEM) of those who sign callers' ones; null: callers need none."),
+        Meta(
+            description="File with the authorities (PEM) of callers' certificates; null: callers need no certificate."
+        ),
     ] = None
     tokens: Annotated[
-        _Text | None, Meta(description="File of tokens, made by `robosc-bridge token`; null: callers need none.")
+        _Text | None, Meta(description="File of tokens, made by `robosc-bridge token`; null: callers need no token.")
     ] = None
     insecure_beyond_loopback: Annotated[
-        bool, Meta(description="Listen without TLS where other machines reach it, on a network that is trusted.")
+        bool, Meta(description="Listen without TLS on an address that other machines can reach, on a trusted network.")
     ] = False
     mavlink_url: Annotated[
         _Text | None,
-        Meta(description="Address of the ground station, such as udpout:192.168.1.2:14550; null: none."),
+        Meta(description="Address of the ground station, such as udpout:192.168.1.2:14550; null: no ground station."),
     ] = None
-    mavlink_system: Annotated[int, Meta(ge=1, le=255, description="Number of the vehicle.")] = 1
+    mavlink_system: Annotated[int, Meta(ge=1, le=255, description="System id of the vehicle.")] = 1
     mavlink_key: Annotated[
         _Text | None,
-        Meta(description="File with the key of signing: then only what is signed is obeyed; null: nothing is signed."),
+        Meta(description="File with the signing key: only signed commands are obeyed then; null: no signatures."),
     ] = None
-    mavlink_link_id: Annotated[int, Meta(ge=0, le=255, description="Number of the signed stream.")] = 0
+    mavlink_link_id: Annotated[int, Meta(ge=0, le=255, description="Link id of the signed stream.")] = 0
     mavlink_unsigned_commands: Annotated[
-        bool, Meta(description="True: unsigned commands of other computers do more than stopping.")
+        bool, Meta(description="True: unsigned commands from other computers can do more than stop.")
     ] = False
     mavlink_interval_s: Annotated[
-        float, Meta(ge=0.05, le=10, description="Seconds between two messages of pose, and of obstacles.")
+        float, Meta(ge=0.05, le=10, description="Seconds between two messages of the pose, and of the obstacles.")
     ] = 0.1
     metrics_address: Annotated[
         _Text | None,
-        Meta(description="HOST:PORT at which Prometheus reads metrics, over HTTP at /metrics; null: none."),
+        Meta(description="HOST:PORT at which Prometheus reads metrics, over HTTP at /metrics; null: no metrics."),
     ] = None
 
 
@@ -262,24 +270,30 @@ class View(_Section, frozen=True):
 
     address: Annotated[
         _Address | None,
-        Meta(description="HOST:PORT to serve the page on, such as 127.0.0.1:8066; null: none."),
+        Meta(description="HOST:PORT to serve the page on, such as 127.0.0.1:8066; null: no page."),
     ] = None
     names: Annotated[
         tuple[_Name, ...],
-        Meta(max_length=20, description="Further names by which browsers reach it, beside its address and localhost."),
+        Meta(
+            max_length=20,
+            description="Further names by which browsers reach the page, besides its address and localhost.",
+        ),
     ] = ()
     tls_certificate: Annotated[
-        _Text | None, Meta(description="File with its certificate chain (PEM); null: no TLS, loopback alone.")
+        _Text | None, Meta(description="File with the page's certificate chain (PEM); null: no TLS, loopback only.")
     ] = None
-    tls_key: Annotated[_Text | None, Meta(description="File with its private key (PEM).")] = None
+    tls_key: Annotated[_Text | None, Meta(description="File with the private key of the certificate (PEM).")] = None
     insecure_beyond_loopback: Annotated[
-        bool, Meta(description="Serve it without TLS where other machines reach it, on a network that is trusted.")
+        bool,
+        Meta(
+            description="Serve the page without TLS on an address that other machines can reach, on a trusted network."
+        ),
     ] = False
     scene: Annotated[
         _Text | None,
-        Meta(description="Name or file of a scene (docs/twin.md) whose walls and line the map shows; null: none."),
+        Meta(description="Name or file of a scene (docs/twin.md) whose walls and line the map shows; null: no scene."),
     ] = None
-    scene_seed: Annotated[int, Meta(ge=0, le=2**31, description="Seed of what the scene leaves to chance.")] = 0
+    scene_seed: Annotated[int, Meta(ge=0, le=2**31, description="Seed of the random parts of the scene.")] = 0
 
 
 class SupervisorSource(_Section, frozen=True):
@@ -287,31 +301,34 @@ class SupervisorSource(_Section, frozen=True):
 
     server: Annotated[
         _ServerAddress | None,
-        Meta(description="HOST or HOST:PORT of the synthesis server (default port: 50051); null: none is asked."),
+        Meta(description="HOST or HOST:PORT of the synthesis server (default port: 50051); null: no server."),
     ] = None
     ca: Annotated[
-        _Text | None, Meta(description="File with certificates (PEM) that are believed there; null: without TLS.")
+        _Text | None,
+        Meta(description="File with the trusted authorities (PEM) of the server's certificate; null: no TLS."),
     ] = None
     certificate: Annotated[_Text | None, Meta(description="File with the bridge's own certificate chain (PEM).")] = None
-    key: Annotated[_Text | None, Meta(description="File with its private key (PEM).")] = None
+    key: Annotated[_Text | None, Meta(description="File with the private key of the certificate (PEM).")] = None
     token_file: Annotated[_Text | None, Meta(description="File with the bridge's token for the server.")] = None
     keep: Annotated[
         _Text | None,
         Meta(
-            description="Folder for what the server made last, for a start without network; null: `robosc-bridge` "
+            description="Folder for the server's last supervisor, for a start without network; null: `robosc-bridge` "
             "in the user's state folder."
         ),
     ] = None
     trusted_keys: Annotated[
         tuple[_Text, ...],
-        Meta(description="Whose signatures are believed: public keys (`ssh-ed25519 AAAA...`), or files with them."),
+        Meta(description="Public keys (`ssh-ed25519 AAAA...`) whose signatures are trusted, or files with such keys."),
     ] = ()
 
 
 class Log(_Section, frozen=True):
     """Recording of logs."""
 
-    folder: Annotated[_Text | None, Meta(description="Folder for logs; null: only the terminal.")] = None
+    folder: Annotated[_Text | None, Meta(description="Folder for logs; null: the log only goes to the terminal.")] = (
+        None
+    )
 
 
 class Configuration(_Section, frozen=True):
@@ -326,10 +343,10 @@ class Configuration(_Section, frozen=True):
     remote: Annotated[Remote, Meta(description="Access to the bridge from other programs and computers.")] = Remote()
     view: Annotated[View, Meta(description="The live view, a web page.")] = View()
     supervisor: Annotated[SupervisorSource, Meta(description="Source of the supervisor.")] = SupervisorSource()
-    log: Annotated[Log, Meta(description="Log of what happens.")] = Log()
+    log: Annotated[Log, Meta(description="Log of the run.")] = Log()
     channels: Annotated[
         dict[_Text, Channel],
-        Meta(description="By identifier (or name) of each communication of the model, what it is mapped to."),
+        Meta(description="Channel of each communication of the model, by its identifier or name."),
     ] = {}
 
 

@@ -1,4 +1,4 @@
-"""A first configuration for a robot and a model: obvious mappings are made, the others are left to be filled in."""
+"""A first configuration for a robot and a model, with the obvious mappings; the user fills in the others."""
 
 import json
 import re
@@ -105,7 +105,7 @@ def _has(features: DriverFeatures, channel: Channel) -> bool:
 
 
 def _last_words(identifier: str) -> str:
-    """The part of an identifier that tells what it is for, without the robot's name before it."""
+    """The part of an identifier that shows its purpose, without the robot's name before it."""
     parts = [part for part in identifier.split("/") if part]
     pair = "/".join(parts[-2:])
     return pair if parts[-2:-1] in (["line"], ["emergency_stop"]) else "".join(parts[-1:])
@@ -206,6 +206,6 @@ def quoted(text: str) -> str:
 
 
 def _flow(channel: Channel) -> str:
-    """A channel on one line, with all that it can be told."""
+    """A channel with all its options, on one line."""
     values = msgspec.to_builtins(channel)
     return "{" + ", ".join(f"{name}: {value}" for name, value in values.items()) + "}"

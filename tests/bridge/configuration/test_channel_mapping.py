@@ -127,7 +127,7 @@ def test_names_of_communications_may_stand_for_their_identifiers() -> None:
 def test_a_second_tie_is_told() -> None:
     model = with_message("incoming", "Twist")
     (line,) = errors_of(model, "channels:\n  /m: {channel: drive}\n  m: {channel: log}\n")
-    assert line == "c.yaml:6: channels.m: incoming message 'm' ('/m') is mapped here again; it is by '/m' already"
+    assert line == "c.yaml:6: channels.m: incoming message 'm' ('/m') is mapped here again, but '/m' maps it already"
 
 
 def test_messages_told_on_one_identifier_need_one_channel() -> None:
@@ -158,7 +158,7 @@ def test_messages_told_on_one_identifier_need_one_channel() -> None:
         ("incoming", "string", "rotate", "the data is number, not string"),
         ("incoming", "Near", "rotate", "the data is number, not Near"),
         ("incoming", "none", "rotate", "the data is number, not nothing"),
-        ("incoming", "Scan", "scanner", "it is for an outgoing message"),
+        ("incoming", "Scan", "scanner", "the channel is for an outgoing message"),
         ("incoming", "Scan", "log", None),
         ("incoming", "Scan", "grpc", None),
         ("incoming", "Scan", "none", None),
@@ -168,7 +168,7 @@ def test_messages_told_on_one_identifier_need_one_channel() -> None:
         ("outgoing", "Lidar", "scanner", "has no field 'echoes'; there is ranges, angle_min"),
         ("outgoing", "Echoes", "scanner", "'ranges[]' is number, not integer"),
         ("outgoing", "Flat", "scanner", "'ranges' is array of number, not double"),
-        ("outgoing", "Twist", "drive", "it is for an incoming message"),
+        ("outgoing", "Twist", "drive", "the channel is for an incoming message"),
         ("outgoing", "Odometry", "odometry", None),
         ("outgoing", "Pose", "odometry", "has no field 'pose.position'; there is pose"),
         ("outgoing", "Point", "odometry", "has no field 'x'; there is pose, twist"),
@@ -186,7 +186,7 @@ def test_messages_told_on_one_identifier_need_one_channel() -> None:
         ("outgoing", "string", "fault", None),
         ("outgoing", "double", "line_lost", "the data is nothing, not double"),
         ("outgoing", "none", "rotated", None),
-        ("outgoing", "none", "log", "it is for an incoming message"),
+        ("outgoing", "none", "log", "the channel is for an incoming message"),
         ("outgoing", "Scan", "grpc", None),
         ("outgoing", "Scan", "none", None),
     ],
@@ -243,15 +243,23 @@ CALLS = """robot R {{
         ("service m with request: Other, response: Outcome", "rotate", "request: the data is number, not {width}"),
         ("service m with request: Angle, response: Left", "rotate", "response: has no field 'remaining'"),
         ("service m with request: Angle, response: Left", "grpc", None),
-        ("service m with request: Angle, response: Left", "drive", "it is for an incoming message"),
-        ("service m with request: Angle, response: Left", "none", "it is for an incoming message or an outgoing"),
+        ("service m with request: Angle, response: Left", "drive", "the channel is for an incoming message"),
+        (
+            "service m with request: Angle, response: Left",
+            "none",
+            "the channel is for an incoming message or an outgoing",
+        ),
         ("action m with request: Angle, response: Outcome, feedback: Left", "rotate", None),
         (
             "action m with request: Angle, response: Outcome, feedback: Angle",
             "rotate",
             "feedback: has no field 'angle'",
         ),
-        ("action m with request: none, response: none, feedback: none", "stop", "it is for an incoming message or a s"),
+        (
+            "action m with request: none, response: none, feedback: none",
+            "stop",
+            "the channel is for an incoming message or a s",
+        ),
     ],
 )
 def test_services_and_actions_are_tied_to_skills(declaration: str, channel: str, reason: str | None) -> None:
@@ -268,7 +276,7 @@ def test_a_robot_of_ones_own_is_not_for_the_drives_of_a_turtlebot3() -> None:
     own = "robot: {wheel_separation_m: 0.3, linear_m_s: 0.8, angular_rad_s: 1.5}\n"
     head = f"{own}drive: {{driver: opencr, port: /dev/ttyUSB1}}\n"
     (line,) = errors_of(model, "channels: {/m: {channel: none}}", head)
-    problem = "the drive 'opencr' is that of a TurtleBot3; it must be one of burger, waffle, waffle_pi"
+    problem = "the drive 'opencr' belongs to a TurtleBot3; 'robot' must be one of burger, waffle, waffle_pi"
     assert line == f"c.yaml:1: robot: {problem}"
     for driver in ("dynamixel", "mavlink-rover", "of_a_plug_in"):
         head = f"{own}drive: {{driver: {driver}, port: /dev/ttyUSB1}}\n"
@@ -286,7 +294,7 @@ def test_devices_that_are_not_there_are_told(monkeypatch: pytest.MonkeyPatch) ->
 
     assert told("{channel: scanner}") == ": there is no scanner: the section 'scanner' is missing"
     assert told("{channel: fault, device: scanner}") == ": there is no scanner: the section 'scanner' is missing"
-    assert told("{channel: imu}") == ": the drive 'dynamixel' measures no accelerations and yaw rates"
+    assert told("{channel: imu}") == ": the drive 'dynamixel' has no inertial sensor"
     assert told("{channel: bumper}") == ": the drive 'dynamixel' has no bumpers"
     assert told("{channel: button, name: x}") == ".name: the drive 'dynamixel' has no button 'x'; there is none"
     line = told("{channel: none}", "skills: {emergency_stop: {stop_buttons: [button_1]}}")
@@ -324,7 +332,8 @@ def test_settings_name_what_the_model_has() -> None:
         "c.yaml:6: execution.priority[1]: 'mve' is not a request of the model; did you mean 'move'?",
         "c.yaml:6: execution.priority[2]: 'scan_front' is not a request of the model; there is move, rotate_left, "
         "rotate_right",
-        'c.yaml:9: execution.max_age_s["/cmd_vel"]: the model is told nothing there; there is /rotate_done, /scan',
+        'c.yaml:9: execution.max_age_s["/cmd_vel"]: the model receives no message with this identifier; '
+        "there is /rotate_done, /scan",
         "c.yaml:10: execution.release_identifiers[1]: the model sends nothing on '/scan'; there is /cmd_vel, "
         "/rotate_left, /rotate_right",
     ]

@@ -212,7 +212,7 @@ def test_the_server_is_a_host_with_or_without_a_port(address: str) -> None:
             "skills: {emergency_stop: {stop_buttons: [a], resume_buttons: [a]}}",
             "skills.emergency_stop.resume_buttons: 'a' stops the robot already",
         ),
-        ("execution: {priority: [a]}", "execution.priority: means nothing unless 'policy' is priority"),
+        ("execution: {priority: [a]}", "execution.priority: has no effect unless 'policy' is priority"),
         (
             "execution: {period_s: 0.1}",
             "execution.period_s: is 0.1; it must be at most half of 'safety.overrun_s', which is 0.1",
@@ -225,12 +225,12 @@ def test_the_server_is_a_host_with_or_without_a_port(address: str) -> None:
             "safety: {command_timeout_s: 0.03}",
             "safety.command_timeout_s: is 0.03; it must be at least twice 'execution.period_s', which is 0.02",
         ),
-        ("remote: {mavlink_key: k}", "remote.mavlink_key: means nothing without 'mavlink_url'"),
+        ("remote: {mavlink_key: k}", "remote.mavlink_key: has no effect without 'mavlink_url'"),
         (
             "remote: {mavlink_unsigned_commands: true}",
-            "remote.mavlink_unsigned_commands: means nothing without 'mavlink_url'",
+            "remote.mavlink_unsigned_commands: has no effect without 'mavlink_url'",
         ),
-        ("remote: {tokens: t}", "remote.tokens: means nothing without 'grpc_address'"),
+        ("remote: {tokens: t}", "remote.tokens: has no effect without 'grpc_address'"),
     ],
 )
 def test_contradictions_are_told(text: str, expected: str) -> None:

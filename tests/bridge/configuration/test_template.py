@@ -140,7 +140,7 @@ def test_every_setting_is_written_with_what_it_means() -> None:
     assert written.keys() == set(Configuration.__struct_fields__)
     assert max(map(len, text.splitlines())) <= 120
     words = {
-        "# Fastest rotation, in rad/s.",
+        "# Highest yaw rate, in rad/s.",
         "# Execution of the supervisor.",
         "# Rotator.rotate_done: outgoing message",
     }

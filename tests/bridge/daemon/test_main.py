@@ -103,7 +103,7 @@ def test_what_is_not_tied_is_listed(bridge: Bridge, tmp_path: Path) -> None:
         (("driver: opencr", "driver: opncr"), "unknown drive base 'opncr'"),
         (("answer_limit_s", "answer_limt_s"), "answer_limt_s"),
         (("token_file: null", "token_file: /nowhere/token"), "/nowhere/token: No such file"),
-        (("mavlink_key: null", "mavlink_key: key"), "means nothing without 'mavlink_url'"),
+        (("mavlink_key: null", "mavlink_key: key"), "has no effect without 'mavlink_url'"),
     ],
 )
 def test_check_refuses_what_run_refuses(change: tuple[str, str], why: str, bridge: Bridge, tmp_path: Path) -> None:

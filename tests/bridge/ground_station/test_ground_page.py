@@ -37,7 +37,7 @@ def test_times_and_limits() -> None:
     for text in (
         f"has not turned for {stream.STALE_S:g} s",
         f"after {stream.GONE_S:g} s the heartbeat ends",
-        f"A scan is told for {stream.SCAN_LIMIT_S:g} s, a reading of the motors for {stream.READING_LIMIT_S:g} s",
+        f"A scan is sent for {stream.SCAN_LIMIT_S:g} s, a reading of the motors for {stream.READING_LIMIT_S:g} s",
         f"between {commands.SHORTEST_INTERVAL_S * 1000:g} ms and an hour",
         f"with a confirmation count within {command_handler.REPEATED_S:g} s",
         f"not answered within {command_handler.ANSWER_LIMIT_S:g} s",

@@ -75,8 +75,8 @@ class Execution(_Section, frozen=True):
     every: Annotated[
         Literal["period", "event"] | None,
         Meta(
-            description="When the supervisor decides: each period, or after each message as well; null: `event`, or never in a "
-            "supervision layer."
+            description="When the supervisor decides: each period, or after each message as well; null: `event`, or "
+            "never in a supervision layer."
         ),
     ] = None
     policy: Annotated[

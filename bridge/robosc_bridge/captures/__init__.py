@@ -1,1 +1,1 @@
-"""Captures: the bytes of a robot's lines, recorded with their times, replayed to the decoders, freed of their owner."""
+"""Captures: the bytes of a robot's lines, recorded with their times, replayed to the decoders, and redacted."""

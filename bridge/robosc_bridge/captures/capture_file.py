@@ -5,8 +5,8 @@
 | `base/out`, `base/in`, `scanner/in`, ... | `octets` | bytes that were written or read at once |
 | `base/events`, ... | `json` | a happening: the line was opened, set to a speed, emptied, closed or lost |
 
-The metadata of a channel are those of its line: driver, robot, options. Messages are not gathered in chunks while they
-are recorded, so that a file that ends in the middle loses no more than its last ones.
+The metadata of a channel describe its line: driver, robot, options. While a capture is recorded, its messages are not
+gathered in chunks, so that a file that ends in the middle only lacks its last messages.
 """
 
 import json
@@ -35,7 +35,7 @@ _DAMAGED = (McapError, struct.error, RuntimeError, ZstdError, EOFError, LookupEr
 
 
 class CaptureError(BridgeError):
-    """A capture cannot be written or read; says why."""
+    """A capture cannot be written or read; the message says why."""
 
 
 class Kind(StrEnum):
@@ -48,7 +48,7 @@ class Kind(StrEnum):
 
 @dataclass(frozen=True)
 class LineInfo:
-    """A line, as a reader has to know it.
+    """A line, with what a reader needs to know of it.
 
     Attributes:
         name: Name: `base` or `scanner`.
@@ -98,14 +98,14 @@ class LineInfo:
 
 @dataclass(frozen=True, slots=True)
 class Record:
-    """Bytes that passed at once, or a happening.
+    """Bytes that were read or written at once, or an event of the line.
 
     Attributes:
-        time_ns: Time in nanoseconds since 1970; of bytes that were read, once they were; of bytes that were written,
-            before that.
+        time_ns: Time in nanoseconds since 1970: for bytes that were read, just after that; for bytes that were written,
+            just before.
         line: Name of the line.
-        kind: Direction, or that it is a happening.
-        data: Bytes; of a happening its JSON.
+        kind: Direction of the bytes, or the kind for an event.
+        data: Bytes; for an event, its JSON.
     """
 
     time_ns: int
@@ -129,7 +129,7 @@ class CaptureWriter:
     """Writer of a capture.
 
     Args:
-        stream: File that it is written to; stays its owner's.
+        stream: File that it is written to, which still belongs to its owner.
         lines: Lines whose records are written, by name.
         is_packed: True to gather and compress messages, as in files that are kept.
     """
@@ -175,7 +175,7 @@ class Capture:
     Attributes:
         lines: Its lines, by name.
         records: Records, in the order in which they were written.
-        is_whole: True if the file has its end; else its recording was broken off.
+        is_whole: True if the file is complete; else its recording was interrupted.
     """
 
     lines: Mapping[str, LineInfo]

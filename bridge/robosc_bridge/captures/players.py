@@ -1,8 +1,8 @@
-"""Players of a line's records, one for each kind of line: they tell what the drivers' decoders make of them.
+"""Players of a line's records, one for each kind of line: they show how the drivers' decoders interpret them.
 
-A LiDAR's player is its driver, on a host whose time and bytes are those of the capture. Requests to wheels went out as
-they were decided then: their players find answers to these, and take them through the decoders and the odometry of the
-drivers.
+The player of a LiDAR is its driver, on a host whose time and bytes are those of the capture. Requests to the wheels are
+the recorded ones: the players of these lines find the answers to the requests, and pass them through the decoders and
+the odometry of the drivers.
 """
 
 import math
@@ -66,16 +66,16 @@ class Summary:
     """Figures of a line.
 
     Attributes:
-        driver: Driver that used it.
+        driver: Driver that used the line.
         readings: Readings of a drive base.
         scans: Full revolutions, or rounds of obstacles.
         frames: Well-formed frames that came.
-        bad_frames: Frames with a wrong check or impossible contents.
-        skipped_bytes: Bytes that came and belong to no frame.
+        bad_frames: Frames with a wrong checksum or impossible contents.
+        skipped_bytes: Received bytes that belong to no frame.
         bytes_in: Bytes that came.
         bytes_out: Bytes that were sent.
         unanswered: Requests that got no answer before the next one.
-        problems: Number of times that each kind of problem was met.
+        problems: Number of problems of each kind.
     """
 
     driver: str

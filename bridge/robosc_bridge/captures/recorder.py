@@ -1,6 +1,6 @@
-"""Recorder of the bytes on the lines of a robot that drives: it may lose records, and never holds up a line.
+"""Recorder of the bytes on the lines of a driving robot: it may lose records, but never holds up a line.
 
-Threads of devices put what passes into a queue that is bounded; a thread of its own writes. Where the disk is full or
+The threads of devices put the bytes into a bounded queue, and a separate thread writes them. If the disk is full or
 does not answer, records are lost and the robot drives on.
 """
 
@@ -37,19 +37,19 @@ type Tap = Callable[[Kind, bytes], None]
 
 
 class Recorder:
-    """Writer of what passes on the lines, in a thread of its own.
+    """Writer of the bytes on the lines, in a thread of its own.
 
     Args:
-        file: File that is written; one that is there becomes the first older part.
+        file: File that is written; an existing one becomes the first older part.
         lines: Lines, by their paths or addresses.
         host: Host whose time the records have.
-        limit_bytes: Most bytes of all parts together.
+        limit_bytes: Maximum size of all parts together.
 
     Attributes:
-        lost: Records that were lost so far.
+        lost: Number of records lost so far.
 
     Raises:
-        CaptureError: The file is something else than a capture.
+        CaptureError: The file exists and is not a capture.
         OSError: It cannot be written.
     """
 

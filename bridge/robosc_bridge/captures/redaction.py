@@ -1,4 +1,4 @@
-"""Redaction of a capture: what identifies its owner goes, and what a driver is tested with stays.
+"""Redaction of a capture: data that identifies its owner is removed, and data for testing a driver is kept.
 
 | what | what becomes of it |
 |---|---|
@@ -11,7 +11,7 @@
 | MAVLink: signatures | removed, and the packets are as if they had never been signed |
 | LiDARs: texts of six characters or more between frames | overwritten: some tell their serial number at the start |
 
-The ranges of a LiDAR are the shape of a room, and stay; `without` leaves out the whole line.
+The ranges of a LiDAR show the shape of a room, and are kept; `without` leaves out the whole line.
 """
 
 import re

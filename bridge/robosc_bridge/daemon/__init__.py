@@ -1,1 +1,1 @@
-"""The daemon: devices in threads of their own, and the loop that executes the supervisor between them."""
+"""The daemon: a thread for each device, and the loop that executes the supervisor between them."""

@@ -1,4 +1,4 @@
-"""From a configuration to a daemon with its devices' threads."""
+"""Assembly of a daemon and the threads of its devices from a configuration."""
 
 import contextlib
 import dataclasses
@@ -89,7 +89,7 @@ _THREAD_LIMIT_S = 10.0
 
 
 class AssemblyError(BridgeError):
-    """A configuration asks for what cannot be made; says what."""
+    """A configuration asks for something that cannot be made; the message says what."""
 
 
 def safety_limits(configuration: Configuration) -> SafetyLimits:
@@ -261,10 +261,10 @@ class Machine:
         daemon: The loop, run by whoever calls `run`.
         drive: The drive base's thread.
         scanner: The LiDAR's thread; None: there is none.
-        camera: The camera's thread; None: nothing is mapped to what it shows.
+        camera: The camera's thread; None: no communication is mapped to it.
         operations: The daemon as remote endpoints see it.
-        liveness: Threads and endpoints that must not end by themselves.
-        manager: Service manager that is told that the bridge lives.
+        liveness: Monitor of threads and endpoints that must not end while the robot runs.
+        manager: Service manager that the bridge notifies that it is alive.
     """
 
     daemon: Daemon

@@ -1,4 +1,4 @@
-"""Access to the daemon from elsewhere: its remote endpoints, as the program starts and stops them."""
+"""Remote endpoints of the daemon, as the program starts and stops them."""
 
 import logging
 from collections.abc import Callable, Iterator, Sequence
@@ -20,7 +20,7 @@ _log = logging.getLogger(__name__)
 
 
 class Endpoint(Protocol):
-    """Serves operators or ground stations, in threads of its own."""
+    """Server for operators or ground stations, with threads of its own."""
 
     @property
     def name(self) -> str:
@@ -42,10 +42,10 @@ class Endpoint(Protocol):
 
 
 class LivenessMonitor:
-    """Threads and endpoints that must not end by themselves while the robot runs.
+    """Monitor of the threads and endpoints that must not end while the robot runs.
 
     Args:
-        threads: Threads of devices; reporting what becomes of them is up to the drivers.
+        threads: Threads of devices; the drivers report the state of the devices themselves.
     """
 
     def __init__(self, threads: Sequence[DeviceThread]) -> None:

@@ -28,11 +28,11 @@ class Job:
         supervisor: Supervisor that is executed.
         mapping: Channels that its communications are mapped to.
         settings: Settings of the executor.
-        needs_scanner: True if a LiDAR must be there before it starts.
-        starts_itself: True if it starts as soon as the devices are there; else it stays in standby.
-        stays_after_fault: True if it waits for somebody to start it again after a fault; else it ends.
-        is_layer: True for a supervision layer, where programs ask for what it lets through; False for a controller.
-        needs_camera: True if a camera must be there before it starts.
+        needs_scanner: True if a LiDAR must be there before the job starts.
+        starts_itself: True if the job starts as soon as the devices are there; else it stays in standby.
+        stays_after_fault: True if the bridge waits after a fault until an operator starts it again; else it ends.
+        is_layer: True for a supervision layer, which judges the requests of programs; False for a controller.
+        needs_camera: True if a camera must be there before the job starts.
     """
 
     supervisor: Supervisor
@@ -51,7 +51,7 @@ class Execution:
     Args:
         job: Job that is executed.
         robot: Robot that the job moves.
-        requesters: Programs that ask for motion, where the job is a supervision layer.
+        requesters: Programs that send requests, if the job is a supervision layer.
         clock: The only source of time.
         log: The event log.
 
@@ -60,9 +60,9 @@ class Execution:
         SettingsError: A setting is wrong, or names what the model does not have.
 
     Attributes:
-        executor: Executor at work; None: nothing is executed.
+        executor: Executor at work; None: no supervisor is executed.
         due_s: Time of the next decision, in seconds.
-        overruns: Number of decisions that were left out because the one before took too long.
+        overruns: Number of decisions that were left out because the previous one took too long.
     """
 
     def __init__(self, job: Job, robot: RobotAdapter, requesters: Requesters, clock: Clock, log: EventLog) -> None:

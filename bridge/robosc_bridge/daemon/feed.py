@@ -1,7 +1,7 @@
-"""Feed for watchers of the daemon: the latest snapshot, and entries of the event log since the last look.
+"""Feed for watchers of the daemon: the latest snapshot, and the new entries of the event log.
 
-The loop writes, any number of watchers read, each from a thread of its own; nobody waits for anybody. A watcher that
-reads too slowly loses entries and is told how many, but never loses the latest snapshot.
+The loop writes, and any number of watchers read, each from a thread of its own; none waits for another. A watcher that
+reads too slowly loses entries and learns how many, but it always gets the latest snapshot.
 """
 
 import threading
@@ -23,25 +23,25 @@ MAXIMUM_WAITING = 1000
 
 @dataclass(frozen=True)
 class Snapshot:
-    """State of the daemon, as the loop saw it at the end of a cycle. Nobody changes any part of it.
+    """State of the daemon, as the loop saw it at the end of a cycle. No part of it changes afterwards.
 
     Attributes:
         number: Number that grows with each snapshot.
         time_s: Time of the snapshot, in seconds since 1970-01-01 UTC.
         state: State of the daemon.
-        problem: The fault that has stopped it; empty: none.
-        reasons: Reasons why the safety layer lets nothing move.
-        warnings: Warnings for a person although the safety layer lets things move.
-        stops: Reasons why the executor requests nothing; empty: it may, or nothing is executed.
+        problem: The fault that has stopped the robot; empty: none.
+        reasons: Reasons why the safety layer does not let the robot move.
+        warnings: Warnings for a person while the safety layer lets the robot move.
+        stops: Reasons why the executor issues no request; empty: it may, or no supervisor is executed.
         devices: For each device that belongs to the robot, True if it works.
         components: State and variables of each component with a behaviour, `{name: {"state": s, "variables": {v:
             value}}}`; empty: nothing is executed.
         enabled: Names of the requests that are allowed now, in the model's order.
-        reading: Last reading of the drive base; None: nothing yet, or it is lost.
-        scan: The LiDAR's last full revolution; None: the same.
-        overruns: Number of decisions that were left out because the one before took too long.
+        reading: Last reading of the drive base; None: there is none yet, or the drive base is lost.
+        scan: The LiDAR's last full revolution; None: likewise.
+        overruns: Number of decisions that were left out because the previous one took too long.
         communications: Location of each service and action, by name; empty: nothing is executed.
-        timing: Times that the bridge measures of itself, and counts of its lines.
+        timing: The bridge's own times, and the counts of its lines.
     """
 
     number: int
@@ -67,8 +67,8 @@ class Update:
 
     Attributes:
         snapshot: The latest snapshot; None: there was none yet.
-        entries: Entries of the event log since the last look, in their order.
-        lost: Number of entries before these that were dropped because nobody looked.
+        entries: Entries of the event log since the last update, in their order.
+        lost: Number of entries before these that were dropped because the watcher was too slow.
     """
 
     snapshot: Snapshot | None
@@ -156,7 +156,7 @@ class Feed:
 
 
 class WatchedLog:
-    """Event log whose entries are shown as well.
+    """Event log whose entries also go to the feed.
 
     Args:
         log: Log that the entries are written to.

@@ -1,4 +1,4 @@
-"""Keys that are typed in the terminal of the bridge, one by one and without being shown."""
+"""Keys pressed in the terminal of the bridge, one by one and without echo."""
 
 import contextlib
 import logging
@@ -19,11 +19,11 @@ _LIMIT_S = 2.0
 
 
 class Keyboard:
-    """Reads keys in a thread of its own while its context lasts; does nothing where there is no terminal.
+    """Reader of keys, in a thread of its own while its context lasts; does nothing without a terminal.
 
     Args:
-        told: Takes each key: a single character, or `space`; must not wait.
-        number: Of the terminal's file.
+        told: Function that takes each key, a single character or `space`; must not wait.
+        number: File descriptor of the terminal.
     """
 
     def __init__(self, told: Callable[[str], None], number: int | None = None) -> None:

@@ -44,7 +44,7 @@ class Lifecycle:
 
     Attributes:
         state: State of the bridge.
-        problem: The fault that has stopped it; empty: none.
+        problem: The fault that has stopped the robot; empty: none.
     """
 
     def __init__(self, job: Job, safety: SafetyLayer, readiness: Readiness, orders: Orders, clock: Clock) -> None:

@@ -1,7 +1,7 @@
 """The loop: executes the supervisor at its period, between the devices' reports and the safety layer.
 
-One thread runs it and calls the executor; the devices' threads, remote endpoints and signal handlers only put something
-into its inbox.
+One thread runs the loop and calls the executor; the devices' threads, remote endpoints and signal handlers only put
+items into its inbox.
 """
 
 import logging
@@ -47,7 +47,7 @@ PROGRAM_SHARE_S = 0.002
 
 @dataclass(frozen=True)
 class Key:
-    """A key was typed in the terminal."""
+    """A key was pressed in the terminal."""
 
     key: str
 
@@ -70,9 +70,9 @@ class Daemon:
         emergency_stop: The operator's stop.
         clock: The only source of time.
         log: The executor's event log.
-        feed: Feed that shows everything; None: nobody looks.
+        feed: Feed for watchers; None: there are no watchers.
         inbox: Queue that the loop waits at; None: one of this computer.
-        timing: Measurement of its times; None: one of its own.
+        timing: Measurement of the bridge's times; None: one of its own.
     """
 
     def __init__(

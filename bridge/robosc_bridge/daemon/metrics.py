@@ -1,4 +1,4 @@
-"""Metrics of the bridge for Prometheus: its latest snapshot, over HTTP at /metrics, when it is asked for."""
+"""Metrics of the bridge for Prometheus: its latest snapshot, over HTTP at /metrics."""
 
 import logging
 import threading
@@ -33,11 +33,11 @@ _log = logging.getLogger(__name__)
 
 
 class MetricsError(BridgeError):
-    """The metrics cannot be served as configured; says why."""
+    """The metrics cannot be served as configured; the message says why."""
 
 
 class MetricsEndpoint:
-    """Server of the metrics: an `Endpoint`. It only reads, and its end stops no robot.
+    """Server of the metrics: an `Endpoint`. It only reads, and its end does not stop the robot.
 
     Args:
         feed: Feed that shows the daemon.
@@ -45,7 +45,7 @@ class MetricsEndpoint:
         is_open: True if other machines may read them.
 
     Raises:
-        MetricsError: It may not listen there.
+        MetricsError: The server may not listen at this address.
     """
 
     name = "metrics endpoint"

@@ -1,4 +1,4 @@
-"""Operations that a remote endpoint may perform on the daemon, from any thread, without waiting for it."""
+"""Operations that a remote endpoint may perform on the daemon, from any thread and without waiting."""
 
 from collections.abc import Callable, Mapping
 from concurrent.futures import Future
@@ -21,7 +21,7 @@ A command that was reported to a person as failed does not take effect later.
 
 
 class Inbox(Protocol):
-    """Function that tells the loop something."""
+    """Function that puts an item into the inbox of the loop."""
 
     def __call__(self, item: Order | FromProgram, /) -> None:
         """Tell it something; never waits."""
@@ -35,8 +35,8 @@ class Operations:
         mapping: Channels that its communications are mapped to.
         is_layer: True if the supervisor is a supervision layer.
         feed: Feed that the daemon shows.
-        post: Function that tells the loop something.
-        operator_seen: Function that tells the safety layer that the operator is there.
+        post: Function that puts an item into the inbox of the loop.
+        operator_seen: Function that reports a sign of life of an operator to the safety layer.
         turtlebot: TurtleBot3 that is driven, as a configuration names it; empty: another robot.
 
     Attributes:

@@ -27,7 +27,7 @@ def unanswered(why: str) -> None:
 
 
 class Orders:
-    """Orders without an answer so far; used by the loop's thread, but for `halting`."""
+    """Orders without an answer so far; used by the loop's thread, except for `halting`."""
 
     def __init__(self) -> None:
         self._open: list[tuple[Until, Order]] = []
@@ -90,7 +90,7 @@ _GRAVE = frozenset(LATCHING) - {Reason.OPERATOR_STOP, Reason.SUPERVISOR_FAULT}
 
 
 class Latches:
-    """Reasons that have latched, and how they are forgotten; used by the loop's thread.
+    """Reasons that have latched, and their reset; used by the loop's thread.
 
     Args:
         safety: The safety layer.

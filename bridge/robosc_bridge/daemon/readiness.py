@@ -10,13 +10,13 @@ class Readiness:
     """State of the devices that belong to the robot: whether they work.
 
     Args:
-        needs_scanner: True if a LiDAR belongs to it.
-        needs_camera: True if a camera does.
+        needs_scanner: True if a LiDAR belongs to the robot.
+        needs_camera: True if a camera belongs to the robot.
 
     Attributes:
-        devices: For each device that belongs to the robot, True if it works; replaced at each change, never changed.
-        reading: Last reading of the drive base; None: nothing yet, or it is lost.
-        scan: The LiDAR's last full revolution; None: the same.
+        devices: For each device that belongs to the robot, True if it works; replaced by a new value at each change.
+        reading: Last reading of the drive base; None: there is none yet, or the drive base is lost.
+        scan: The LiDAR's last full revolution; None: likewise.
     """
 
     def __init__(self, *, needs_scanner: bool, needs_camera: bool = False) -> None:

@@ -1,4 +1,4 @@
-"""An endpoint that serves from an event loop in a thread of its own: nothing in it can hold up the control loop."""
+"""An endpoint that serves from an event loop in a thread of its own, so that it cannot hold up the control loop."""
 
 import asyncio
 import logging
@@ -19,10 +19,10 @@ class ServedEndpoint(ABC):
         name: Name of the thread, and for the log.
         label: Text before the reason why it cannot serve.
         error: Exception type that is raised with that text.
-        expected: Exceptions that may come of its configuration: reported in a sentence, without a traceback.
+        expected: Exceptions that a wrong configuration may cause: reported in a sentence, without a traceback.
 
     Attributes:
-        address: `HOST:PORT` that it listens on; empty: it does not yet.
+        address: `HOST:PORT` that it listens on; empty: it does not listen yet.
     """
 
     def __init__(

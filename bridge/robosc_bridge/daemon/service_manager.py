@@ -1,4 +1,4 @@
-"""Words with systemd: the bridge is ready, it lives, it ends.
+"""Notifications to systemd: the bridge is ready, is alive, ends.
 
 The protocol is that of sd_notify(3): datagrams to the socket that `NOTIFY_SOCKET` names. It has been the same since
 2010; the package `sdnotify` is no longer kept and does no more than this, and `systemd-python` needs a compiler and the
@@ -20,7 +20,7 @@ class ServiceManager:
     """The service manager that has started this process; without one, nothing is sent.
 
     Args:
-        is_working: Function that returns True at a time at which all that must live does.
+        is_working: Function that takes a time and returns True if all required threads are alive then.
         environment: Environment of the process.
         process: Number of the process.
     """

@@ -1,4 +1,4 @@
-"""Snapshots that the loop shows: one whenever something changes that a person would want to see at once."""
+"""Snapshots of the loop: one at each change that a person should see at once."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, Protocol
@@ -15,7 +15,7 @@ INTERVAL_S = 0.05
 
 
 class ExecutionState(Protocol):
-    """The supervisor at work, as it is shown."""
+    """State of the supervisor at work, for snapshots."""
 
     overruns: int
 
@@ -38,14 +38,14 @@ class ExecutionState(Protocol):
 
 
 class Snapshots:
-    """Maker of snapshots, and only of those that are worth it.
+    """Maker of snapshots, which leaves out those without news.
 
     Args:
         feed: Feed that shows the snapshots.
         execution: The supervisor at work.
         readiness: Knowledge about the devices.
         clock: The time.
-        timing: Function that returns the times that the bridge measures of itself.
+        timing: Function that returns the bridge's own times.
     """
 
     def __init__(

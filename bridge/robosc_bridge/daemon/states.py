@@ -29,13 +29,13 @@ class OperatorCommand(StrEnum):
 
 @dataclass(frozen=True)
 class Order:
-    """Command of an operator who wants to know what became of it.
+    """Command of an operator, with the function that takes the answer.
 
     Attributes:
-        command: Command that is wanted.
+        command: The command.
         by: Name of the operator, for the log.
-        answer: Function that is called once, by the loop's thread, or after its end by that of the operator: with the
-            reason why the command cannot be, one sentence, or with nothing ("") once it is done. It neither waits nor
+        answer: Function that is called once, by the loop's thread or, after its end, by that of the operator: with one
+            sentence that says why the command cannot be carried out, or with "" once it is done. It neither waits nor
             raises.
     """
 

@@ -1,10 +1,10 @@
 """Source of the supervisor, and the reason why it is trusted.
 
-It is made here, by this machine's synthesizer, or it is foreign: a file, or what a synthesis server sends. A foreign
-one is untrusted input, whatever digest it carries: it is validated, and executed only if a key that this bridge was
-given has signed the file, or else if the independent verifier passes it against the texts of the model. What a server
-made last for the same texts is kept, so that the robot starts without a network, too; it is checked again like any
-other file. None of them is executed if its silent steps never end, unless somebody allows that.
+The supervisor is synthesized on this machine, or it is foreign: a file, or the answer of a synthesis server. A foreign
+supervisor is untrusted input, whatever digest it carries: it is validated, and executed only if a trusted key of this
+bridge has signed the file, or else if the independent verifier passes it against the texts of the model. The last
+supervisor that a server made for the same texts is kept, so that the robot can start without a network; it is checked
+again like any other file. No supervisor is executed if its silent steps never end, unless the user allows that.
 """
 
 import contextlib
@@ -54,13 +54,13 @@ class Source:
     """Source of the supervisor to execute.
 
     Attributes:
-        file: The model (`.rscd`), or a supervisor (`.rsup`); that has its signature or its model's text beside it.
-        deployment: Deployment that the supervisor is to have.
-        server: HOST:PORT of a synthesis server that makes it of the model; None: it is made here.
-        cache: Folder for what a server made last; None: nothing is kept.
-        trusted: Keys whose signatures of supervisor files are believed.
+        file: The model (`.rscd`), or a supervisor (`.rsup`) with its signature or the text of its model beside it.
+        deployment: Deployment of the supervisor.
+        server: HOST:PORT of the synthesis server that makes the supervisor; None: it is made on this machine.
+        cache: Folder for the last supervisors of a server; None: none is kept.
+        trusted: Keys whose signatures of supervisor files are trusted.
         credentials: Credentials for reaching the server; None: without TLS, certificate and token.
-        allow_livelock: True if silent steps may go on for ever.
+        allow_livelock: True if silent steps may go on forever.
     """
 
     file: Path

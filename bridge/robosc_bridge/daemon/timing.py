@@ -1,7 +1,7 @@
-"""Times that the bridge measures of itself, as histograms.
+"""Times of the bridge, measured by itself as histograms.
 
-Each histogram is filled by one thread, and read by any: a reader may miss what is added at that moment, and nothing
-waits. Figures of share are the upper bounds of their buckets, a quarter wide: what they say is never too good.
+Each histogram is filled by one thread, and read by any, without waiting: a reader may miss a time that is being added.
+Percentiles are the upper bounds of their buckets, which are a quarter wide, so that they are never too good.
 """
 
 from bisect import bisect_left
@@ -96,10 +96,10 @@ class TimingFigures:
 
 
 class Timing:
-    """Measurement of the way of a scan through the loop to the wheels, and of the loop.
+    """Measurement of the times of the loop, and of those from a scan through the loop to the wheels.
 
-    The loop says when it has taken up a scan, decides, and commands another velocity; the thread of the drive base says
-    when an exchange is over.
+    The loop reports when it has taken up a scan, decides, and commands another velocity; the thread of the drive base
+    reports the end of an exchange.
 
     Args:
         clock: Clock that returns the time, in seconds.

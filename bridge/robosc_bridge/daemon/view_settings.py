@@ -19,8 +19,8 @@ class ViewSettings:
         security: The certificate.
         names: Further names by which browsers reach the server.
         framed_by: Origins, or schemes with their colon, whose pages may show this one in a frame.
-        scene: Name or file of a scene that the map shows; None: none.
-        scene_seed: Seed of what the scene leaves to chance.
+        scene: Name or file of the scene that the map shows; None: no scene.
+        scene_seed: Seed of the random parts of the scene.
     """
 
     address: str = ADDRESS

@@ -1,7 +1,7 @@
-"""Cameras as streams of grey pictures, from a V4L2 device, a film or a simulator, that can be waited for and left.
+"""Cameras as streams of grey pictures from a V4L2 device, a video file or a simulator, with bounded waits.
 
-OpenCV's calls for V4L2 devices may wait for ever, and decoders of damaged pictures may crash: both happen in a process
-of its own (`camera_process`), which is ended whatever it does. A simulator serves the same stream on a Unix socket.
+OpenCV's calls for V4L2 devices may wait forever, and decoders of damaged pictures may crash. So both run in a separate
+process (`camera_process`), which can be ended at any time. A simulator serves the same stream on a Unix socket.
 """
 
 import contextlib
@@ -36,7 +36,7 @@ GreyRows = NDArray[np.uint8]
 
 
 class Camera(Protocol):
-    """Gives pictures; used from one thread, in which no call waits for longer than two seconds."""
+    """Source of pictures; used from one thread, in which no call waits for longer than two seconds."""
 
     def open(self) -> None:
         """Begin; at once, without waiting for a picture.
@@ -135,10 +135,10 @@ class _StreamCamera(ABC):
 
 
 class SocketCamera(_StreamCamera):
-    """Pictures that somebody serves on a Unix socket.
+    """Pictures from a Unix socket, such as that of a simulator.
 
     Args:
-        path: Of the socket.
+        path: Path of the socket.
     """
 
     _socket: socket.socket | None = None
@@ -171,10 +171,10 @@ class SocketCamera(_StreamCamera):
 
 
 class ProcessCamera(_StreamCamera):
-    """Pictures of a V4L2 device or a film, read in a process of its own.
+    """Pictures of a V4L2 device or a video file, read in a separate process.
 
     Args:
-        path: Of the device (/dev/video0, or a stable name below /dev/v4l/by-id) or the film.
+        path: Path of the device (/dev/video0, or a stable name below /dev/v4l/by-id) or of the video file.
     """
 
     _process: subprocess.Popen[bytes] | None = None

@@ -1,7 +1,7 @@
 """`python -m robosc_bridge.devices.camera_process PATH`: the pictures of a camera on standard output, until it ends.
 
-They are grey, in the format of `protocol.netpbm`. Whatever is wrong is one line on standard error. It ends with its
-host, whose end of standard input is closed then, also while OpenCV waits for a device.
+The pictures are grey, in the format of `protocol.netpbm`. A problem is reported in one line on standard error. The
+process ends together with its host, whose end of standard input is then closed, even while OpenCV waits for a device.
 """
 
 import os

@@ -1,8 +1,8 @@
 """Two Dynamixel X servos as wheels, on a U2D2 or another half-duplex adapter.
 
-The servos' bus watchdogs are armed while torque is on: when nothing reaches them for half a second, they stop by
-themselves. A servo that has stopped itself, for whatever reason, is not set in motion again before torque is switched
-on anew, and one that has shut down not before a person has it restarted.
+The servos' bus watchdogs are armed while torque is on: a servo that receives nothing for half a second stops on its
+own. A servo that has stopped on its own, for whatever reason, is not set in motion again until torque is switched on
+anew, and one that has shut down not until a person has had it restarted.
 
 Source: ROBOTIS e-Manual, pages XL430-W250, XM430-W210 and "DYNAMIXEL Protocol 2.0".
 """
@@ -44,17 +44,17 @@ class DynamixelBase:
 
     Args:
         path: Path of the adapter's port.
-        robot: Robot that the wheels belong to: a TurtleBot3, or a body whose wheels the following say.
-        motors: Ids of the left and the right one.
-        bauds: Speeds to look for them at, in this order.
+        robot: Robot that the wheels belong to: a TurtleBot3, or a body whose wheels the following arguments describe.
+        motors: Ids of the left and the right motor.
+        bauds: Baud rates at which to look for the motors, in this order.
         wheel_radius_m: Radius of the wheels; None: that of the TurtleBot3.
-        gear_ratio: Revolutions of a motor for one of its wheel.
-        mirrored: For the left and the right one, True if its own positive direction turns its wheel backward; a drive
-            mode of reverse, which it has or is given, turns that round.
-        drive_modes: Drive mode that each is to have, `normal` or `reverse`, kept in its EEPROM; None: as they are.
-        model: Name of the model that they must be of; None: any that can be driven.
-        acceleration_rad_s2: Acceleration of a wheel; None: as fast as it can.
-        watchdog_s: Time without a request after which the motors stop by themselves, in seconds, at least three
+        gear_ratio: Revolutions of a motor for one revolution of its wheel.
+        mirrored: For the left and the right motor, True if its own positive direction turns its wheel backward; the
+            drive mode reverse inverts that.
+        drive_modes: Drive mode of each motor, `normal` or `reverse`, kept in its EEPROM; None: left as it is.
+        model: Required model of the motors; None: any that can be driven.
+        acceleration_rad_s2: Acceleration of a wheel; None: the largest that the motor can do.
+        watchdog_s: Time without a request after which the motors stop on their own, in seconds, at least three
             exchanges.
         answer_limit_s: Longest wait for one answer.
         host: Parts of its computer that it uses.

@@ -1,16 +1,16 @@
-"""Requests to Dynamixel devices and their answers, never those of another request.
+"""Requests to Dynamixel devices, each with its own answer and never with that of another request.
 
-Packets of protocol 2.0 carry no number by which an answer could be told to belong to its request, and an answer that
-comes too late looks as the answer to the next request. A device answers in the order in which it is asked, though. So a
-device that has not answered is first asked for something else, of a length that no other request has; once that answer
-is there, nothing older can follow. Only then is it asked again.
+Packets of protocol 2.0 carry no number that assigns an answer to its request, and an answer that comes too late looks
+like the answer to the next request. But a device answers requests in their order. So a device that has not answered is
+first sent another request, whose answer has a length that no other answer has; once that answer has come, no older one
+can follow. Only then is the first request repeated.
 
-A request whose length was damaged on its way makes a device wait for bytes that never come, and take the requests that
-follow for them. So a device that does not answer twice in a row is sent as many zeros as may be missing: the
-checksum of what they complete is wrong, and between packets they are skipped.
+A request whose length was damaged on its way makes a device wait for bytes that never come, and take the following
+requests for these bytes. So a device that does not answer twice in a row is sent as many zeros as may be missing: a
+packet that they complete has a wrong checksum, and between packets they are skipped.
 
 Packets are those of dynamixel-sdk. Its `readTxRx`, `writeTxRx` and `GroupSyncRead` are not used: they take any answer
-of a device for the one they wait for, and the last forgets the error bytes and whatever came behind a missing device.
+of a device for the expected one, and the last one loses the error bytes and all answers behind a missing device.
 """
 
 import itertools
@@ -62,7 +62,7 @@ class RefusedError(DeviceError):
     """Error that a device has refused a request.
 
     Args:
-        problem: Description of what was asked of which device.
+        problem: Description of the request and its device.
         status: Its answer.
     """
 
@@ -77,11 +77,11 @@ class BusCounters:
 
     Attributes:
         requests: Requests that wanted an answer.
-        unanswered: Those of the requests without a sound answer in time.
+        unanswered: Requests without a sound answer in time.
         damaged: Answers with a wrong checksum or cut short.
         foreign: Sound packets that were no answer to the request.
-        late: Those of them from the device that was asked: answers to what it was asked before.
-        repeated: Requests that were made again.
+        late: Foreign packets from the device that was asked: its answers to earlier requests.
+        repeated: Requests that were repeated.
     """
 
     requests: int = 0
@@ -96,7 +96,7 @@ class DynamixelBus:
     """One or several devices on a line. Used from one thread.
 
     Args:
-        line: Open line; stays its owner's.
+        line: Open line, which still belongs to its owner.
         name_of: Function that returns the name of a device in messages, with the line.
         answer_limit_s: Longest wait for one answer.
         host: Host whose time it uses.

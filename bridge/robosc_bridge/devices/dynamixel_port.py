@@ -1,9 +1,9 @@
 """A port for dynamixel-sdk's packet handler on a serial line of ours.
 
-The SDK's own `PortHandler` asks for bytes over and over while it waits, which keeps a core busy (33 ms of computing for
-an answer that takes 34 ms); it measures time by a clock that a person may set; it lets the exceptions of pyserial,
-termios and the system through, and is busy for ever after one. This port waits in `poll`, by the monotonic clock,
-raises `LineError` alone, and is never busy: it is used from one thread.
+The SDK's own `PortHandler` polls for bytes in a busy loop (33 ms of computing for an answer that takes 34 ms); it
+measures time by a clock that a person may set; and it lets the exceptions of pyserial, termios and the system through,
+and stays busy forever after one. This port waits in `poll`, by the monotonic clock, raises only `LineError`, and is
+never busy, because it is used from one thread.
 """
 
 from collections.abc import Sequence
@@ -18,7 +18,7 @@ class DynamixelPort:
 
     Args:
         line: Line that it sends and receives over.
-        answer_limit_s: Longest wait for an answer, beside the time that its bytes take on the wire.
+        answer_limit_s: Longest wait for an answer, in addition to the time that its bytes take on the wire.
         host: Host whose time it uses.
 
     Attributes:

@@ -1,8 +1,7 @@
-"""Interface of a drive base and a range scanner to the rest of the bridge, whatever device is behind them.
+"""Interface of drive bases and range scanners to the rest of the bridge, the same for all devices.
 
-Both are used from one thread each, that of their line; none of their methods waits longer than its line's limit.
-Times are those of `robosc_bridge.host.monotonic`, in seconds. Axes are those of REP 103: x forward, angles
-counter-clockwise.
+Each is used from one thread, that of its line; none of the methods waits longer than the limit of the line. Times are
+those of `robosc_bridge.host.monotonic`, in seconds. Axes are those of REP 103: x forward, angles counter-clockwise.
 """
 
 import math
@@ -19,7 +18,7 @@ class Velocity:
     Attributes:
         linear_m_s: Forward.
         angular_rad_s: Counter-clockwise.
-        until_s: Time after which it may be commanded no more, in seconds; two velocities may differ in it and be equal.
+        until_s: Time after which it may no longer be commanded, in seconds; equality ignores it.
     """
 
     linear_m_s: float = 0.0
@@ -60,7 +59,7 @@ class MotorFault(StrEnum):
 
 
 class BatteryLevel(StrEnum):
-    """Judgement of a drive base on its battery, by what it knows of it."""
+    """Judgement of a drive base on its own battery."""
 
     SOUND = "sound"
     LOW = "low"
@@ -76,21 +75,23 @@ class DriveReading:
         pose: Odometry.
         velocity: Velocity as the wheels measure it.
         wheels_m_s: Speed of the left and the right wheel.
-        goals_m_s: Speeds that the left and the right wheel were told in this exchange, as the device rounds them;
-            None: they were told none, or the driver does not say.
+        goals_m_s: Speeds that were commanded to the left and the right wheel in this exchange, as the device rounds
+            them; None: none were commanded, or the driver does not say.
         pose_covariance: Covariance of x, y and heading of the pose, row by row, in m², m rad and rad²; it grows from
             zero where the odometry began. Empty: it is not known.
         velocity_variances: Variances of the linear and the angular velocity; None: they are not known.
         is_torque_on: True if the motors hold and obey.
         faults: Faults of any motor.
-        acceleration_m_s2: Acceleration with which the motors bring a wheel to a new goal; None: as fast as they can.
+        acceleration_m_s2: Acceleration with which the motors bring a wheel to a new goal; None: the largest they can
+            do.
         battery_v: Voltage of the battery, in volts; None: it is not reported.
         battery_share: Charge of the battery, 0 to 1; None: it is not reported.
         battery_level: Judgement of the drive base itself on the battery; None: it makes none.
         temperature_c: Temperature of the hottest motor, in degrees Celsius; None: it is not reported.
         buttons: True for each button that is pressed, by name: `button_1`, `bumper_1` and so on.
         imu: Further measurements by name, such as `angular_velocity_z`; empty: there are none.
-        wheels_m: Way of the left and the right wheel since the odometry began; None: encoders are not read.
+        wheels_m: Distance that the left and the right wheel have rolled since the odometry began; None: encoders are
+            not read.
         wheel_radius_m: Radius of both wheels; None: not known.
     """
 
@@ -130,7 +131,7 @@ class DriveLimits:
 
 
 class DriveBase(Protocol):
-    """Two wheels, however they are reached."""
+    """Two wheels and their motors, behind any device."""
 
     @property
     def limits(self) -> DriveLimits:

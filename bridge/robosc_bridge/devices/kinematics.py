@@ -1,8 +1,8 @@
 """Commands for two wheels so that the body moves as it should, within the limits of the wheels.
 
-The limits are applied in this order: the body's velocity is clamped; the wheels' speeds are made of it; where one is
-too fast, both are slowed by the same factor, which keeps the curvature; then they are rounded to what the wire
-carries.
+The limits are applied in this order: the body's velocity is clamped; the speeds of the wheels are computed from it; if
+one wheel is too fast, both are slowed by the same factor, which keeps the curvature; then the speeds are rounded to the
+resolution of the device.
 """
 
 import math

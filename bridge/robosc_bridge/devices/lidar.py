@@ -1,4 +1,4 @@
-"""The TurtleBot3's LiDARs as range scanners: one driver, and what is particular to each model as data."""
+"""The TurtleBot3's LiDARs as range scanners: one driver, with the particulars of each model as data."""
 
 import contextlib
 import math
@@ -25,13 +25,13 @@ class Model[Frame]:
 
     Attributes:
         name: Name in the registry.
-        bauds: Speeds of its line; the first is the likeliest.
+        bauds: Baud rates of its line, the most likely one first.
         make_decoder: Function that makes a decoder of its frames.
         points: Function that returns the points of a frame.
         start: Command that starts its motor; empty: it rotates by itself.
         stop: Command that stops its motor; empty: it cannot be stopped.
         restart_pause_s: Pause between stop and start, in seconds; None: a restart is the start alone.
-        stale_after_s: Three revolutions: after so long a silence, what came before says nothing about now.
+        stale_after_s: Three revolutions: after a silence of this length, earlier bytes are discarded.
         min_m: Shortest distance that it measures.
         max_m: Longest.
         is_dtr_off: True if its official driver drops this modem line, which opening a port raises.
@@ -74,13 +74,13 @@ class Lidar[Frame]:
     Args:
         model: Model of the LiDAR.
         path: Path of its port.
-        baud: Speed of its line; None: found out among those of the model.
+        baud: Baud rate of its line; None: those of the model are tried.
         front_rad: Direction of its front, in radians, counter-clockwise from that of the robot.
-        is_upside_down: True if it hangs, so that it rotates the other way round.
+        is_upside_down: True if it is mounted upside down, so that it rotates the other way round.
         host: Parts of its computer that it uses.
 
     Attributes:
-        counters: Counters since it was made, across being opened anew.
+        counters: Counters since this object was made; opening the line anew does not reset them.
     """
 
     def __init__(

@@ -1,4 +1,4 @@
-"""The drivers named `mavlink-rover`, with options as a file can say them."""
+"""The drivers named `mavlink-rover`, with options of types that a configuration file can contain."""
 
 from pathlib import Path
 

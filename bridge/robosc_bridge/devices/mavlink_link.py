@@ -1,8 +1,8 @@
 """One line to a vehicle, shared by all its users in this process.
 
-A drive base and a scanner may be configured on one line, and have a thread each. A thread of the line itself reads, and
-sorts what comes; it never sends. What is sent comes from its users' threads, so that a user who no longer lives keeps
-nothing alive: above all, the heartbeat is sent by the drive base where there is one.
+A drive base and a scanner, each with its own thread, may be configured on one line. The line has a thread that reads
+and dispatches messages, but never sends. Only the threads of the users send, so that a user whose thread has ended
+keeps nothing alive: above all, the heartbeat comes from the drive base, if there is one.
 """
 
 import threading
@@ -50,7 +50,7 @@ type Obstacle = ObstacleRing | SectorDistance
 
 @dataclass(frozen=True, slots=True)
 class LinkSettings:
-    """Settings for reaching a vehicle, the same for all who share its line.
+    """Settings for reaching a vehicle, the same for all users of its line.
 
     Attributes:
         path: Path of a serial port, or an address of `transport.network_line`.

@@ -1,7 +1,7 @@
-"""Obstacles around a MAVLink rover, as far as it knows them, as a range scanner.
+"""A range scanner made of the obstacles that a MAVLink rover reports.
 
-It has no laser of its own: the vehicle, or a companion computer in it, reports a ring of distances
-(OBSTACLE_DISTANCE) or those of single sensors (DISTANCE_SENSOR). Where rings come, single sensors are not looked at.
+It has no laser of its own: the vehicle, or a companion computer in it, reports a ring of distances (OBSTACLE_DISTANCE)
+or those of single sensors (DISTANCE_SENSOR). If rings are reported, single sensors are ignored.
 """
 
 import math

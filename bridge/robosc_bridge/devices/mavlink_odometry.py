@@ -1,7 +1,7 @@
 """Pose of a vehicle since it was first seen, from the estimate that its autopilot reports.
 
-An autopilot counts from where its estimator began, and the estimate may jump: when it is reset, when the vehicle
-starts anew, when another message is the one that reports it. A jump is no motion.
+The estimate of an autopilot starts where its estimator began, and it may jump: when it is reset, when the vehicle
+restarts, or when another message begins to report it. A jump does not count as motion.
 """
 
 import math

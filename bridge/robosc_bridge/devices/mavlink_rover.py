@@ -1,7 +1,8 @@
 """A MAVLink rover: ArduPilot Rover, driven in its mode GUIDED by velocity and yaw rate.
 
-The vehicle stops by itself 3 s after the last target. It is no real-time wheel bus: it tells once a second whether it
-is armed and in which mode, and a person with its remote control may take it over at any time, which is respected.
+The vehicle itself stops 3 s after the last target. It is not a real-time wheel bus: it reports only once a second
+whether it is armed and in which mode. A person with its remote control may take it over at any time, and the driver
+respects that.
 
 Sources: ArduPilot Rover (`GCS_MAVLink_Rover.cpp`, `mode_guided.cpp`, `AP_Arming_Rover.cpp`), mavlink.io.
 """

@@ -1,4 +1,4 @@
-"""Pose of a body, from the encoders of its wheels, and from a gyroscope where there is one.
+"""Pose of a body, from the encoders of its wheels and, if there is one, from a gyroscope.
 
 The equations are those of turtlebot3_node 2.3.6 (`odometry.cpp`): the way of the middle between the wheels, along the
 heading halfway through the step. The covariance is propagated after R. Siegwart, I. Nourbakhsh, D. Scaramuzza,
@@ -9,7 +9,8 @@ Wheels that slip report a rotation that the body has not made, which a gyroscope
 robot stands, which wheels do not. So the heading is a complementary filter of both: in each step, the rotation is the
 mean of the two, each with the inverse of its variance as its weight (W. T. Higgins, "A comparison of complementary and
 Kalman filtering", IEEE Transactions on Aerospace and Electronic Systems 11 (3), 1975: with independent white errors of
-both this is the Kalman filter). On the way the gyroscope has most of the weight, at a standstill the wheels have all.
+both this is the Kalman filter). In motion the gyroscope has most of the weight; at a standstill the wheels have all of
+it.
 """
 
 import math
@@ -31,7 +32,7 @@ _CERTAIN: Matrix = (0.0,) * 9
 
 @dataclass(frozen=True, slots=True)
 class Rotation:
-    """Rotation of the body in a step, as something else than its wheels measures it.
+    """Rotation of the body in a step, measured by another sensor than its wheels.
 
     Attributes:
         angle_rad: Angle, counter-clockwise.

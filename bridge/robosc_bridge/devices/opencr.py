@@ -1,17 +1,20 @@
 """A stock TurtleBot3: its OpenCR board, which drives the wheels, as a Dynamixel device.
 
-The board has no time limit for commands: while its heartbeat changes, the last one holds. It stops the wheels half a
-second after the last change. It does not tell what is wrong with a motor, only that torque is off.
+The board has no time limit for commands: the last command holds as long as the heartbeat from the bridge changes. It
+stops the wheels half a second after the last change. It does not report what is wrong with a motor, only that torque is
+off.
 
-Sources: ROBOTIS-GIT/OpenCR 1.5.3 (`turtlebot3_ros2`) and turtlebot3_node 2.3.6; what the latter does wrong is not done
-here (it reads the device status before it has one, and takes old readings for new ones).
+Sources: ROBOTIS-GIT/OpenCR 1.5.3 (`turtlebot3_ros2`) and turtlebot3_node 2.3.6, without two mistakes of the latter (it
+reads the device status before it has one, and takes old readings for new ones).
 
-A wheel servo that does not answer the board holds up each pass of its firmware for half a second, and it handles one
-packet in a pass: the board answers, but later than any answer is waited for. Nothing more is asked of it then than is
-needed to tell that from a board that is silent: whatever is asked must be worked off before it hears anything else.
+A wheel servo that does not answer the board holds up each pass of the board's firmware for half a second, and the
+firmware handles one packet in a pass: the board answers, but only after the limit of any request. The driver then sends
+no more requests than it needs to distinguish this board from a silent one, since the board must process every request
+before it receives any other.
 
-The board adds to every command what its two buttons want, of which one drives 0.3 m and the other one half a turn when
-they are held for 3 s, and what an RC-100 remote control wants; a command of zero does not end that, torque off does.
+The board adds the motion of its own inputs to every command: of its two buttons, held for 3 s, one drives 0.3 m and the
+other one makes half a turn, and an RC-100 remote control steers. A command of zero does not end that motion, torque off
+does.
 """
 
 import contextlib

@@ -1,4 +1,4 @@
-"""Options of a driver, as a configuration can say them: named, and of the type that the driver's signature tells."""
+"""Options of a driver in a configuration, with the names and types of the driver's signature."""
 
 import inspect
 from collections.abc import Mapping
@@ -14,7 +14,7 @@ _SAID_ELSEWHERE = ("path", "robot")
 
 
 class DriverOptionError(BridgeError, ValueError):
-    """A driver takes no such option, or another value."""
+    """A driver does not know an option, or does not accept its value."""
 
 
 def option_types(driver: Driver) -> dict[str, Any] | None:

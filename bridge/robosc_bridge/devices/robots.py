@@ -25,7 +25,7 @@ class Motor:
     Attributes:
         name: Name as on its label.
         model_number: Number that it reports.
-        velocity_limit_raw: Limit of its goal velocity, as it left the factory; what is beyond, it ignores.
+        velocity_limit_raw: Factory setting of the limit of its goal velocity; it ignores goals beyond the limit.
         lowest_v: Lowest supply that it is made for, in volts.
     """
 
@@ -52,7 +52,7 @@ class Battery:
     """Voltages of the battery.
 
     Attributes:
-        empty_v: Voltage that counts as nothing left.
+        empty_v: Voltage of an empty battery.
     """
 
     empty_v: float = 10.5
@@ -60,7 +60,7 @@ class Battery:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """Abilities of a robot, as its owner knows them: all that a drive needs that sees to its motors itself.
+    """Abilities of a robot, as its owner gives them: enough for a drive that takes care of its motors itself.
 
     Attributes:
         linear_m_s: Fastest speed forward and backward; of a MAVLink rover, not more than its parameter CRUISE_SPEED.

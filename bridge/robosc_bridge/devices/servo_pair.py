@@ -1,4 +1,4 @@
-"""The two wheel servos on their bus, as one unit whose commands are confirmed."""
+"""The two wheel servos on their bus, as one unit that confirms its commands."""
 
 from collections.abc import Mapping
 from dataclasses import replace

@@ -18,7 +18,7 @@ class ServoSettings:
 
     Attributes:
         model_number: A key of `SERVOS`.
-        sign: Sign of the robot's forward direction, in what the servo calls positive.
+        sign: Sign of the robot's forward direction in the servo's own direction.
         operating_mode: `VELOCITY_MODE` or another, which must be changed.
         velocity_limit_raw: Limit of its goal velocity.
         temperature_limit_c: Temperature at which it shuts down, in degrees Celsius.

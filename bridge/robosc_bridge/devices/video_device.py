@@ -1,4 +1,4 @@
-"""A V4L2 device or a film through OpenCV, whose calls may wait for ever: for a process of its own."""
+"""A V4L2 device or a video file through OpenCV, whose calls may wait forever: only for use in a separate process."""
 
 import errno
 import math
@@ -20,10 +20,10 @@ _SLOWEST_S, _FASTEST_S = 1.0, 0.005
 
 
 class VideoDevice:
-    """A camera as a V4L2 device, or a recorded film.
+    """A camera as a V4L2 device, or a video file.
 
     Args:
-        path: Of the device (/dev/video0, or a stable name below /dev/v4l/by-id) or the film.
+        path: Path of the device (/dev/video0, or a stable name below /dev/v4l/by-id) or of the video file.
 
     Raises:
         LineMissingError: There is no such device.

@@ -1,7 +1,7 @@
-"""Monitors of whether the wheels follow their commands, and nothing but these: of the drivers and the safety layer.
+"""Monitors that check whether the wheels follow their commands and no others, for the drivers and the safety layer.
 
-A driver knows what it told its motors, in their units, and names the fault; the safety layer believes no driver, and
-looks again. The rules stand here alone.
+A driver knows the commands to its motors, in their units, and names the fault; the safety layer trusts no driver and
+checks again. Both use the rules of this module.
 """
 
 import math
@@ -53,7 +53,7 @@ class _LastingMonitor:
 
 
 class FollowingMonitor(_LastingMonitor):
-    """Finds a wheel that is held, rotates by itself, or has refused its goal without a word.
+    """Monitor that finds a wheel that is held, rotates without a command, or has silently refused its goal.
 
     Args:
         limit_s: Longest time that a wheel may be far from its goal.
@@ -95,10 +95,10 @@ class FollowingMonitor(_LastingMonitor):
 
 
 class ExcessMonitor(_LastingMonitor):
-    """Finds a wheel that something else drives, too: it is faster than its goal, or rotates the other way.
+    """Monitor that finds a wheel that is also driven otherwise: faster than its goal, or the other way round.
 
     Args:
-        limit_s: Longest time that a wheel may be so, as one that is braking.
+        limit_s: Longest time that a wheel may do so, since a braking wheel does it for a while.
     """
 
     def __init__(self, limit_s: float = 0.5) -> None:

@@ -1,1 +1,1 @@
-"""First drive of a real robot: what is plugged in, servos that are set up, figures that are measured."""
+"""Preparations for the first drive of a real robot: probe of the devices, set-up of servos, calibration."""

@@ -3,7 +3,7 @@
 *Wheel radius*: the robot is pushed straight ahead along a tape measure. *Wheel separation*: it is turned on the spot by
 whole revolutions, back to a mark on the floor; a straight way knows nothing of the separation (J. Borenstein, L. Feng,
 "Measurement and Correction of Systematic Odometry Errors in Mobile Robots", 1996, separate the two errors likewise).
-*Front of the LiDAR*: it looks at a wall squarely; a line is fitted to what is ahead by total least squares.
+*Front of the LiDAR*: the robot faces a wall squarely; a line is fitted to the points ahead by total least squares.
 """
 
 import math
@@ -30,12 +30,12 @@ _LIMIT_S = 5.0
 
 
 class CalibrationError(BridgeError):
-    """A figure cannot be worked out from what was measured; says what to do again."""
+    """A figure cannot be computed from the measurements; the message says what to repeat."""
 
 
 @dataclass(frozen=True)
 class Way:
-    """A way as the wheels have rolled it, whatever an inertial sensor says.
+    """A motion as measured by the wheels alone, without an inertial sensor.
 
     Attributes:
         forward_m: Distance, backward below zero.

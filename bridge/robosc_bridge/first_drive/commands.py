@@ -1,4 +1,4 @@
-"""`robosc-bridge probe`, `setup-servo`, `calibrate` and `doctor`: what comes before the first drive."""
+"""`robosc-bridge probe`, `setup-servo`, `calibrate` and `doctor`: the commands before the first drive."""
 
 import argparse
 import json

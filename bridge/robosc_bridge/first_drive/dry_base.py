@@ -1,7 +1,7 @@
-"""A drive base that does everything but drive: torque stays off, and what would be driven is told.
+"""A drive base that does everything except driving: torque stays off, and the velocities are reported instead.
 
-What the wheels would have done is in its readings, so that a supervisor goes on as if the robot had moved; all else in
-them, such as the battery and the buttons, is the robot's own.
+Its readings contain the motion that the wheels would have made, so that a supervisor goes on as if the robot had moved;
+the rest of a reading, such as the battery and the buttons, comes from the robot.
 """
 
 import logging
@@ -18,7 +18,7 @@ class DryBase:
     """A `DriveBase` whose wheels never turn.
 
     Args:
-        base: The real one.
+        base: The real drive base.
         separation_m: Distance between its wheels, in metres.
         clock: Clock that returns the time, in seconds.
     """

@@ -1,6 +1,6 @@
-"""Probe of ports: boards, servos, LiDARs and rovers that answer there, with what is wrong with each.
+"""Probe of ports: boards, servos, LiDARs and rovers that answer there, with the problems of each.
 
-Nothing is written but pings, requests to read, and the commands that start a LiDAR's motor and stop it again.
+It only sends pings, read requests, and the commands that start a LiDAR's motor and stop it again.
 """
 
 import contextlib
@@ -36,7 +36,7 @@ class FoundDevice:
     Attributes:
         kind: `opencr`, `servo`, `lidar` or `vehicle`.
         name: Name for a person.
-        facts: Facts that it tells, by name.
+        facts: Facts that it reports, by name.
         problems: Problems with it, each with what to do; empty: none.
     """
 
@@ -53,7 +53,7 @@ class ProbedPort:
     Attributes:
         port: Its name.
         devices: Devices that answer there.
-        problem: Reason why it cannot be used, or that nothing answers; empty: something does.
+        problem: Reason why the port cannot be used, or a note that no device answers; empty: a device answers.
     """
 
     port: str

@@ -1,4 +1,4 @@
-"""Servos on a line: who is there, at which speed, and how each is set up. Only pings and reads are sent."""
+"""Servos on a line: their ids, baud rates and settings. Only pings and read requests are sent."""
 
 import contextlib
 from collections.abc import Sequence
@@ -36,11 +36,11 @@ class FoundServo:
 
     Attributes:
         device: Its id.
-        baud: Speed at which it answers.
+        baud: Baud rate at which it answers.
         model_number: Number of its model.
         firmware: Version of its firmware.
-        registers: Settings and measurements by name, as far as it lets them be read.
-        problems: Problems that keep the bridge from driving it, or will, each with what to do.
+        registers: Settings and measurements by name, as far as the servo lets them be read.
+        problems: Problems that keep the bridge from driving the servo, now or later, each with its remedy.
     """
 
     device: int

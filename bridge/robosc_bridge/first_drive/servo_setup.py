@@ -1,7 +1,8 @@
-"""Set-up of a servo as a wheel: id, speed of the line, direction, and what the bridge asks of it.
+"""Set-up of a servo as a wheel: id, baud rate, direction, and the settings that the bridge requires.
 
-Torque goes off first: with torque on, a servo refuses to change its EEPROM. Only what differs is written, as an EEPROM
-wears out, and each value is read back. Id and speed come last, in this order: with another of these it is reached anew.
+Torque goes off first: with torque on, a servo refuses to change its EEPROM. Only registers that differ are written,
+because an EEPROM wears out, and each value is read back. Id and baud rate come last, in this order: after a change of
+either, the servo must be addressed anew.
 
 Source: ROBOTIS e-Manual, pages XL430-W250 and XM430-W210 ("Control Table Data", "EEPROM Area").
 """
@@ -24,12 +25,12 @@ _VELOCITY = 128
 
 @dataclass(frozen=True)
 class Wish:
-    """Wish for a servo; None: as it is.
+    """Wanted settings of a servo; None: left as it is.
 
     Attributes:
         device: Id.
-        baud: Speed of the line.
-        is_reversed: True if it counts the other way round, as a TurtleBot3's right one does.
+        baud: Baud rate.
+        is_reversed: True if its direction is reversed, like that of a TurtleBot3's right servo.
     """
 
     device: int | None = None
@@ -45,7 +46,7 @@ class Change:
         name: Name of the register.
         address: Its address.
         before: Its value.
-        after: The value that is wanted.
+        after: The wanted value.
     """
 
     name: str
@@ -58,10 +59,10 @@ class ServoSetup:
     """A servo on a line, to be set up.
 
     Args:
-        line: Open line; its speed is another afterwards.
+        line: Open line; its baud rate may differ afterwards.
         host: Host whose time is used.
         path: Name of the line in messages.
-        bauds: Speeds at which the servo is looked for.
+        bauds: Baud rates at which to look for the servo.
     """
 
     def __init__(self, line: Port, host: Host, path: str, bauds: Sequence[int] = BAUDS) -> None:

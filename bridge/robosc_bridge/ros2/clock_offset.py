@@ -1,9 +1,9 @@
-"""Offset between the clocks of two computers, from times at which one has sent and the other has received.
+"""Offset between the clocks of two computers, from the times of sending on one and of arrival on the other.
 
-What is received was under way for a time that is not known, but never less than zero: the smallest difference of many
-is the nearest to the offset of the clocks. That is the minimum filter of NTP (D. L. Mills, "Internet time
-synchronization: the Network Time Protocol", IEEE Transactions on Communications 39 (10), 1991), one way only: what is
-left is the shortest time under way, below a millisecond on one computer and some on a network.
+The transmission time of a message is unknown, but never less than zero, so that the smallest of many differences is the
+nearest to the offset of the clocks. That is the minimum filter of NTP (D. L. Mills, "Internet time synchronization: the
+Network Time Protocol", IEEE Transactions on Communications 39 (10), 1991), in one direction only: the remaining error
+is the shortest transmission time, below a millisecond on one computer and a few milliseconds on a network.
 """
 
 import time
@@ -56,8 +56,8 @@ class LocalClocks:
     """Clocks of this computer.
 
     Attributes:
-        monotonic: Function that returns the time by the clock that times are compared by, in seconds.
-        wall_ns: Function that returns the time by the clock of ROS, in nanoseconds since 1970-01-01 UTC.
+        monotonic: Function that returns the time of the clock for comparing times, in seconds.
+        wall_ns: Function that returns the time of the ROS clock, in nanoseconds since 1970-01-01 UTC.
     """
 
     monotonic: Callable[[], float] = monotonic

@@ -1,4 +1,4 @@
-"""`robosc-bridge ros2`: publish what a bridge measures as a ROS 2 node, until it is interrupted."""
+"""`robosc-bridge ros2`: publish a bridge's measurements as a ROS 2 node, until it is interrupted."""
 
 import argparse
 import math

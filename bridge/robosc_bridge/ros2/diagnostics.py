@@ -1,4 +1,4 @@
-"""State of a bridge as entries for diagnostic_msgs/DiagnosticArray, before they are messages."""
+"""State of a bridge as entries for diagnostic_msgs/DiagnosticArray, without the message types."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ _STANDBY = "STANDBY"
 
 
 class Level(IntEnum):
-    """Level as diagnostic_msgs/DiagnosticStatus has it."""
+    """Level of diagnostic_msgs/DiagnosticStatus."""
 
     OK = 0
     WARN = 1
@@ -44,7 +44,7 @@ class Link:
         address: Address of the bridge.
         robot: Name of the robot in its model; empty: no bridge has answered yet.
         version: Version of the bridge; empty: no bridge has answered yet.
-        problem: Reason why the bridge is not heard, one sentence; empty: it is.
+        problem: Reason why the bridge does not answer, one sentence; empty: it answers.
     """
 
     address: str

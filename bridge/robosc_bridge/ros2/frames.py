@@ -1,4 +1,4 @@
-"""Frames of a robot and where they are on it, by REP 105 (ros.org/reps/rep-0105.html) and as a TurtleBot3's are called.
+"""Frames of a robot and their positions, by REP 105 (ros.org/reps/rep-0105.html), with a TurtleBot3's names.
 
 Source of the places: ROBOTIS-GIT/turtlebot3, `turtlebot3_description/urdf`.
 """
@@ -74,7 +74,7 @@ class Frames:
 
 @dataclass(frozen=True)
 class Mounting:
-    """A frame that does not move in another one.
+    """A frame that is fixed in another one.
 
     Attributes:
         parent: The other one, with the prefix.

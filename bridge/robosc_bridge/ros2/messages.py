@@ -1,6 +1,7 @@
-"""Conversion of what a bridge tells to messages of ROS 2.
+"""Conversion of a bridge's snapshots to messages of ROS 2.
 
-Units and axes are those of REP 103 (ros.org/reps/rep-0103.html). Needs the packages of the messages and no middleware.
+Units and axes are those of REP 103 (ros.org/reps/rep-0103.html). The module needs the message packages,
+but no middleware.
 """
 
 import math

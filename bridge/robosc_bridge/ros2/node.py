@@ -1,4 +1,4 @@
-"""The node of ROS 2: publishers, and nothing that anybody could command."""
+"""The node of ROS 2: publishers only, without any way to command the robot."""
 
 from collections.abc import Sequence
 from types import TracebackType
@@ -12,17 +12,17 @@ ROS_ARGUMENTS = "--ros-args"
 
 
 class MissingRosError(Exception):
-    """ROS 2, or a package of it, is not installed; one sentence that says what to do."""
+    """ROS 2, or one of its packages, is not installed; the message says in one sentence what to do."""
 
 
 class NodeError(Exception):
-    """The node cannot be made as it is asked for; one sentence for a person."""
+    """The node cannot be made as requested; the message is one sentence for a person."""
 
 
 class BridgeNode:
     """The node, an `Outlet`; use it with `with`.
 
-    Nothing spins it: publishers need no executor, and parameters cannot be set from elsewhere.
+    No executor spins it: publishers need none, and parameters cannot be set from outside.
 
     Args:
         frames: Names of frames.
@@ -34,7 +34,7 @@ class BridgeNode:
 
     Raises:
         MissingRosError: rclpy or a package of messages is not installed.
-        NodeError: ROS does not take a name or an argument.
+        NodeError: ROS does not accept a name or an argument.
     """
 
     def __init__(

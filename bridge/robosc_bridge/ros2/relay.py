@@ -1,4 +1,4 @@
-"""Relay of what a bridge tells: what is new and fresh goes on, with its time by the clock of ROS."""
+"""Relay of a bridge's snapshots: it passes on new and fresh readings, with their times by the ROS clock."""
 
 import math
 import threading
@@ -27,7 +27,7 @@ class EarlierBridgeError(Exception):
 
 
 class Outlet(Protocol):
-    """Place that messages go to; stamps are in nanoseconds since 1970-01-01 UTC."""
+    """Receiver of the messages; stamps are in nanoseconds since 1970-01-01 UTC."""
 
     def know(self, turtlebot: str) -> None:
         """A bridge tells which TurtleBot3 it drives; empty: another robot."""

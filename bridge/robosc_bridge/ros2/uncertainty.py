@@ -1,9 +1,9 @@
-"""Covariances of what a bridge measures: those that it tells, else assumed, and larger than a good robot's are.
+"""Covariances of a bridge's measurements: those that it sends, or else assumed ones, larger than a good robot's.
 
-That of the pose grows with the way, as dead reckoning does. The step is that of R. Siegwart, I. Nourbakhsh and
-D. Scaramuzza, "Introduction to Autonomous Mobile Robots", 2nd edition, 2011, section 5.2.4; that variances grow in
-proportion to the way is from K. S. Chong and L. Kleeman, "Accurate odometry and error modelling for a mobile robot",
-ICRA 1997.
+The covariance of the pose grows with the distance, as in dead reckoning. The step is that of R. Siegwart, I. Nourbakhsh
+and D. Scaramuzza, "Introduction to Autonomous Mobile Robots", 2nd edition, 2011, section 5.2.4; that variances grow in
+proportion to the distance is from K. S. Chong and L. Kleeman, "Accurate odometry and error modelling for a mobile
+robot", ICRA 1997.
 """
 
 import math
@@ -62,7 +62,7 @@ class PlanarPose:
 
 
 class PoseUncertainty:
-    """Covariance of a pose that is followed from where it is seen first."""
+    """Covariance of a pose that is tracked from its first reading."""
 
     def __init__(self) -> None:
         self._pose: PlanarPose | None = None

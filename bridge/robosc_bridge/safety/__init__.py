@@ -1,8 +1,8 @@
-"""The safety layer: every motion command passes through it, and by default nothing does.
+"""The safety layer: every motion command must pass it, and by default it lets none pass.
 
-It stands on the standard library and on the values of `robosc_bridge.devices.interface` alone, and is evaluated in the
-thread of the drive base, from what the other threads report to it: a supervisor that hangs cannot hold it up. What each
-reason leads to, and within what time, stands in docs/bridge-safety.md.
+It depends only on the standard library and the values of `robosc_bridge.devices.interface`. The thread of the drive
+base evaluates it from the reports of the other threads, so that a supervisor that hangs cannot hold it up.
+docs/bridge-safety.md says what each reason leads to, and within what time.
 """
 
 from robosc_bridge.safety.layer import Output, SafetyLayer

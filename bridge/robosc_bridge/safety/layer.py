@@ -1,4 +1,4 @@
-"""The layer itself: one lock, one `output` for each exchange with the drive base."""
+"""The safety layer itself: one lock, and one `output` for each exchange with the drive base."""
 
 import math
 import threading
@@ -23,9 +23,9 @@ class Output:
 
     Attributes:
         velocity: Standstill whenever there is a reason; it holds for `SafetyLimits.motor_timeout_s`.
-        is_torque_wanted: True if the motors are to hold.
-        reasons: Reasons why it may not move, in the order of `Reason`.
-        warnings: Warnings that a person should know, in the order of `Caution`.
+        is_torque_wanted: True if torque is to be on.
+        reasons: Reasons why the robot may not move, in the order of `Reason`.
+        warnings: Warnings for a person, in the order of `Caution`.
     """
 
     velocity: Velocity
@@ -35,18 +35,18 @@ class Output:
 
 
 class SafetyLayer:
-    """Safety layer that lets velocities pass that are safe, and zero otherwise; in standby until it is enabled.
+    """Safety layer that lets safe velocities pass and otherwise commands zero; in standby until it is enabled.
 
-    The thread of the drive base calls `output`, switches torque as it says, exchanges the velocity, and reports with
-    `on_drive_reading` or `drive_failed`; the others may be called from any thread, also from a signal handler. All
-    times are those of one monotonic clock, in seconds. Nothing raises, and nothing waits but for the lock, which is
-    held for some 40 microseconds.
+    The thread of the drive base calls `output`, switches torque and exchanges the velocity accordingly, and reports
+    with `on_drive_reading` or `drive_failed`; the other methods may be called from any thread, and from a signal
+    handler. All times are those of one monotonic clock, in seconds. No method raises, and none waits for anything but
+    the lock, which is held for some 40 microseconds.
 
-    A command counts only if it was given after an `output` without reasons, or ends the silence of commands: what was
-    said before or during a stop never moves the robot afterwards. Motion begins with the ramp from standstill.
+    A command counts only if it was given after an `output` without reasons, or if it ends a silence of commands: a
+    command from before or during a stop never moves the robot afterwards. Motion begins with the ramp from standstill.
 
     Args:
-        limits: Limits of what may pass, and for how long.
+        limits: Limits of velocities and times.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:

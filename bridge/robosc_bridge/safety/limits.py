@@ -1,4 +1,4 @@
-"""The numbers of the safety layer: what they are where nobody says otherwise, and what they may be.
+"""The numbers of the safety layer: their defaults and their bounds.
 
 The configuration, its schema, its page and the template of `robosc-bridge init` take them from here.
 """
@@ -23,8 +23,8 @@ class Bounds:
     """Bounds of a number.
 
     Attributes:
-        least: Smallest value; None: all above 0.
-        most: Largest value; None: all that are finite.
+        least: Smallest value; None: any above 0.
+        most: Largest value; None: any finite one.
     """
 
     least: float | None = None
@@ -76,15 +76,16 @@ _MAY_BE_NONE = ("scan_timeout_s", "operator_timeout_s", "battery_warn_v", "batte
 
 @dataclass(frozen=True, kw_only=True)
 class SafetyLimits:
-    """Limits of what the safety layer lets pass, and times after which it stops the robot.
+    """Limits of the velocities that the safety layer lets pass, and times after which it stops the robot.
 
     Attributes:
         linear_m_s: Fastest speed forward and backward.
         angular_rad_s: Fastest rotation.
-        wheel_m_s: Fastest wheel; where one would be faster, both are slowed alike, so that the curvature stays.
+        wheel_m_s: Highest speed of a wheel; if one would be faster, both are slowed by the same factor, which keeps the
+            curvature.
         separation_m: Distance between the wheels' middles.
-        scan_timeout_s: Longest time without a full scan (`SCAN_TIMEOUTS_S`); None: no scanner is needed. It has no
-            default, so that nobody forgets the scanner.
+        scan_timeout_s: Longest time without a full scan (`SCAN_TIMEOUTS_S`); None: no scanner is needed. There is no
+            default, so that the scanner cannot be forgotten.
         linear_acceleration_m_s2: Acceleration away from standstill.
         linear_deceleration_m_s2: Deceleration towards standstill. A command of zero passes at once.
         angular_acceleration_rad_s2: Acceleration away from standstill.
@@ -94,24 +95,24 @@ class SafetyLimits:
         motor_failures: Number of failed exchanges in a row that count as silence, too.
         loop_timeout_s: Longest time between two cycles of the supervisor's loop.
         pause_s: Longest time in which neither the drive base's thread nor the loop turns while the motors hold.
-        operator_timeout_s: Longest time without a sign of the operator; None: none is needed.
-        battery_warn_v: Mean voltage at and below which the safety layer warns; None: only what the drive base itself
-            tells of its battery counts.
-        battery_stop_v: Mean voltage at and below which it stops the robot; None: the same.
-        battery_mean_s: Time that a mean is made of, so that a dip stops nothing.
+        operator_timeout_s: Longest time without a sign of life of an operator; None: none is needed.
+        battery_warn_v: Mean voltage at and below which the safety layer warns; None: only the drive base's own
+            judgement of its battery counts.
+        battery_stop_v: Mean voltage at and below which it stops the robot; None: likewise.
+        battery_mean_s: Time over which the mean is taken, so that a short dip does not stop the robot.
         astray_m_s: Difference from its goal above which a wheel is astray, if it is also more than half of the goal.
         astray_s: Longest time that a wheel may be astray.
-        unbidden_s: Longest time that a wheel may rotate faster than `astray_m_s`, after all have stood still and with
-            nothing commanded since.
+        unbidden_s: Longest time that a wheel may rotate faster than `astray_m_s`, after all wheels have stood still and
+            without a command since.
         torque_on_s: Longest time that the motors take to hold.
         torque_off_s: Longest wait for the wheels to stand still before torque goes off.
         standstill_m_s: Fastest speed of a wheel that counts as standstill.
-        min_valid_share: Smallest share of the scanner's ranges where the robot goes that must be valid in a full
-            scan; with a smaller one, the scanner sees nothing there; at most 1.
+        min_valid_share: Smallest share of valid ranges in the direction of motion in a full scan, at most 1; with a
+            smaller share, the scanner is blind in that direction.
         has_own_controls: True if the drive base has controls of its own that move the wheels while torque is on.
-        is_torque_off_on_operator_stop: True if an operator's stop wants torque off, too.
-        is_stopped_when_blind: True if the robot may not go where the scanner sees nothing: what is unknown counts as an
-            obstacle. Else a person is informed.
+        is_torque_off_on_operator_stop: True if an operator's stop also switches torque off.
+        is_stopped_when_blind: True if the robot may not move in a direction in which the scanner is blind, as if there
+            were an obstacle; False: it may, with a warning.
 
     Raises:
         ValueError: A number is not finite, not within its bounds or inconsistent with another; all of them are

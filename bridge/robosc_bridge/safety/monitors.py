@@ -1,8 +1,7 @@
-"""Monitors that remember what was reported to the safety layer.
+"""Monitors that keep track of the reports to the safety layer.
 
-Times come from outside and are believed in one direction only: a time in the future counts as the moment in which it
-is
-first looked at, and one that is no time is ignored.
+Times come from outside and are not trusted fully: a time in the future counts as the moment at which the monitor first
+sees it, and a time that is not finite is ignored.
 """
 
 import math
@@ -17,10 +16,10 @@ SECTOR_DEG = 30
 
 
 class Freshness:
-    """Age of the last report of something.
+    """Age of the last report of one kind.
 
     Args:
-        timeout_s: Age after which it is stale, in seconds; None: it never is.
+        timeout_s: Age after which the report is stale, in seconds; None: it never is.
     """
 
     def __init__(self, timeout_s: float | None) -> None:
@@ -47,12 +46,12 @@ class Freshness:
 
 
 class ScanCoverageMonitor:
-    """Finds out whether the scanner measures anything where the robot goes.
+    """Monitor that finds out whether the scanner measures anything in the direction of motion.
 
     Ahead and behind are the sectors of 30 degrees to both sides of the front and of the back.
 
     Args:
-        min_share: Of the ranges in a sector, below which nothing is seen there.
+        min_share: Share of valid ranges in a sector, below which the scanner is blind there.
     """
 
     def __init__(self, min_share: float) -> None:
@@ -78,9 +77,9 @@ class ScanCoverageMonitor:
 
 
 class BatteryMonitor:
-    """Battery as mean voltages and the drive base's own word tell it.
+    """Monitor of the battery, by mean voltages and by the drive base's own judgement.
 
-    The times of the means follow each other, so that two of them at the latest tell of an empty battery.
+    The means are of successive times, so that an empty battery is found after two of them at the latest.
 
     Args:
         limits: The voltages, and the time of a mean.
@@ -121,14 +120,14 @@ class BatteryMonitor:
 
 
 class WheelMonitor:
-    """Monitor that finds wheels that are held, rotate by themselves, or do not stop.
+    """Monitor that finds wheels that are held, rotate without a command, or do not stop.
 
     Args:
         limits: Limits of how far off a wheel may be, and for how long.
 
     Attributes:
-        is_astray: True if some wheel has been off its goal for too long.
-        is_unbidden: True if some wheel has rotated for too long after all stood still, though nothing was commanded.
+        is_astray: True if a wheel has been off its goal for too long.
+        is_unbidden: True if a wheel has rotated for too long after all stood still, although no motion was commanded.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:

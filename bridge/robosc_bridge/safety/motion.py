@@ -1,4 +1,4 @@
-"""Velocities within the limits of the safety layer: pure functions, on those of the drive bases."""
+"""Limitation of velocities by the safety layer: pure functions, built on those of the drive bases."""
 
 from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.devices.kinematics import wheel_speeds, within_limits

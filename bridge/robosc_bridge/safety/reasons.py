@@ -1,4 +1,4 @@
-"""Reasons why the robot may not move, and cautions that a person should know though it may."""
+"""Reasons why the robot may not move, and cautions for a person while it may."""
 
 from enum import StrEnum
 
@@ -6,7 +6,7 @@ from enum import StrEnum
 class Reason(StrEnum):
     """Reason why the wheels are commanded to stand still, as a sentence for a person.
 
-    Most end by themselves when their cause ends; those in `LATCHING` hold until an operator resets them.
+    Most reasons end together with their cause; those in `LATCHING` hold until an operator resets them.
     """
 
     STANDBY = "The robot is in standby."

@@ -1,7 +1,7 @@
-"""The model's other side on the channel `grpc`: messages, services and actions of connected programs.
+"""The other side of the model's communications on the channel `grpc`: messages, services and actions of programs.
 
-Numbers of calls and goals are never used again while the bridge runs, so that what a program answers late, or to an
-earlier run, is told from what is awaited now.
+Numbers of calls and goals are never reused while the bridge runs, so that a late answer, or an answer to an earlier
+run, cannot be taken for the awaited one.
 """
 
 import logging

@@ -26,14 +26,14 @@ from robosc_bridge.daemon.robot.adapter import RobotAdapter
 
 
 class ProgramDispatcher:
-    """Takes up what programs send, in the loop's thread.
+    """Dispatcher of the items that programs send, in the loop's thread.
 
     Args:
-        clients: Programs that are there.
-        program_channel: The model's other side.
+        clients: Connected programs.
+        program_channel: The other side of the model's communications.
         requesters: The caller's side of a layer.
         execution: The supervisor at work.
-        robot: Tells the executor what has become of its requests.
+        robot: Adapter that reports the outcome of requests to the executor.
     """
 
     def __init__(

@@ -1,8 +1,8 @@
 """Queue of items from programs to the loop, bounded for each program, so that none can hold up the others.
 
-The loop takes some in each of its cycles, from each program in turn. A program that sends faster than they are taken
-loses what is beyond the limits, and all that follows until it is told so, in its place in the order. Whatever it
-asked for ends then: what was lost may have been the message that ends it.
+The loop takes some items in each of its cycles, from each program in turn. A program that sends faster than the loop
+takes them loses the items beyond the limits, and all that follow until it is notified, in its turn. All its requests
+end then: a lost item may have been the message that ends one.
 """
 
 import threading
@@ -23,7 +23,7 @@ MAXIMUM_WAITING_BYTES = 2_000_000
 
 @dataclass(frozen=True)
 class Unreadable:
-    """Item of a program that is not plain data of a reasonable size, or that asks for what makes no sense.
+    """Item of a program that is not plain data of a reasonable size, or that is an invalid request.
 
     Attributes:
         program: Program that sent it.
@@ -36,7 +36,7 @@ class Unreadable:
 
 @dataclass
 class Overflowed:
-    """Record that a program has sent more than is taken.
+    """Record that a program has sent more than the inbox takes.
 
     Attributes:
         program: Program that sent it.
@@ -72,9 +72,9 @@ class ProgramInbox:
     """Inbox that is filled by the endpoints' threads and emptied by the loop's.
 
     Args:
-        wake: Function that is called when something waits where nothing did.
-        look: Function that returns what the loop gets of what was sent; raises `InvalidRequestError` if it makes no
-            sense. Called from any thread.
+        wake: Function that is called when the first item begins to wait.
+        look: Function that converts an item that was sent to the one that the loop gets; raises `InvalidRequestError`
+            if the item is invalid. Called from any thread.
     """
 
     def __init__(self, wake: Callable[[], None], look: Callable[[FromProgram], FromProgram]) -> None:

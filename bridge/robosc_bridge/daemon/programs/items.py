@@ -1,9 +1,10 @@
 """Items that programs and operators beyond a remote endpoint send to the loop, and items that the loop sends to them.
 
-A program is whatever is connected: it may answer services and actions of the model that are mapped to `grpc`, take and
-give messages there, and, where the supervisor is a supervision layer, be the existing controller or operator whose
-requests the layer lets through or holds back. Data is plain: None, booleans, numbers, texts, lists, and dicts with
-texts as keys. Whatever a program sends is untrusted: what makes no sense is answered with `Refused` and does nothing.
+A program is any connected client. It may answer services and actions of the model that are mapped to `grpc`, and
+receive and send messages there. If the supervisor is a supervision layer, it may also be the existing controller or
+operator whose requests the layer lets through or holds back. Data is plain: None, booleans, numbers, texts, lists, and
+dicts with texts as keys. All items of a program are untrusted: an invalid one is answered with `Refused` and has no
+effect.
 """
 
 import logging
@@ -31,7 +32,7 @@ class _Weighed:
 
 @dataclass(frozen=True)
 class MessageSent(_Weighed):
-    """The model sent a message on an identifier that is mapped to `grpc`; every program is told."""
+    """The model sent a message on an identifier that is mapped to `grpc`; every program gets it."""
 
     name: str
     identifier: str
@@ -69,7 +70,7 @@ class CancelMade:
 
 @dataclass(frozen=True)
 class PassedOn(_Weighed):
-    """The robot sent a message, after the supervisor has seen it; every program is told."""
+    """The robot sent a message, which the supervisor has seen; every program gets it."""
 
     identifier: str
     data: Any
@@ -84,7 +85,7 @@ class Blocked:
 
 @dataclass(frozen=True)
 class Answered(_Weighed):
-    """A call of this program is answered; `data` is None for the default answer of one held back or failed."""
+    """A call of this program is answered; `data` is None: the default answer, as the call was held back or failed."""
 
     call_id: str
     data: Any
@@ -124,7 +125,7 @@ class GoalOver(_Weighed):
 
 @dataclass(frozen=True)
 class Refused:
-    """Refusal of what this program sent, which makes no sense, in one sentence; it changed nothing."""
+    """Refusal of an invalid item of this program, in one sentence; the item changed nothing."""
 
     why: str
 
@@ -151,7 +152,7 @@ class Program:
 
     Attributes:
         name: Name of the program, for the log.
-        tell: Function that the loop's thread calls with each thing the program is told; neither waits nor raises.
+        tell: Function that the loop's thread calls with each item for the program; neither waits nor raises.
         serves: Names of the model's services and actions, mapped to `grpc`, that it answers.
         may_request: True if it may be the caller of a supervision layer.
     """
@@ -167,14 +168,14 @@ class Program:
 
 @dataclass(frozen=True)
 class Attached:
-    """A program is there: the first thing it tells. What another one serves already, it does not serve."""
+    """A program has connected; its first item. It does not serve what another program already serves."""
 
     program: Program
 
 
 @dataclass(frozen=True)
 class Detached:
-    """A program is gone: what the model asked it for has failed, and the goals it asked a layer for are cancelled."""
+    """A program has disconnected: the model's calls and goals at it fail, its own goals at a layer are cancelled."""
 
     program: Program
 

@@ -1,7 +1,7 @@
-"""Requests that programs may make of a supervision layer, and the check that they make sense.
+"""Requests that programs may send to a supervision layer, and the check that they are valid.
 
-All of it follows from the model and the configuration alone, so it is checked in the thread of the caller: large data
-takes time that the loop does not have.
+The check depends only on the model and the configuration, so it runs in the thread of the caller: large data takes time
+that the loop does not have.
 """
 
 import math
@@ -32,16 +32,16 @@ ProgramRequest = MessageRequested | CallRequested | GoalRequested | CancelReques
 
 
 class InvalidRequestError(ValueError):
-    """Request of a program that makes no sense; the message is one sentence."""
+    """Request of a program that is invalid; the message is one sentence."""
 
 
 class RequestChecker:
-    """Requests that programs may make; used by all threads.
+    """Checker of the requests of programs; used by all threads.
 
     Args:
         model: Model of the supervisor.
         mapping: Channel that each communication is mapped to.
-        is_layer: True if programs may ask for anything.
+        is_layer: True if the supervisor is a layer, so that programs may send requests.
 
     Attributes:
         messages: Messages that programs may send to the robot, by identifier.

@@ -1,9 +1,9 @@
 """The caller's side of a supervision layer: programs whose requests the layer passes on or blocks.
 
-Ids of calls and goals are each program's own. What a program asked for ends with its connection: goals are cancelled,
-and what its messages and calls keep moving stands still at once, without waiting for `command_timeout_s`. The layer
-knows one caller only, and takes whatever comes on an identifier for a sign of its life. Here there are several: each
-program's own signs count for what it keeps moving, and no others.
+Each program has its own ids of calls and goals. The requests of a program end with its connection: goals are cancelled,
+and the motion of its messages and calls stops at once, without waiting for `command_timeout_s`. The layer knows only
+one caller, and takes every message on an identifier for a sign of its life. Here there are several callers: the motion
+that a program has requested goes on only as long as that program itself sends signs of life.
 """
 
 import logging

@@ -1,7 +1,7 @@
 """The executor's interface to the robot: requests go to channels, readings of devices come from them.
 
-What follows from a request at once, such as that a rotation has failed, is told to the executor later, in
-`deliver_pending`: it must not be called while it is at work.
+Immediate consequences of a request, such as a rotation that fails, reach the executor later, in `deliver_pending`,
+because the executor must not be called while it is at work.
 """
 
 import logging
@@ -43,8 +43,9 @@ class RobotAdapter:
         motion: Motion of the wheels.
         switch: The operator's stop.
         program_channel: Exchange with programs on the other side of a remote endpoint.
-        on_failed_rotation: Called with the reason when a rotation has failed of which the model hears nothing.
-        service_timeout_s: Time after which the executor takes a call for failed, in seconds; None: never.
+        on_failed_rotation: Function that is called with the reason of a failed rotation, if the model gets no message
+            of it.
+        service_timeout_s: Time after which a call fails for the executor, in seconds; None: never.
         clock: Clock that returns the time, in seconds.
     """
 

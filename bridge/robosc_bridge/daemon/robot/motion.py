@@ -1,8 +1,7 @@
 """Wanted motion of the wheels: keep a velocity, rotate by an angle, or stand still.
 
-A velocity that the supervisor asked for holds until it asks for something else, as on any drive base; its releases
-decide whether it still may (semantics 3.6). It is passed to the safety layer anew at every cycle of the loop, so that
-it ends with the loop.
+A velocity that the supervisor commanded holds until its next command, as on any drive base, unless the supervisor
+releases it (semantics 3.6). The loop passes it to the safety layer anew in every cycle, so that it ends with the loop.
 """
 
 from collections.abc import Callable
@@ -16,7 +15,7 @@ class MotionTarget:
 
     Args:
         rotate: The skill that rotates.
-        command: Takes a velocity for the safety layer, and the time.
+        command: Function of the safety layer that takes a velocity and the time.
     """
 
     def __init__(self, rotate: Rotate, command: Callable[[Velocity, float], None]) -> None:

@@ -1,4 +1,4 @@
-"""Rotations by an angle that the model asked for, one at a time, and the report of their end."""
+"""Rotations by an angle on request of the model, one at a time, and the report of their end."""
 
 import logging
 import math
@@ -33,9 +33,9 @@ class Rotations:
     Args:
         motion: Motion of the wheels.
         listeners: Identifiers that receive the end of a cycle that a message asked for.
-        owe: Function that takes what the executor is to be told, once it is not at work.
-        on_failed: Called with the reason when a rotation has failed of which the model hears nothing.
-        service_timeout_s: Time after which the executor takes a call for failed, in seconds; None: never.
+        owe: Function that takes reports to the executor, for the time when it is not at work.
+        on_failed: Function that is called with the reason of a failed rotation, if the model gets no message of it.
+        service_timeout_s: Time after which a call fails for the executor, in seconds; None: never.
         clock: Clock that returns the time, in seconds.
     """
 

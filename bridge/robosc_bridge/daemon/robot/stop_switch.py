@@ -1,4 +1,4 @@
-"""The operator's stop and resume, from buttons, keys and elsewhere: to the safety layer first, then to the model."""
+"""The operator's stop and resume, from buttons, keys and calls: to the safety layer first, then to the model."""
 
 from collections.abc import Callable, Collection
 
@@ -11,13 +11,14 @@ STOP_HELD = "a button that stops the robot is pressed"
 
 
 class StopSwitch:
-    """Stop switch of the operator, wherever the operator's command comes from.
+    """Stop switch of the operator, for commands from any source.
 
     Args:
         skill: Skill that interprets buttons, keys and calls.
         listeners: Identifiers that each kind of channel reports to.
-        on_stop: Called when the operator stops the robot, before the model hears of it.
-        on_resume: Called when the operator lets it go on; returns the reason why it cannot, or nothing.
+        on_stop: Function that is called when the operator stops the robot, before the model gets the message.
+        on_resume: Function that is called when the operator lets the robot go on; returns the reason why it cannot, or
+            an empty text.
     """
 
     def __init__(

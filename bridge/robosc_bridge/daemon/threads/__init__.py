@@ -1,1 +1,1 @@
-"""Threads of the devices, the steps that they take, and what they report to the loop."""
+"""Threads of the devices, their steps, and their reports to the loop."""

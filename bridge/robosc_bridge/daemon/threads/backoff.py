@@ -1,12 +1,12 @@
-"""Waiting time before something that failed is tried again: twice as long each time, up to a limit."""
+"""Waiting time before a failed attempt is repeated: twice as long each time, up to a limit."""
 
 
 class Backoff:
     """Waits that grow.
 
     Args:
-        first_s: After the first failure.
-        limit_s: The longest.
+        first_s: Waiting time after the first failure, in seconds.
+        limit_s: Longest waiting time, in seconds.
     """
 
     def __init__(self, first_s: float = 0.25, limit_s: float = 4.0) -> None:

@@ -1,4 +1,4 @@
-"""The camera kept open and looked at, step by step: each picture is a sighting of the line, and so is their absence."""
+"""Worker for the camera: each picture becomes a sighting, with the line or without."""
 
 import logging
 import math
@@ -26,8 +26,8 @@ _log = logging.getLogger(__name__)
 class CameraWorker:
     """Worker that keeps a camera open and reports where the line is.
 
-    The line is reported as lost again and again, once in `timeout_s`, for as long as no picture comes: also while
-    there is no camera.
+    The line is reported as lost again and again, once in `timeout_s`, as long as no picture comes, even if there is no
+    camera.
 
     Args:
         camera: The camera.

@@ -12,7 +12,7 @@ _SOUND_SHARE = 0.5
 
 @dataclass(frozen=True)
 class FrameErrorReport:
-    """News that the line of a scanner has become noisy, or is sound again.
+    """Report that the line of a scanner has become noisy, or is sound again.
 
     Attributes:
         is_noisy: True if it has become noisy; False if it is sound again.
@@ -24,11 +24,11 @@ class FrameErrorReport:
 
 
 class FrameErrorMonitor:
-    """Says when too many frames are damaged, and when no longer: at half of that share, so that it does not flutter.
+    """Monitor of the share of damaged frames, with hysteresis: the line is sound again below half of the limit.
 
     Args:
-        counters: Of the scanner; they only grow.
-        limit_share: Of all frames of a window, above which too many are damaged.
+        counters: Counters of the scanner, which only grow.
+        limit_share: Share of damaged frames in a window above which the line is noisy.
     """
 
     def __init__(self, counters: ScannerCounters, limit_share: float) -> None:

@@ -35,8 +35,8 @@ class DeviceDown:
     Attributes:
         device: Device that the report is about.
         problem: Description of what is wrong, one line for a person.
-        retry_s: Time until it is tried again, in seconds; 0: it is still being listened to.
-        is_first: True if it was up before, or was never tried: what follows only repeats it.
+        retry_s: Time until the next attempt, in seconds; 0: the device is still open and may recover.
+        is_first: True if the device was up before, or was never tried; the reports that follow repeat this one.
     """
 
     device: Device
@@ -47,10 +47,10 @@ class DeviceDown:
 
 @dataclass(frozen=True)
 class ResetDone:
-    """Report that the drive base was reset, as a person wanted.
+    """Report that the drive base was reset on an operator's command.
 
     Attributes:
-        problem: Description of what is still wrong, one line; empty: nothing.
+        problem: Description of a problem that remains, one line; empty: none.
     """
 
     problem: str = ""
@@ -61,8 +61,8 @@ class SafetyNotice:
     """Report that the reasons why the safety layer lets nothing through, or something else about it, have changed.
 
     Attributes:
-        reasons: Reasons why nothing may move; empty: it may.
-        warnings: Warnings that a person should know.
+        reasons: Reasons why the robot may not move; empty: it may.
+        warnings: Warnings for a person.
     """
 
     reasons: tuple[Reason, ...]

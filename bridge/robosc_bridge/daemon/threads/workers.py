@@ -1,8 +1,8 @@
-"""Workers that keep a device open and at work, step by step; they know no thread.
+"""Workers that keep a device open and at work, step by step, independent of threads.
 
-A step does what is due and says when the next one is. A device that fails is closed and tried again later, each time
-with a longer pause; it is opened by the same steps as at the start, and never moves by itself afterwards: what passes
-the safety layer decides that alone.
+A step does the work that is due and returns the time of the next one. A device that fails is closed and opened again
+later, with growing pauses, by the same steps as at the start. It never moves on its own afterwards: only the output of
+the safety layer moves it.
 """
 
 import logging
@@ -107,7 +107,7 @@ class Worker(Protocol):
 class DriveWorker:
     """Worker that keeps a drive base in its cycle.
 
-    It sends out what the safety layer lets through, and reports what comes back.
+    It sends the velocities that the safety layer lets through, and reports the readings.
 
     Args:
         base: The drive base.
@@ -116,7 +116,7 @@ class DriveWorker:
         period_s: Time between exchanges, in seconds.
         clock: Clock that returns the time, in seconds.
         backoff: Pauses between attempts to open it.
-        timing: Measurement of the bridge's times; None: one of its own.
+        timing: Measurement of the bridge's times; None: a new one.
 
     Attributes:
         stepped_s: Time at which its last step began or ended.
@@ -275,15 +275,15 @@ class DriveWorker:
 
 
 class ScannerWorker:
-    """Worker that keeps a range scanner turning: each full revolution is reported.
+    """Worker that keeps a range scanner rotating, and reports each full revolution.
 
     Args:
         scanner: The scanner.
         gate: The safety layer.
         report: Function that takes the reports; must not wait.
         silent_after_s: Time without a full revolution after which it counts as lost, in seconds.
-        restart_after_s: Time without any revolution after which its motor is restarted, in seconds, `RESTART_LIMIT`
-            times; then it is lost.
+        restart_after_s: Time without any revolution after which its motor is restarted, in seconds; after
+            `RESTART_LIMIT` restarts the scanner is lost.
         clock: Clock that returns the time, in seconds.
         backoff: Pauses between attempts to open it.
         bad_frames_share: Share of damaged frames in a second above which its line is reported to be noisy.

@@ -15,7 +15,7 @@ def test_the_page_is_listed() -> None:
 
 
 def test_names() -> None:
-    assert f"begin with `{NODE}: `" in PAGE
+    assert f"`{NODE}: `" in PAGE
     assert ", ".join(f"`{name}`" for name in WHEEL_JOINTS) in PAGE
 
 
@@ -33,7 +33,9 @@ def test_times() -> None:
 def test_covariances() -> None:
     for text in (
         f"| distance | {uncertainty.WAY_M2_PER_M:.0e} m²".replace("e-0", "e-"),
-        f"| heading | {uncertainty.HEADING_RAD2_PER_M:.0e} rad² for each metre and".replace("e-0", "e-"),
+        f"| heading | {uncertainty.HEADING_RAD2_PER_M:.0e} rad² for each metre and for each radian".replace(
+            "e-0", "e-"
+        ),
         f"{uncertainty.LINEAR_M2_S2:.0e} m²/s² along x and y, {uncertainty.ANGULAR_RAD2_S2:.0e} rad²/s²".replace(
             "e-0", "e-"
         ),

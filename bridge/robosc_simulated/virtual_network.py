@@ -39,7 +39,7 @@ class VirtualNetwork:
         scheme, port = address.partition(":")[0], int(address.rpartition(":")[2])
         if scheme == "tcp":
             if port not in self.servers:
-                raise LineMissingError(address, "nobody serves there")
+                raise LineMissingError(address, "no program listens there")
             return self.servers[port].connect(address)
         return _Datagrams(self, address, port)
 

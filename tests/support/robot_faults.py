@@ -77,8 +77,8 @@ def steer(bridge: Driven) -> None:
 
 # What a person must see to.
 GRAVE = (
-    Fault("a motor is overloaded", lambda bridge: bridge.robot.left.overload(), "A motor tells of a fault."),
-    Fault("a motor is too hot", lambda bridge: bridge.robot.right.overheat(), "A motor tells of a fault."),
+    Fault("a motor is overloaded", lambda bridge: bridge.robot.left.overload(), "A motor reports a fault."),
+    Fault("a motor is too hot", lambda bridge: bridge.robot.right.overheat(), "A motor reports a fault."),
     Fault(
         "a motor has lost its power",
         lambda bridge: bridge.robot.right.brown_out(0.0),
@@ -93,8 +93,8 @@ GRAVE = (
         ("opencr",),
         is_line=True,
     ),
-    Fault("OpenCR's remote control steers", steer, "The wheels rotate though nobody commanded it", ("opencr",)),
-    Fault("a wheel is held", lambda bridge: bridge.robot.left.block_wheel(), "A motor tells of a fault."),
+    Fault("OpenCR's remote control steers", steer, "The wheels rotate without a command", ("opencr",)),
+    Fault("a wheel is held", lambda bridge: bridge.robot.left.block_wheel(), "A motor reports a fault."),
     Fault("the battery is empty", empty, "The battery is empty.", (*BASES, "mavlink-rover")),
     Fault("the base is unplugged", lambda bridge: bridge.robot.base_line.disconnect(), "the drive base is lost: /",
           is_line=True),

@@ -50,7 +50,7 @@ def add_recording(parser: argparse.ArgumentParser) -> None:
 def add_commands(commands: Any) -> None:
     """Add the commands to subparsers of argparse."""
     replayed = commands.add_parser(
-        "replay", help="tell what the drivers make of a recording (run --record)", epilog=_EPILOG
+        "replay", help="show how the drivers interpret a recording (run --record)", epilog=_EPILOG
     )
     replayed.add_argument("file", metavar="FILE", type=Path, help=f"the recording ({SUFFIX})")
     replayed.add_argument("--line", metavar="NAME", help="this line alone, such as base or scanner")
@@ -59,7 +59,7 @@ def add_commands(commands: Any) -> None:
     replayed.set_defaults(run=_replay)
 
     redact = commands.add_parser(
-        "redact", help="copy a recording without what identifies its owner, to give it to others", epilog=_EPILOG
+        "redact", help="copy a recording without data that identifies its owner, for sharing", epilog=_EPILOG
     )
     redact.add_argument("file", metavar="FILE", type=Path, help=f"the recording ({SUFFIX})")
     redact.add_argument("-o", "--output", metavar="FILE", type=_capture_name, required=True, help="file to write")

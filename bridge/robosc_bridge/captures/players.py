@@ -363,7 +363,7 @@ class _Vehicle(_Player):
                 if sector is not None:
                     yield self.item("scan", **_ranges(nearest_in_sectors((sector,))))
         if state.restarts != before.restarts:
-            yield self.problem("the vehicle has started anew")
+            yield self.problem("the vehicle has restarted")
 
 
 def _number(value: object, default: int) -> int:

@@ -65,7 +65,7 @@ def redacted(capture: Capture, without: Collection[str] = ()) -> Capture:
         raise CaptureError(f"the capture has no line '{unknown[0]}'; it has {', '.join(capture.lines)}")
     lines = {name: _info(info) for name, info in capture.lines.items() if name not in without}
     if not lines:
-        raise CaptureError("no line is left of the capture")
+        raise CaptureError("no line of the capture would be left")
     found: list[Record] = []
     for name, info in lines.items():
         records = [record for record in capture.records if record.line == name]
@@ -77,7 +77,7 @@ def redacted(capture: Capture, without: Collection[str] = ()) -> Capture:
 def _info(info: LineInfo) -> LineInfo:
     if info.driver not in (*_LIDARS, *_SERVOS, "mavlink-rover"):
         raise CaptureError(
-            f"line '{info.name}': nobody knows what the driver '{info.driver}' tells about its owner; leave it out "
+            f"line '{info.name}': it is unknown what its driver '{info.driver}' reveals about the owner; leave it out "
             f"with --without {info.name}"
         )
     options = {name: value for name, value in info.options.items() if name in _KEPT_OPTIONS}

@@ -172,7 +172,9 @@ def check_settings(configuration: Configuration, mapping: ChannelMapping, deploy
     """
     _require_endpoints(configuration, mapping)
     if deployment is Deployment.LAYER and not is_remote(configuration):
-        raise AssemblyError("a supervision layer needs 'remote.grpc_address' or 'remote.mavlink_url' for who asks it")
+        raise AssemblyError(
+            "a supervision layer needs 'remote.grpc_address' or 'remote.mavlink_url' for those who send requests to it"
+        )
     limits = safety_limits(configuration)
     fastest = Velocity(limits.linear_m_s, limits.angular_rad_s)
     drive_base(configuration)

@@ -63,7 +63,7 @@ class LivenessMonitor:
         for name in ended:
             if name not in self._told:
                 self._told.add(name)
-                _log.critical("the %s has ended by itself: the robot stops, and the bridge must be started anew", name)
+                _log.critical("the %s has ended unexpectedly: the robot stops, and the bridge must be restarted", name)
         return not ended and all(thread.is_alive for thread in self._threads)
 
 

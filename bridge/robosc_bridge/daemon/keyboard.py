@@ -71,7 +71,7 @@ class Keyboard:
             except OSError:
                 data = b""
             if not data:
-                _log.warning("the terminal is gone: no key is heard any more")
+                _log.warning("the terminal is gone: keys have no effect any more")
                 return
             for key in data.decode("utf-8", "replace"):
                 self._told(_NAMES.get(key, key))

@@ -209,7 +209,7 @@ class Lifecycle:
         return (
             ""
             if self._are_alive()
-            else "a thread of a device or a remote endpoint has ended; the bridge must be started anew"
+            else "a thread of a device or a remote endpoint has ended; the bridge must be restarted"
         )
 
     def _order_standby(self, order: Order) -> None:

@@ -56,7 +56,7 @@ class ServedEndpoint(ABC):
         """
         self._thread.start()
         if not self._is_ready.wait(_START_LIMIT_S):
-            raise self._error(f"{self._label}: it has not begun within {_START_LIMIT_S:g} seconds")
+            raise self._error(f"{self._label}: it has not started within {_START_LIMIT_S:g} seconds")
         if self._failure is not None:
             self._thread.join(_STOP_LIMIT_S)
             if isinstance(self._failure, self._error):

@@ -70,7 +70,7 @@ class ServiceManager:
             self._due_s = now_s + self.watchdog_s / _BEATS
             self._send("WATCHDOG=1")
         elif self._is_well:
-            _log.error("the drive base's thread hangs: the service manager is told no longer that the bridge lives")
+            _log.error("the drive base's thread hangs: the service manager gets no more keep-alive messages")
         self._is_well = is_well
 
     def _send(self, text: str) -> None:

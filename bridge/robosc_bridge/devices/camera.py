@@ -150,7 +150,7 @@ class SocketCamera(_StreamCamera):
             self._socket.connect(self._path)
         except (FileNotFoundError, ConnectionRefusedError) as error:
             self.close()
-            raise LineMissingError(self._path, "nobody serves pictures there; is the simulator running?") from error
+            raise LineMissingError(self._path, "no program serves pictures there; is the simulator running?") from error
         except PermissionError as error:
             self.close()
             raise LineDeniedError(self._path, "no permission") from error

@@ -275,7 +275,7 @@ class DynamixelBase:
             return
         tried = " or ".join(map(str, self._bauds))
         hint = "" if FACTORY_BAUD in self._bauds else f" A motor fresh from the factory speaks {FACTORY_BAUD} baud."
-        raise DeviceSilentError(f"{self._names[left]} does not answer at {tried} baud; has it power?{hint}")
+        raise DeviceSilentError(f"{self._names[left]} does not answer at {tried} baud; does it have power?{hint}")
 
     def _exchange(self, pair: ServoPair, bus: DynamixelBus, velocity: Velocity) -> DriveReading:
         if self._is_doubtful or self._has_paused():

@@ -54,7 +54,7 @@ class MotorFault(StrEnum):
     OVERLOAD = "overload"
     TORQUE_LOST = "torque off by itself"
     WATCHDOG = "bus watchdog"
-    BLOCKED = "does not rotate as told"
+    BLOCKED = "does not rotate as commanded"
     UNCOMMANDED = "rotates without a command"
 
 

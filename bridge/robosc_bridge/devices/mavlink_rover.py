@@ -88,7 +88,7 @@ _LEVELS: Mapping[int, BatteryLevel] = {
     ChargeState.FAILED: BatteryLevel.EMPTY,
 }
 _LONG_TARGETS = (
-    "the rover is armed; where the bridge or its line fails, it drives on for up to 3 s, until its target expires "
+    "the rover is armed; if the bridge or its line fails, it drives on for up to 3 s, until its target expires "
     "(docs/bridge-safety.md says what shortens that)"
 )
 
@@ -235,7 +235,7 @@ class MavlinkRover:
         heartbeat = self._heartbeat(state)
         if state.restarts != self._restarts:
             self._is_torque_wanted = False
-            raise DeviceError(f"{self._path}: the rover has started anew; it must be opened again")
+            raise DeviceError(f"{self._path}: the rover has restarted; it must be opened again")
         is_obeying = heartbeat.is_armed and heartbeat.mode == Mode.GUIDED
         told = self._fresh(state)
         if self._is_torque_wanted:
@@ -381,7 +381,7 @@ class MavlinkRover:
             if self._waits(is_answered, _ANSWER_LIMIT_S):
                 self._check_answer(link.state, number, began_s, action)
                 return
-        raise DeviceSilentError(f"{self._path}: the rover does not answer when told to {action}")
+        raise DeviceSilentError(f"{self._path}: the rover does not answer the command to {action}")
 
     def _check_answer(self, state: VehicleState, number: MavCommand, began_s: float, action: str) -> None:
         result = state.answers[number].content.result

@@ -363,7 +363,7 @@ class OpenCrBase:
         if information not in self._robot.opencr_information:
             raise WrongDeviceError(
                 f"{self._path}: OpenCR's firmware is for another robot than '{self._robot.name}' "
-                f"(it tells {information})"
+                f"(it reports {information})"
             )
 
     def _check_motors(self, bus: DynamixelBus) -> None:
@@ -448,9 +448,9 @@ class OpenCrBase:
             half = UPTIME_MODULUS // 2
             passed_s = ((uptime_ms - before_ms + half) % UPTIME_MODULUS - half) / 1000
             if passed_s < max(0.0, asked_s - before_received_s - _LAG_S):
-                self._give_up("OpenCR has started anew")
+                self._give_up("OpenCR has restarted")
             if passed_s > received_s - before_asked_s + _LEAD_S:
-                self._give_up("the computer stood still or OpenCR has started anew")
+                self._give_up("the computer stood still or OpenCR has restarted")
         self._uptime = uptime_ms, asked_s, received_s
 
     def _give_up(self, problem: str) -> NoReturn:

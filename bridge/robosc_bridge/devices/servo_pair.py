@@ -245,7 +245,7 @@ class ServoPair:
             self._await(motor)
             self._bus.begin(self._limit_s)
             if self.read_hardware(motor):
-                raise DeviceFaultError(f"{self._hardware_text(motor)}, also after its restart")
+                raise DeviceFaultError(f"{self._hardware_text(motor)}, even after its restart")
         return self.motors[0] in faulty, self.motors[1] in faulty
 
     def _require_cool(self, motor: int) -> None:
@@ -272,7 +272,7 @@ class ServoPair:
                 return
 
     def _hardware_text(self, motor: int) -> str:
-        return f"{self._names[motor]} tells {', '.join(sorted(self.hardware[motor]))}"
+        return f"{self._names[motor]} reports {', '.join(sorted(self.hardware[motor]))}"
 
     def _write_both(self, address: int, value: int, problem: str) -> None:
         """Write one byte to both at once, and see that they have it."""

@@ -64,7 +64,7 @@ def follow(base: DriveBase, host: Host, is_over: Callable[[], bool], separation_
         if reading.is_torque_on:
             raise CalibrationError("the motors hold: torque must be off")
         if reading.wheels_m is None:
-            raise CalibrationError("the drive base does not report the ways of its wheels")
+            raise CalibrationError("the drive base does not report the distances of its wheels")
         begin = begin or reading.wheels_m
         if is_over():
             left_m, right_m = (now_m - before_m for now_m, before_m in zip(reading.wheels_m, begin, strict=True))
@@ -84,10 +84,10 @@ def wheel_radius_m(way: Way, measured_m: float, radius_m: float) -> float:
         CalibrationError: The way was too short or not straight, or the two are too far apart.
     """
     if measured_m < LEAST_WAY_M or abs(way.forward_m) < LEAST_WAY_M:
-        raise CalibrationError(f"the way is too short: push it {LEAST_WAY_M:g} m or more, better 2 m")
+        raise CalibrationError(f"the distance is too short: push the robot {LEAST_WAY_M:g} m or more, better 2 m")
     if abs(way.rotation_rad) > _STRAIGHT_RAD:
         degrees = math.degrees(way.rotation_rad)
-        raise CalibrationError(f"the robot has turned by {degrees:.0f} degrees on the way: push it straight")
+        raise CalibrationError(f"the robot has turned by {degrees:.0f} degrees on the way: push it straight ahead")
     return _plausible(radius_m * measured_m / abs(way.forward_m), radius_m, "wheel radius")
 
 
@@ -104,9 +104,9 @@ def wheel_separation_m(way: Way, revolutions: int, separation_m: float, radius_f
         CalibrationError: It was not turned by so much, or not on the spot.
     """
     if abs(way.rotation_rad) < LEAST_ROTATION_RAD:
-        raise CalibrationError("it was not turned by a revolution: turn it on the spot, back to the mark")
+        raise CalibrationError("the robot was not turned by a whole revolution: turn it on the spot, back to the mark")
     if abs(way.forward_m) > abs(way.rotation_rad) * separation_m / 2:
-        raise CalibrationError("it was moved away from its place: turn it on the spot")
+        raise CalibrationError("the robot was moved away from its place: turn it on the spot")
     found_m = separation_m * radius_factor * abs(way.rotation_rad) / (2 * math.pi * revolutions)
     return _plausible(found_m, separation_m, "wheel separation")
 
@@ -115,7 +115,7 @@ def _plausible(found_m: float, usual_m: float, name: str) -> float:
     if abs(found_m / usual_m - 1) > MOST_CHANGE:
         raise CalibrationError(
             f"the {name} would be {found_m:.4f} m, and is {usual_m:.4f} m by its configuration: measure again, and "
-            "see whether both wheels were turned"
+            "check whether both wheels were turned"
         )
     return found_m
 
@@ -136,12 +136,14 @@ def wall_angle_rad(ranges_m: Sequence[float]) -> float:
     ahead = [(math.radians(angle), ranges_m[angle % BINS]) for angle in angles_deg]
     seen = [(angle, range_m) for angle, range_m in ahead if math.isfinite(range_m)]
     if len(seen) < _LEAST_POINTS:
-        raise CalibrationError("no wall is seen ahead: put the robot before a plain wall, half a metre to a metre away")
+        raise CalibrationError(
+            "no wall is seen ahead: put the robot in front of a plain wall, half a metre to a metre away"
+        )
     points = np.array([(range_m * math.cos(angle), range_m * math.sin(angle)) for angle, range_m in seen])
     middle = points.mean(axis=0)
     _, sizes, axes = np.linalg.svd(points - middle, full_matrices=False)
     if sizes[1] / math.sqrt(len(points)) > _ROUGH_M:
-        raise CalibrationError("what is ahead is no plain wall: take one without corners, legs or glass")
+        raise CalibrationError("the points ahead are not a plain wall: choose one without corners, legs or glass")
     normal = axes[1] * math.copysign(1.0, float(axes[1] @ middle))
     return math.atan2(float(normal[1]), float(normal[0]))
 

@@ -41,7 +41,7 @@ type Ask = Callable[[str], str]
 def add_commands(commands: Any) -> None:
     """Add the commands to subparsers of argparse."""
     probed = commands.add_parser(
-        "probe", help="tell what is plugged in: boards, servos, LiDARs, and what is wrong with each", epilog=_EPILOG
+        "probe", help="list what is plugged in (boards, servos, LiDARs) and the problems of each", epilog=_EPILOG
     )
     probed.add_argument(
         "--port",
@@ -245,7 +245,7 @@ def _number(ask: Ask, question: str) -> float:
     except ValueError as error:
         raise CalibrationError(f"'{answer}' is no number") from error
     if not 0.0 < found < 1e3:
-        raise CalibrationError(f"'{answer}' cannot be")
+        raise CalibrationError(f"'{answer}' is not possible")
     return found
 
 
@@ -260,7 +260,7 @@ def _wheels(configuration: Configuration) -> tuple[float, float]:
         return ROBOTS[robot].wheel_radius_m, ROBOTS[robot].wheel_separation_m
     radius_m = configuration.drive.options.get("wheel_radius_m")
     if not isinstance(radius_m, int | float):
-        raise CalibrationError("drive.options.wheel_radius_m is missing: write what the wheels measure about")
+        raise CalibrationError("drive.options.wheel_radius_m is missing: give the approximate radius of the wheels")
     return float(radius_m), robot.wheel_separation_m
 
 

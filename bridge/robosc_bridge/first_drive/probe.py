@@ -117,7 +117,7 @@ def _board(bus: DynamixelBus, model: int, firmware: int) -> FoundDevice:
         information = int.from_bytes(bus.read(opencr.DEVICE, opencr.MODEL_INFORMATION, 4).data, "little")
         facts["robots"] = [robot.name for robot in ROBOTS.values() if information in robot.opencr_information]
         if not facts["robots"]:
-            problems.append(f"its firmware is for no robot that is known here (it tells {information})")
+            problems.append(f"its firmware is for no robot that is known here (it reports {information})")
         bus.begin(LIMIT_S)
         block = opencr.decode_block(bus.read(opencr.DEVICE, opencr.BLOCK_ADDRESS, opencr.BLOCK_LENGTH).data)
         pressed = [name for name, is_pressed in block.buttons.items() if is_pressed]

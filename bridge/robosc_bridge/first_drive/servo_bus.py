@@ -161,7 +161,7 @@ def _problems(registers: dict[str, int | float], baud: int) -> Sequence[str]:
     if errors:
         names = [name for bit, name in _ERRORS.items() if errors & bit]
         found.append(
-            f"it has a hardware error ({', '.join(names)}); see to its cause, then `reset`, or switch it off and on"
+            f"it has a hardware error ({', '.join(names)}); remove its cause, then `reset`, or switch it off and on"
         )
     if baud != BAUDS[0]:
         found.append(

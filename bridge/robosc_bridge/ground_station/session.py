@@ -226,7 +226,7 @@ class StationSession:
     def _end_driving(self, was_moving: bool) -> None:
         if was_moving:
             self._texts.say(self._now_s, Severity.WARNING, "No set-point any more: the robot stands.", again_s=0.0)
-            _log.warning("set-points of the ground station have ended while the robot was to move")
+            _log.warning("the set-points of the ground station have ended while the robot was moving")
 
     def _answer_in_words(self, severity: Severity, text: str, asked_by: Sender | None) -> None:
         self._texts.say(self._now_s, severity, text, again_s=0.0, asked_by=asked_by)
@@ -295,7 +295,7 @@ class StationSession:
         if self._station_s is None:
             # It has not been told anything yet.
             self._texts.forget()
-            _log.info("the ground station %d/%d is there", *received.sender)
+            _log.info("the ground station %d/%d has connected", *received.sender)
         self._station_s = self._now_s
         if self._may_change(received):
             self._operations.operator_seen()

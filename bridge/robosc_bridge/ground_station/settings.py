@@ -76,7 +76,7 @@ def ground_settings(configuration: Configuration, fastest: Velocity) -> GroundSe
     address, baud = _parsed(remote.mavlink_url)
     if remote.mavlink_key is not None and remote.mavlink_unsigned_commands:
         raise GroundSettingsError(
-            "remote.mavlink_unsigned_commands: with a key (mavlink_key), only signed commands are obeyed; take one away"
+            "remote.mavlink_unsigned_commands: with a key (mavlink_key), only signed commands are obeyed; remove one"
         )
     scanner = configuration.scanner
     return GroundSettings(

@@ -30,7 +30,7 @@ class ConnectionSlots:
         if taken >= self._most and not self._is_full:
             self._is_full = True
             _log.error(
-                "all %d connections of the remote endpoint are taken: callers are refused, also those who want to stop "
+                "all %d connections of the remote endpoint are taken: callers are refused, even those who want to stop "
                 "the robot; keys and signals stop it all the same",
                 self._most,
             )

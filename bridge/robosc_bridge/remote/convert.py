@@ -285,7 +285,7 @@ def item_of(request: pb.AttachRequest, program: programs.Program) -> programs.Fr
     if kind == "keep_alive":
         return None
     if kind not in _READERS:
-        raise RequestError("'hello' is the first message alone" if kind == "hello" else "a message without a kind")
+        raise RequestError("only the first message may be 'hello'" if kind == "hello" else "a message without a kind")
     try:
         return _READERS[kind](program, getattr(request, kind))
     except DataError as error:

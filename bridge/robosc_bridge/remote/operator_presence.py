@@ -41,7 +41,7 @@ class OperatorPresence:
             self._seconds_over = self._seconds_over + 1 if self._count > MESSAGES_A_S else 0
             self._begin_s, self._count = now_s, 0
         if self._seconds_over >= FLOOD_S:
-            raise FloodError(f"an operator sends at most {MESSAGES_A_S} messages a second, and these are more")
+            raise FloodError(f"an operator may send at most {MESSAGES_A_S} messages a second; this one sends more")
         self._count += 1
         # A second with few of them, and nothing is waiting any more.
         return self._seconds_over == 0 and self._count <= MESSAGES_A_S

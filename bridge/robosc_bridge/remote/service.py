@@ -156,7 +156,9 @@ class BridgeService(convert.BridgeServiceServicer):
         undone_by = UNDONE_BY.get(command)
         if undone_by is not None:
             self._operations.order(undone_by, by)
-            _log.warning("%s was not answered, or has left: %s is followed by %s", by, command, undone_by)
+            _log.warning(
+                "%s was not answered, or its caller has disconnected: %s is followed by %s", by, command, undone_by
+            )
 
     async def Watch(  # noqa: N802
         self, request: convert.WatchRequest, context: Context
@@ -225,7 +227,7 @@ class BridgeService(convert.BridgeServiceServicer):
         except (TimeoutError, StopAsyncIteration):
             request = None
         if request is None or request.WhichOneof("message") != "hello":
-            raise convert.RequestError(f"the first message is 'hello', within {HELLO_LIMIT_S:g} seconds")
+            raise convert.RequestError(f"the first message must be 'hello', within {HELLO_LIMIT_S:g} seconds")
         return request.hello
 
     @asynccontextmanager

@@ -35,7 +35,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 _EPILOG = (
     "It publishes odom, joint_states, imu, battery_state, scan, /tf, /tf_static and /diagnostics, and takes no "
-    "velocities: the supervisor keeps command of the wheels. What stands after --ros-args is ROS's, such as "
+    "velocities: the supervisor keeps command of the wheels. Arguments after --ros-args are passed to ROS, such as "
     "`--ros-args -r odom:=wheels/odometry`. exit status: 0 it was told to end; 1 the bridge refuses, or ROS 2 has "
     "failed; 2 wrong use, no ROS 2, or a bridge of an earlier version"
 )

@@ -95,7 +95,7 @@ class Relay:
             if response.sent_s <= 0.0:
                 raise EarlierBridgeError(
                     f"the bridge at {self._link.address} is of an earlier version ({self._link.version}), which does "
-                    "not tell the times of its readings: update it"
+                    "not send the times of its readings: update it"
                 )
             self._heard_s = self._clocks.monotonic()
             self._offset.add(response.sent_s, self._heard_s)

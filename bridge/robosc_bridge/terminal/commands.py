@@ -28,7 +28,7 @@ _COMMANDS = {
     "start": "execute the supervisor, in standby or after a fault",
     "standby": "bring the robot to rest and let the motors go",
     "resume": "let the robot go on after a stop",
-    "reset": "forget faults whose cause is gone; standby follows",
+    "reset": "clear faults whose cause is gone; standby follows",
 }
 NAMES = ("stop", *_COMMANDS, "status", "watch", "teleop", "token")
 """Names of the commands."""

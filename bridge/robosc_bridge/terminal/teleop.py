@@ -147,7 +147,7 @@ def teleop(client: BridgeClient) -> int:
         UnreachableError: There is no terminal; or the connection is lost, and the bridge stops the wheels by itself.
     """
     if not os.isatty(sys.stdin.fileno()):
-        raise UnreachableError("keys are typed in a terminal, and there is none")
+        raise UnreachableError("keys need a terminal, and there is none")
     topic = client.drive_topic()
     with _raw_keys() as number:
         drive(_ThisTerminal(number), client, topic)

@@ -164,7 +164,7 @@ def _parsed(address: str) -> tuple[str, tuple[str, int]]:
 
 def _not_opened(address: str, error: OSError) -> LineError:
     if isinstance(error, (ConnectionRefusedError, TimeoutError)):
-        return LineMissingError(address, "nobody serves there")
+        return LineMissingError(address, "no program listens there")
     if isinstance(error, socket.gaierror):
         return LineMissingError(address, "there is no such host")
     if isinstance(error, PermissionError):

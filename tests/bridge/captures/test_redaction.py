@@ -99,12 +99,12 @@ def test_servos_are_kept_byte_for_byte() -> None:
 def test_a_driver_that_nobody_knows_is_refused_unless_it_is_left_out() -> None:
     foreign, base = LineInfo("scanner", "laser-x"), LineInfo("base", "opencr", "burger")
     both = Capture({"scanner": foreign, "base": base}, (Record(0, "base", Kind.OUT, b"\xff"),))
-    with pytest.raises(CaptureError, match=r"'laser-x' tells about its owner; leave it out with --without scanner"):
+    with pytest.raises(CaptureError, match=r"'laser-x' reveals about the owner; leave it out with --without scanner"):
         redacted(both)
     assert set(redacted(both, ["scanner"]).lines) == {"base"}
     with pytest.raises(CaptureError, match="the capture has no line 'camera'; it has scanner, base"):
         redacted(both, ["camera"])
-    with pytest.raises(CaptureError, match="no line is left"):
+    with pytest.raises(CaptureError, match="no line of the capture would be left"):
         redacted(both, ["scanner", "base"])
 
 

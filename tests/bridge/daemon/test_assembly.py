@@ -228,5 +228,5 @@ def test_the_robot_stops_when_a_face_ends_by_itself(supervisor: Supervisor, capl
         endpoint = MortalEndpoint(made)
         made.run([endpoint])
     assert "has ended" in made.daemon.problem
-    assert caplog.text.count("the recorded endpoint has ended by itself: the robot stops") == 1
+    assert caplog.text.count("the recorded endpoint has ended unexpectedly: the robot stops") == 1
     assert endpoint.told == ["start", f"stop False {State.OVER}"]

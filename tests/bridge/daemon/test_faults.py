@@ -627,7 +627,9 @@ def test_another_baud_is_told_with_what_to_do() -> None:
             servo.table["baud rate"] = 1
 
     with driven("dynamixel", before=slow) as bridge:
-        bridge.was_told("does not answer at 1000000 baud; has it power? A motor fresh from the factory speaks 57600")
+        bridge.was_told(
+            "does not answer at 1000000 baud; does it have power? A motor fresh from the factory speaks 57600"
+        )
         bridge.stays(WHILE_S)
         assert bridge.state is State.STARTING
 

@@ -333,7 +333,7 @@ def test_a_service_of_a_program_answers_another_programs_call(scene: Scene, prog
 
 def test_a_viewer_may_not_ask(scene: Scene) -> None:
     viewer = Connected(scene, "a viewer", may_request=False)
-    assert refused(viewer.say(MessageRequested, "/cmd_vel", FORWARD)) == ["this program may not ask for anything"]
+    assert refused(viewer.say(MessageRequested, "/cmd_vel", FORWARD)) == ["this program may not send requests"]
     scene.live(0.2, 2.0)
     assert scene.out == STANDSTILL
 

@@ -114,7 +114,7 @@ def test_a_motor_fault_ends_the_run_with_its_name(scene: Scene) -> None:
     scene.up()
     scene.daemon.post(SafetyNotice((Reason.MOTOR_FAULT,), ()))
     scene.live(0.5, 2.0)
-    assert (scene.daemon.state, scene.daemon.problem) == (State.OVER, "A motor tells of a fault.")
+    assert (scene.daemon.state, scene.daemon.problem) == (State.OVER, "A motor reports a fault.")
     assert (scene.out, scene.torque) == (STANDSTILL, False)
 
 

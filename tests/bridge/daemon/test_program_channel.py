@@ -298,7 +298,7 @@ def test_a_controller_lets_nobody_ask() -> None:
     scene = helped()
     program = Connected(scene, "a program")
     assert why(program.say(MessageRequested, "/note", "x")) == [
-        "the supervisor is a controller: it lets nobody ask for anything"
+        "the supervisor is a controller, which takes no requests"
     ]
 
 

@@ -89,7 +89,7 @@ def test_one_that_stays_silent_is_restarted_so_often_and_then_opened_anew(scene:
     passed_s = SILENT_S + scene.until(lambda: len(scene.downs()) == 2, 20.0)
     # A last time of silence follows the last restart.
     assert passed_s == pytest.approx((RESTART_LIMIT + 1) * RESTART_S, abs=0.3)
-    silent = f"no full revolution, also after its motor was started anew {RESTART_LIMIT} times"
+    silent = f"no full revolution, even after {RESTART_LIMIT} restarts of its motor"
     assert scene.downs()[1] == DeviceDown(Device.SCANNER, silent, 0.5, is_first=True)
     # Each restart is one byte, and so is its end: it was closed, which stops its motor.
     assert scene.robot.scanner_line.received == before + RESTART_LIMIT + 1

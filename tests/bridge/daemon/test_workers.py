@@ -417,7 +417,7 @@ def test_a_silent_scanner_is_told_once_and_its_first_turn_again(turning: Scanner
 
 
 def test_a_motor_that_stays_silent_is_restarted_so_often_and_then_opened_anew(turning: ScannerScene) -> None:
-    problem = f"no full revolution, also after its motor was started anew {RESTART_LIMIT} times"
+    problem = f"no full revolution, even after {RESTART_LIMIT} restarts of its motor"
     for is_first, retry_s in ((True, 0.5), (False, 1.0)):
         turning.scanner.calls.clear()
         while "close" not in turning.scanner.calls:

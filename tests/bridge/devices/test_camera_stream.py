@@ -118,7 +118,7 @@ def test_a_socket_that_is_missing_or_nobody_serves_is_told(tmp_path: Path) -> No
         if path.name == "dead":
             with socket.socket(socket.AF_UNIX) as listener:
                 listener.bind(str(path))
-        with pytest.raises(LineMissingError, match=f"{path}: nobody serves pictures there"):
+        with pytest.raises(LineMissingError, match=f"{path}: no program serves pictures there"):
             make_camera(f"{SIMULATED}{path}").open()
     with pytest.raises(LineError, match="cannot be opened"):
         make_camera(SIMULATED + "x" * 200).open()

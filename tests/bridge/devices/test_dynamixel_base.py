@@ -150,7 +150,9 @@ def test_a_motor_that_is_missing_is_named(bench: Rig) -> None:
 def test_motors_fresh_from_the_factory_are_found_if_wanted(bench: Rig, caplog: pytest.LogCaptureFixture) -> None:
     for servo in (bench.robot.left, bench.robot.right):
         servo.table["baud rate"] = 1
-    with pytest.raises(DeviceSilentError, match=r"at 1000000 baud; has it power\? A motor fresh .* speaks 57600 baud"):
+    with pytest.raises(
+        DeviceSilentError, match=r"at 1000000 baud; does it have power\? A motor fresh .* speaks 57600 baud"
+    ):
         bench.base.open()
     bench.base = DynamixelBase(
         bench.robot.base_path, BURGER, bauds=(1_000_000, 57_600), answer_limit_s=0.2, host=bench.host
@@ -222,7 +224,7 @@ def test_an_error_that_a_restart_does_not_end_is_told(bench: Rig) -> None:
     bench.start()
     bench.robot.left.brown_out(5.8)
     bench.robot.left.overload()
-    with pytest.raises(DeviceFaultError, match=r"motor 1 \(left\) tells input voltage, also after its restart"):
+    with pytest.raises(DeviceFaultError, match=r"motor 1 \(left\) reports input voltage, even after its restart"):
         bench.base.reset()
 
 
@@ -363,7 +365,7 @@ def test_a_motor_that_shuts_down_stops_the_other_one_at_once(bench: Rig, provoke
     # Whatever is wanted then, nothing moves.
     assert fault in bench.drive(FORWARD, 0.2).faults
     assert bench.goals_rad_s() == (0.0, 0.0)
-    with pytest.raises(DeviceFaultError, match=rf"motor 1 \(left\) tells {fault}; it must be reset"):
+    with pytest.raises(DeviceFaultError, match=rf"motor 1 \(left\) reports {fault}; it must be reset"):
         bench.base.set_torque(True)
 
 

@@ -42,7 +42,7 @@ def test_a_vehicle_that_starts_anew_must_be_opened_again(bench: Bench) -> None:
         bench.rover.restart()
         # A fast one, which goes on telling what it was asked for.
         bench.rover._after_interval(30, 0.05)
-    with pytest.raises(DeviceError, match="has started anew"):
+    with pytest.raises(DeviceError, match="has restarted"):
         bench.drive(FORWARD, 2.0)
     bench.start()
     assert bench.drive(FORWARD, 0.2).is_torque_on

@@ -49,7 +49,7 @@ def test_an_accepted_command_is_not_a_done_one(bench: Bench) -> None:
 def test_commands_are_repeated_and_their_silence_is_told(bench: Bench) -> None:
     bench.base.open()
     bench.rover.answers_commands = False
-    with pytest.raises(DeviceSilentError, match="does not answer when told to go to mode GUIDED"):
+    with pytest.raises(DeviceSilentError, match="does not answer the command to go to mode GUIDED"):
         bench.base.set_torque(True)
     assert [number for number, _ in bench.rover.commands if number == 176] == [176] * 3
 

@@ -410,7 +410,7 @@ def test_a_board_that_has_started_anew_must_be_opened_again(bench: Rig) -> None:
     _board(bench)._began_s = bench.robot.time.now_s()
     bench.host.sleep(0.05)
     for _ in range(2):
-        with pytest.raises(DeviceError, match="OpenCR has started anew; it must be opened again"):
+        with pytest.raises(DeviceError, match="OpenCR has restarted; it must be opened again"):
             bench.base.exchange(Velocity(0.1))
     bench.base.open()
     assert not bench.drive().is_torque_on
@@ -419,8 +419,8 @@ def test_a_board_that_has_started_anew_must_be_opened_again(bench: Rig) -> None:
 @pytest.mark.parametrize(
     ("uptime_s", "problem"),
     [
-        (9.0, "OpenCR has started anew; it must be opened again"),
-        (11.0, "the computer stood still or OpenCR has started anew; it must be opened again"),
+        (9.0, "OpenCR has restarted; it must be opened again"),
+        (11.0, "the computer stood still or OpenCR has restarted; it must be opened again"),
     ],
 )
 def test_a_board_whose_time_is_another_than_the_computers_has_restarted(

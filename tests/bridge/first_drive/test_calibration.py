@@ -132,7 +132,7 @@ def test_what_is_no_wall_is_refused() -> None:
     with pytest.raises(CalibrationError, match="no wall is seen ahead"):
         wall_angle_rad([math.nan] * BINS)
     corner = [0.5 + abs(degree - 360 * (degree > 180)) * 0.02 for degree in range(BINS)]
-    with pytest.raises(CalibrationError, match="no plain wall"):
+    with pytest.raises(CalibrationError, match="not a plain wall"):
         wall_angle_rad(corner)
 
 
@@ -152,7 +152,7 @@ def test_a_way_that_says_nothing_of_the_wheels_is_refused(way: Way, measured_m: 
 @pytest.mark.parametrize(
     ("way", "problem"),
     [
-        (Way(0.0, 1.0), "not turned by a revolution"),
+        (Way(0.0, 1.0), "not turned by a whole revolution"),
         (Way(5.0, 31.4), "moved away from its place"),
         (Way(0.0, 31.4 * 2), "would be 0.3"),
     ],

@@ -257,7 +257,7 @@ def test_nobody_there_is_told_once_and_tried_ever_more_seldom(
         pauses_s = [after_s - before_s for before_s, after_s in itertools.pairwise(tries_s)]
         assert len(pauses_s) == 153
         assert pauses_s == pytest.approx([0.25, 0.5, 1.0, 2.0] + [4.0] * (len(pauses_s) - 4))
-    assert caplog.text.count("nobody serves there") == 1
+    assert caplog.text.count("no program listens there") == 1
 
 
 def test_a_problem_is_told_again_after_a_line_that_has_lasted(

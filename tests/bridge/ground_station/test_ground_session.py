@@ -162,9 +162,9 @@ def test_what_happens_is_told_in_words(talk: Talk) -> None:
     talk.daemon.show(devices={Device.DRIVE: True, Device.SCANNER: True}, reasons=(Reason.COMMAND_SILENT,))
     assert joined_texts(talk.live(0.2)) == ["The scanner is there"]
     talk.daemon.show(state=State.FAULT, problem="a motor is hot", reasons=(Reason.MOTOR_FAULT,))
-    assert joined_texts(talk.live(0.5)) == ["a motor is hot", "A motor tells of a fault.", "Stopped by a fault"]
+    assert joined_texts(talk.live(0.5)) == ["a motor is hot", "A motor reports a fault.", "Stopped by a fault"]
     assert joined_texts(talk.live(19.0)) == []
-    assert joined_texts(talk.live(2.0)) == ["a motor is hot", "A motor tells of a fault."]
+    assert joined_texts(talk.live(2.0)) == ["a motor is hot", "A motor reports a fault."]
 
 
 def test_a_safe_stop_is_told_and_its_end_and_no_ordinary_end(talk: Talk) -> None:

@@ -109,11 +109,11 @@ class TestHello:
         program.send(keep_alive=pb.KeepAlive())
         assert program.failure() == (
             grpc.StatusCode.INVALID_ARGUMENT,
-            "the first message is 'hello', within 5 seconds",
+            "the first message must be 'hello', within 5 seconds",
         )
         program = attached(stub)
         program.send(hello=pb.Hello(name="other"))
-        assert program.receive().refused.why == "'hello' is the first message alone"
+        assert program.receive().refused.why == "only the first message may be 'hello'"
         program.end()
 
     def test_it_comes_soon_or_the_place_is_given_to_another(self, stub: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -250,7 +250,7 @@ class TestOperator:
         code, details = program.failure()
         program.end()
         assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
-        assert details == "an operator sends at most 200 messages a second, and these are more"
+        assert details == "an operator may send at most 200 messages a second; this one sends more"
         assert daemon.seen <= 2 + MESSAGES_A_S
 
     def test_other_programs_give_none(self, daemon: FakeDaemon, stub: Any) -> None:

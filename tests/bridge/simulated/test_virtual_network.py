@@ -44,7 +44,7 @@ def test_datagrams_come_whole_and_in_order_to_who_listens() -> None:
 
 def test_a_connection_carries_bytes_both_ways_until_one_end_is_closed() -> None:
     with VirtualHost(0.0) as host:
-        with pytest.raises(LineMissingError, match="nobody serves there"):
+        with pytest.raises(LineMissingError, match="no program listens there"):
             host.open_network("tcp:127.0.0.1:5760")
         server = host.serve(5760)
         with pytest.raises(LineBusyError):

@@ -106,7 +106,7 @@ def test_nobody_serves_there() -> None:
     with socket.socket() as silent:
         # It is taken, and nobody listens.
         silent.bind(("127.0.0.1", 0))
-        with pytest.raises(LineMissingError, match="nobody serves there"):
+        with pytest.raises(LineMissingError, match="no program listens there"):
             NetworkLine(f"tcp:127.0.0.1:{_port(silent)}")
 
 

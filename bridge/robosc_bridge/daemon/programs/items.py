@@ -315,7 +315,7 @@ class Clients:
         try:
             program.tell(item)
         except Exception:  # What a program's side does wrong must not stop the robot's loop.
-            _log.exception("%s could not be told something", program.name)
+            _log.exception("an item could not be sent to %s", program.name)
 
     def tell_all(self, item: ToProgram) -> None:
         """Tell every program something."""

@@ -77,9 +77,9 @@ class RequestChecker:
         if not isinstance(item, ProgramRequest):
             return item
         if not self._is_layer:
-            raise InvalidRequestError("the supervisor is a controller: it lets nobody ask for anything")
+            raise InvalidRequestError("the supervisor is a controller, which takes no requests")
         if not item.program.may_request:
-            raise InvalidRequestError("this program may not ask for anything")
+            raise InvalidRequestError("this program may not send requests")
         match item:
             case MessageRequested(identifier=identifier, data=data):
                 meant = self.messages.get(identifier)

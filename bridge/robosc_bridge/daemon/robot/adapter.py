@@ -177,7 +177,7 @@ class RobotAdapter:
             self._rotations.end(reason, is_own=True)
 
     def _stop(self) -> None:
-        self._rotations.end("the robot was told to stop", is_own=True)
+        self._rotations.end("the robot was commanded to stop", is_own=True)
         self._motion.stop(self._clock())
 
     # The devices' side.

@@ -44,7 +44,7 @@ class MotionTarget:
         self._rotate.cancel("another motion was asked for")
         self._pass(velocity, now_s)
 
-    def stop(self, now_s: float, reason: str = "the robot was told to stop") -> None:
+    def stop(self, now_s: float, reason: str = "the robot was commanded to stop") -> None:
         """Stand still from now on; a rotation under way has failed."""
         self._rotate.cancel(reason)
         self._pass(STANDSTILL, now_s)

@@ -351,7 +351,7 @@ class ScannerWorker:
 
     def _restart(self) -> None:
         if self._restarts >= RESTART_LIMIT:
-            raise DeviceSilentError(f"no full revolution, also after its motor was started anew {RESTART_LIMIT} times")
+            raise DeviceSilentError(f"no full revolution, even after {RESTART_LIMIT} restarts of its motor")
         self._restarts += 1
         self._scanner.restart()
         self._restart_at_s = self._clock() + self._restart_after_s

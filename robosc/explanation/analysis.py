@@ -21,7 +21,6 @@ from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, 
 from robosc.explanation.problems import Problems
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
-from robosc.synthesis.fixed_point import allowed
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.runs import ShortestRuns, SystemRun
 from robosc.synthesis.transitions import Steps
@@ -166,6 +165,7 @@ class Analysis:
         free = (*dropped, *(item for item in constraints if item.kind is not ConstraintKind.MARKING))
         _, self._free = problems.without(free)
         self._enabling: dict[str, tuple[Hindrance, ...]] = {}
+        self._kept: dict[str, Any] = {}
         self._unfound = 0
 
     @cached_property
@@ -219,7 +219,17 @@ class Analysis:
         """
         good = self.good if good is None else good
         steps = self._steps[event]
-        return good & steps.plant & allowed(steps, good)
+        if not steps.event.is_controllable:
+            return good & steps.plant
+        return good & steps.plant & steps.condition & self._staying(event, good)
+
+    def _staying(self, event: str, good: Any) -> Any:
+        """Return the states from which an event, if it happens, leads to good states alone."""
+        if good != self.good:
+            return self._steps[event].only(good)
+        if event not in self._kept:
+            self._kept[event] = self._steps[event].only(good)
+        return self._kept[event]
 
     def moving(self, event: str) -> Any:
         """Return the states where an event is more than a step that changes nothing."""
@@ -246,7 +256,7 @@ class Analysis:
                 Hindrance(HindranceKind.REQUIREMENT, event, wanted & ~self._problems.condition(place), condition=place)
                 for place in self._conditions_on(event)
             ]
-            lost = states & steps.plant & steps.condition & ~steps.only(good)
+            lost = states & steps.plant & steps.condition & ~self._staying(event, good)
             found.append(Hindrance(HindranceKind.SUPERVISOR, event, lost))
         return tuple(item for item in found if item.where != self._manager.false)
 
@@ -381,13 +391,8 @@ class Analysis:
                 break
         else:
             return None
-        # A way that is led may go on inside for a while; a shortest one leaves at once, from any of these states.
-        outside = next(
-            place
-            for place in range(len(beyond.states) - 1, 0, -1)
-            if self.predicate(beyond.states[place - 1]) & inside != self._manager.false
-        )
-        event, there = beyond.events[outside - 1], self.predicate(beyond.states[outside])
+        # Ways leave at once what is allowed: rings and layers are such that no state after the first is inside.
+        event, there = beyond.events[0], self.predicate(beyond.states[1])
         leaving = inside & ways.before(event, there)
         if runs is None:
             runs = self.runs(start, {name: self.possible(name, good) for name in self._steps})
@@ -396,7 +401,7 @@ class Analysis:
             raise InternalError("what can be reached is not reached")
         here = self.predicate(before.states[-1])
         return Detour(
-            (*before.events, *beyond.events[outside - 1 :]),
+            (*before.events, *beyond.events),
             len(before.events),
             before.states[-1],
             self.hindrances(event, here, good),

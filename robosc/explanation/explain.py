@@ -23,7 +23,7 @@ from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
-from robosc.synthesis.nodes import count_models, restrict
+from robosc.synthesis.nodes import count_models
 from robosc.synthesis.result import SynthesisProgress
 from robosc.synthesis.runs import SystemRun, decoded
 from robosc.synthesis.ways import WayNotFoundError
@@ -121,11 +121,7 @@ class _Explainer:
         self._reachable = reachable
         self._initial = initial
         self._possible = {event.name: reachable & analysis.possible(event.name) for event in words.system.events}
-        # Runs never leave what is reachable, and a predicate that need not say so is smaller.
-        manager = encoding.manager
-        self._runs = analysis.runs(
-            initial, {name: restrict(manager, where, reachable) for name, where in self._possible.items()}
-        )
+        self._runs = analysis.runs(initial, self._possible)
 
     def _run_to(self, states: Any) -> SystemRun:
         run = self._runs.run_to(states)

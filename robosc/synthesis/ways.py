@@ -23,8 +23,8 @@ from robosc.synthesis.transitions import Steps
 MAXIMUM_STEPS = 16_000
 """Steps after which it is left open whether there is a way; most systems need fewer."""
 
-MAXIMUM_NODES = 1_000_000
-"""Nodes of all layers together, in each of both directions: up to about a second with the faster engine."""
+MAXIMUM_NODES = 4_000_000
+"""Nodes of all layers together, in each of both directions: up to some two seconds with the faster engine."""
 
 
 class WayNotFoundError(Exception):

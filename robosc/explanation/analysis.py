@@ -10,6 +10,7 @@ nonblocking and closed under uncontrollable events, so the state were good.
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from enum import StrEnum
+from functools import cached_property
 from typing import Any
 
 from robosc.automata.compile import State
@@ -20,10 +21,13 @@ from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, 
 from robosc.explanation.problems import Problems
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
-from robosc.synthesis.fixed_point import allowed
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.runs import ShortestRuns, SystemRun
 from robosc.synthesis.transitions import Steps
+from robosc.synthesis.ways import WayNotFoundError, Ways
+
+MAXIMUM_UNFOUND = 2
+"""Ways that took too long to find after which an analysis looks for shortest ones only."""
 
 
 class HindranceKind(StrEnum):
@@ -75,7 +79,8 @@ class Counterexample:
         leaving: Uncontrollable events that can leave a range there.
         forbidden: Uncontrollable events that can happen there against a condition (its place).
         detour: Way that the plants by themselves would have to a marked state, where the state is not bad, but
-            blocks; None where the plants have none either.
+            blocks; None where the plants have none either, or finding one takes too long.
+        is_detour_unknown: True where finding one takes too long.
         unmarked: Automata that are in no marked location, where the state blocks.
         is_marker_missed: True if the marker is not true there, where the state blocks.
     """
@@ -86,6 +91,7 @@ class Counterexample:
     leaving: tuple[tuple[str, RelaxableConstraint], ...]
     forbidden: tuple[tuple[str, int], ...]
     detour: "Detour | None"
+    is_detour_unknown: bool
     unmarked: tuple[str, ...]
     is_marker_missed: bool
 
@@ -154,12 +160,18 @@ class Analysis:
             safe = safe & ~steps.bad
         self.safe = safe
         """The states that are not bad."""
-        self._troubled = ~self._fixed_point.nonblocking_ahead(self._problem, safe)
         self.good = good
         """The states that a supervisor may be in."""
         free = (*dropped, *(item for item in constraints if item.kind is not ConstraintKind.MARKING))
         _, self._free = problems.without(free)
         self._enabling: dict[str, tuple[Hindrance, ...]] = {}
+        self._kept: dict[str, Any] = {}
+        self._unfound = 0
+
+    @cached_property
+    def _troubled(self) -> Any:
+        """The states that are trouble."""
+        return ~self._fixed_point.nonblocking_ahead(self._problem, self.safe)
 
     # Why events cannot happen
 
@@ -207,7 +219,17 @@ class Analysis:
         """
         good = self.good if good is None else good
         steps = self._steps[event]
-        return good & steps.plant & allowed(steps, good)
+        if not steps.event.is_controllable:
+            return good & steps.plant
+        return good & steps.plant & steps.condition & self._staying(event, good)
+
+    def _staying(self, event: str, good: Any) -> Any:
+        """Return the states from which an event, if it happens, leads to good states alone."""
+        if good != self.good:
+            return self._steps[event].only(good)
+        if event not in self._kept:
+            self._kept[event] = self._steps[event].only(good)
+        return self._kept[event]
 
     def moving(self, event: str) -> Any:
         """Return the states where an event is more than a step that changes nothing."""
@@ -234,7 +256,7 @@ class Analysis:
                 Hindrance(HindranceKind.REQUIREMENT, event, wanted & ~self._problems.condition(place), condition=place)
                 for place in self._conditions_on(event)
             ]
-            lost = states & steps.plant & steps.condition & ~steps.only(good)
+            lost = states & steps.plant & steps.condition & ~self._staying(event, good)
             found.append(Hindrance(HindranceKind.SUPERVISOR, event, lost))
         return tuple(item for item in found if item.where != self._manager.false)
 
@@ -312,13 +334,20 @@ class Analysis:
             if self._problems.condition(place) & state == false
         )
         is_blocking = self.safe & state != false
+        detour, is_detour_unknown = None, False
+        if is_blocking:
+            try:
+                detour = self.detour(state, self._fixed_point.marked, self.safe)
+            except WayNotFoundError:
+                is_detour_unknown = True
         return Counterexample(
             run,
             is_forced,
             invariants,
             leaving,
             forbidden,
-            self.detour(state, self._fixed_point.marked, self.safe) if is_blocking else None,
+            detour,
+            is_detour_unknown,
             self._unmarked(state) if is_blocking else (),
             is_blocking and self._encoder.holds(self._marker) & state == false,
         )
@@ -333,7 +362,9 @@ class Analysis:
             )
         )
 
-    def detour(self, start: Any, goal: Any, good: Any, inside: Any | None = None) -> Detour | None:
+    def detour(
+        self, start: Any, goal: Any, good: Any, inside: Any | None = None, runs: ShortestRuns | None = None
+    ) -> Detour | None:
         """Return a way to a goal that the plants alone would have, and where it is stopped; None without any.
 
         Allowed events lead on as far as they can, and only from there the plants alone: the event that is reported is
@@ -344,23 +375,28 @@ class Analysis:
             goal: States that it leads to; allowed events do not.
             good: The states that must not be left.
             inside: States that can be reached by allowed events, if that is known.
+            runs: Shortest runs from the start by allowed events, if there are some already.
+
+        Raises:
+            WayNotFoundError: Finding one takes too long.
         """
-        if inside is None:
-            inside = self._fixed_point.states_from(self._problem, start, good)
-        # Under the requirements first: what synthesis keeps from happening is told before what is forbidden anyhow.
-        steps = self._steps
-        possible = {name: item.plant & self._restricted(item) for name, item in steps.items()}
-        beyond = self._path(steps, possible, inside, goal)
-        if beyond is None:
-            steps = {item.event.name: item for item in self._free.steps}
-            possible = {name: item.plant for name, item in steps.items()}
-            beyond = self._path(steps, possible, inside, goal)
-        if beyond is None:
+        for ways in self._ways(goal):
+            # Allowed events are the plants' own, so from what they reach no way leads on unless one does from here.
+            if ways.is_none_from(start):
+                continue
+            if inside is None:
+                inside = self._fixed_point.states_from(self._problem, start, good)
+            beyond = self._way(ways, inside)
+            if beyond is not None:
+                break
+        else:
             return None
+        # Ways leave at once what is allowed: rings and layers are such that no state after the first is inside.
         event, there = beyond.events[0], self.predicate(beyond.states[1])
-        # A shortest way out leaves at once what is allowed, from any of these states.
-        leaving = inside & possible[event] & steps[event].some(there)
-        before = self.runs(start, {name: self.possible(name, good) for name in self._steps}).run_to(leaving)
+        leaving = inside & ways.before(event, there)
+        if runs is None:
+            runs = self.runs(start, {name: self.possible(name, good) for name in self._steps})
+        before = runs.run_to(leaving)
         if before is None:
             raise InternalError("what can be reached is not reached")
         here = self.predicate(before.states[-1])
@@ -371,8 +407,31 @@ class Analysis:
             self.hindrances(event, here, good),
         )
 
-    def _path(self, steps: Mapping[str, Steps], possible: Mapping[str, Any], start: Any, goal: Any) -> SystemRun | None:
-        return ShortestRuns(self._encoding, self._monitor, tuple(steps.values()), possible, start).run_to(goal)
+    def _ways(self, goal: Any) -> tuple[Ways, Ways]:
+        """Return the ways to a goal under the requirements, and those of the plants alone.
+
+        They are tried in this order: what synthesis keeps from happening is told before what is forbidden anyhow.
+        """
+        return self._marked_ways if goal == self._fixed_point.marked else self._ways_to(goal)
+
+    @cached_property
+    def _marked_ways(self) -> tuple[Ways, Ways]:
+        return self._ways_to(self._fixed_point.marked)
+
+    def _ways_to(self, goal: Any) -> tuple[Ways, Ways]:
+        restricted = {name: item.plant & self._restricted(item) for name, item in self._steps.items()}
+        unrestricted = {item.event.name: item.plant for item in self._free.steps}
+        return (
+            Ways(self._encoding, self._monitor, tuple(self._steps.values()), restricted, goal),
+            Ways(self._encoding, self._monitor, self._free.steps, unrestricted, goal),
+        )
+
+    def _way(self, ways: Ways, start: Any) -> SystemRun | None:
+        try:
+            return ways.way_from(start, is_led=self._unfound < MAXIMUM_UNFOUND)
+        except WayNotFoundError:
+            self._unfound += 1
+            raise
 
     def predicate(self, state: State) -> Any:
         """Return the predicate that is true where the state is this one."""

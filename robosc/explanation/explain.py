@@ -8,10 +8,10 @@ from typing import Any
 
 from robosc.automata.state import subjects
 from robosc.errors import InternalError
-from robosc.explanation.analysis import Analysis, Detour, Hindrance, HindranceKind
+from robosc.explanation.analysis import Analysis, Hindrance, HindranceKind
 from robosc.explanation.blame import explain_problem
 from robosc.explanation.conflict import minimal_conflict
-from robosc.explanation.explanations import EventHere, EventReport, Explanation, Reason, Remark, StateReport
+from robosc.explanation.explanations import EventHere, EventReport, Explanation, Reason, Remark, StateReport, Stopped
 from robosc.explanation.notation import events_text
 from robosc.explanation.problems import Problems
 from robosc.explanation.reports import Reporter
@@ -26,6 +26,7 @@ from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
 from robosc.synthesis.nodes import count_models
 from robosc.synthesis.result import SynthesisProgress
 from robosc.synthesis.runs import SystemRun, decoded
+from robosc.synthesis.ways import WayNotFoundError
 from robosc.synthesis.workspace import workspace
 
 MAXIMUM_STATES = 5
@@ -128,8 +129,13 @@ class _Explainer:
             raise InternalError("a state of the controlled system is not reachable")
         return run
 
-    def _detour(self, goal: Any) -> Detour | None:
-        return self._analysis.detour(self._initial, goal, self._analysis.good, self._reachable)
+    def _stopped(self, goal: Any) -> tuple[Stopped | None, str]:
+        """Return a way of the plants to a goal and where it is stopped, or what is to be told instead of one."""
+        try:
+            detour = self._analysis.detour(self._initial, goal, self._analysis.good, self._reachable, self._runs)
+        except WayNotFoundError:
+            return None, self._reporter.unfound
+        return None if detour is None else self._reporter.stopped(detour, self._analysis.good), ""
 
     # Events
 
@@ -145,16 +151,16 @@ class _Explainer:
         status = "never" if is_never else "free" if possible == wanted else "restricted"
         if is_never:
             found = self._decisive(event, found, wanted)
-        stopped = None
+        stopped, unfound = None, ""
         if is_never and wanted == self._false:
-            detour = self._detour(self._analysis.wanted(event))
-            stopped = None if detour is None else self._reporter.stopped(detour, self._analysis.good)
+            stopped, unfound = self._stopped(self._analysis.wanted(event))
         return EventReport(
             event=event,
             is_controllable=self._system.event(event).is_controllable,
             status=status,
             reasons=tuple(self._reason(item) for item in found),
             stopped=stopped,
+            unfound=unfound,
         )
 
     def _decisive(self, event: str, found: list[Hindrance], wanted: Any) -> list[Hindrance]:
@@ -208,9 +214,10 @@ class _Explainer:
         if found != self._false:
             return found
         problem = f"the controlled system is never in a state that fits '{visible(text[:MAXIMUM_SHOWN])}'"
-        detour = self._detour(condition) if states == self._reachable else None
-        if detour is not None:
-            stopped = self._reporter.stopped(detour, self._analysis.good)
+        stopped, unfound = self._stopped(condition) if states == self._reachable else (None, "")
+        if unfound:
+            problem += f"; {unfound}"
+        if stopped is not None:
             event = stopped.events[stopped.stopped_at]
             problem += (
                 f": the {self._words.terms.plants} would have the way {events_text(stopped.events)}, but {event} must "
@@ -261,15 +268,15 @@ class _Explainer:
             goal = self._encoding.in_location(automaton, location)
             if goal & self._reachable != self._false:
                 continue
-            detour = self._detour(goal)
+            stopped, unfound = self._stopped(goal)
             plants = self._words.terms.plants
             whose = "its behaviour has" if plants == "behaviours" else f"the {plants} have"
             yield Remark(
                 "unreachable-state",
                 f"{self._words.terms.automaton(automaton)} never gets to '{location}'"
-                + ("" if detour else f": {whose} no way there"),
+                + ("" if stopped else f": {unfound}" if unfound else f": {whose} no way there"),
                 place,
-                stopped=None if detour is None else self._reporter.stopped(detour, self._analysis.good),
+                stopped=stopped,
             )
 
     def left_to_the_environment(self) -> Iterator[Remark]:

@@ -81,7 +81,7 @@ class Reason:
 
 @dataclass(frozen=True, slots=True)
 class Stopped:
-    """A shortest way to some goal by the behaviours alone, and where it is stopped.
+    """A way to some goal by the behaviours alone, and where it is stopped.
 
     Attributes:
         events: Events of the whole way.
@@ -108,7 +108,7 @@ class CounterexampleReport:
         messages: Sentences that say what the trouble is.
         parts: Parts of the model that are broken.
         stopped: Way that the behaviours would have to a marked state, for a state that blocks; None where they have
-            none.
+            none, or finding one takes too long, which is then one of the messages.
     """
 
     kind: str
@@ -177,6 +177,7 @@ class EventReport:
         reasons: Reasons that keep it from happening, each with a shortest run to a state where it does.
         stopped: Way to where the behaviours would let it happen, for an event that they never let happen, and why
             that is stopped.
+        unfound: Sentence in place of that way, where finding one takes too long; else empty.
     """
 
     event: str
@@ -184,6 +185,7 @@ class EventReport:
     status: str
     reasons: tuple[Reason, ...]
     stopped: Stopped | None = None
+    unfound: str = ""
 
 
 @dataclass(frozen=True, slots=True)

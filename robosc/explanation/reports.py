@@ -28,6 +28,8 @@ class Reporter:
     def __init__(self, analysis: Analysis, terms: Terms) -> None:
         self._analysis = analysis
         self._terms = terms
+        self.unfound = f"no way of the {terms.plants} is shown: finding one takes too long"
+        """Sentence in place of a way that takes too long to find."""
 
     def path(self, run: SystemRun) -> Path:
         """A run."""
@@ -73,7 +75,9 @@ class Reporter:
             if item.is_marker_missed:
                 parts.append(self._terms.part(_MARKER))
                 messages.append(f"'{parts[-1].text}' is not so there")
-            if item.detour is None:
+            if item.is_detour_unknown:
+                messages.append(self.unfound)
+            elif item.detour is None:
                 messages.append(f"the {self._terms.plants} by themselves have no way to one")
             else:
                 stopped = self.stopped(item.detour, self._analysis.safe)

@@ -142,6 +142,8 @@ class _Text:
         yield f"{item.event}{kind}: {self._statuses[item.status]}"
         for reason in item.reasons:
             yield from _indented(self._reason(reason))
+        if item.unfound:
+            yield f"  {item.unfound}"
         if item.stopped is not None:
             yield from _indented(self._stopped(item.stopped, self._free_way))
 

@@ -56,6 +56,7 @@ class Encoding:
         manager: The manager.
         system: The system.
         subjects: Bits of each place of a state.
+        places: The same, in the order of a state's values.
         blocks: The places, topmost first; bits of places in one block stand among each other.
         state_names: Every current-state variable, in the manager's order.
         order: Every variable, in the order in which they were declared.
@@ -70,6 +71,7 @@ class Encoding:
         self.blocks = block_order(system, found.places)
         for number, subject in enumerate(subject for block in self.blocks for subject in block):
             self.subjects[subject] = self._bits(f"s{number}", subject_domain(system, subject), self._type(subject))
+        self.places = tuple(self.subjects[subject] for subject in subjects(system))
         self.inputs = tuple((item, self._input(number, item)) for number, item in enumerate(system.inputs))
         self.pause = pause
         self.order: list[str] = []

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from robosc.synthesis.engines import Manager
-from robosc.synthesis.nodes import renamed
+from robosc.synthesis.nodes import met, renamed
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -45,9 +45,7 @@ class Image:
             states = manager.let(self.constants, states)
         if self.functions:
             states = manager.let(self.functions, states)
-        states = states & self.relation
-        if self.hidden:
-            states = manager.exist(self.hidden, states)
+        states = met(manager, self.hidden, states, self.relation)
         if self.names:
             states = renamed(manager, self.names, states)
         return states if self.outside is None else states & self.outside

@@ -5,9 +5,11 @@ ICCAD 1990, pp. 126-129 (restrict); R. E. Bryant, "Graph-based algorithms for Bo
 IEEE Trans. Computers C-35(8), 1986, pp. 677-691 (counting).
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from functools import cache
 from typing import Any
 
+from robosc.dd_modules import load_dd
 from robosc.synthesis.compiled import kernel_of
 from robosc.synthesis.engines import Manager, is_compiled, is_reordering
 
@@ -26,6 +28,24 @@ def implies(manager: Manager, node: Any, other: Any) -> bool:
     """Return True if a predicate is true only where another one is; CUDD makes no node for that."""
     kernel = kernel_of(manager)
     return bool(node & ~other == manager.false) if kernel is None else kernel.implies(node, other)
+
+
+def met(manager: Manager, names: Sequence[str], node: Any, other: Any) -> Any:
+    """Return the predicate that is true where some value of the variables makes both of two predicates true.
+
+    CUDD forgets variables while it conjoins: what both are together may be far larger than what is left of it.
+    """
+    if not names:
+        return node & other
+    if is_compiled(manager):
+        return _and_exists()(node, other, names)
+    return manager.exist(names, node & other)
+
+
+@cache
+def _and_exists() -> Callable[[Any, Any, Sequence[str]], Any]:
+    function: Callable[[Any, Any, Sequence[str]], Any] = load_dd("cudd").and_exists
+    return function
 
 
 def renamed(manager: Manager, names: Mapping[str, str], node: Any) -> Any:

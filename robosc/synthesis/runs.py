@@ -13,11 +13,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from robosc.automata.compile import State
-from robosc.automata.state import subjects
 from robosc.errors import InternalError
 from robosc.synthesis.encoding import Bits, Encoding
-from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.nodes import cofactors, is_constant
+from robosc.synthesis.engines import Manager
+from robosc.synthesis.image import Image
+from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
+from robosc.synthesis.nodes import cofactors, implies, is_constant
 from robosc.synthesis.transitions import Steps
 
 MAXIMUM_EFFORT = 1_000_000
@@ -61,6 +62,7 @@ class ShortestRuns:
         steps: The events, in the order in which equally short runs are preferred.
         possible: For each event the states in which it may happen, such as those of the controlled system.
         start: States in which runs begin.
+        chained: Monitor of the nodes that chained events work on, one step each; None for no limit.
     """
 
     def __init__(
@@ -70,17 +72,38 @@ class ShortestRuns:
         steps: Sequence[Steps],
         possible: Mapping[str, Any],
         start: Any,
+        chained: BoundedMonitor | None = None,
     ) -> None:
         self._encoding = encoding
         self._manager = encoding.manager
         self._monitor = monitor
         self._steps = steps
         self._possible = possible
+        self._chained = chained
+        self._images: dict[str, Image] = {}
         self._layers = [_Layer(start, ())]
         self._ring = self._layers[0].reached
         self._rounds = 0
         self._rings = 0
         self._effort = 0
+
+    @property
+    def reached(self) -> Any:
+        """Every state found so far."""
+        return self._layers[-1].reached
+
+    def rings_meet(self, states: Any) -> bool | None:
+        """Return whether runs lead to some states, None where the rings up to there take more than `MAXIMUM_EFFORT`.
+
+        Raises:
+            SynthesisCancelled: The work is to end.
+        """
+        while self.reached & states == self._manager.false:
+            if self._effort + self._ring_effort() > MAXIMUM_EFFORT:
+                return None
+            if not self._grow():
+                return False
+        return True
 
     def trace_to(self, states: Any) -> tuple[str, ...]:
         """Events of a run to one of some reachable states; the same for every engine.
@@ -102,48 +125,49 @@ class ShortestRuns:
 
         Raises:
             SynthesisCancelled: The work is to end.
+            EffortSpentError: Chained events take more nodes than they may.
         """
-        while self._layers[-1].reached & states == self._manager.false:
+        while self.reached & states == self._manager.false:
             if not self._grow():
                 return None
-        number = self._first_layer(states)
+        number, found = self._first_layer(states)
         is_shortest = number <= self._rings
-        state = self._one(self._layers[number].reached & states)
+        state, values = one_of(self._encoding, found)
         events: list[str] = []
-        visited = [decoded(self._encoding, state)]
+        visited = [values]
         while number:
             event, sources = self._before(number, state)
             events.append(event)
-            number = self._first_layer(sources)
-            state = self._one(self._layers[number].reached & sources)
-            visited.append(decoded(self._encoding, state))
+            number, found = self._first_layer(sources)
+            state, values = one_of(self._encoding, found)
+            visited.append(values)
         return SystemRun(tuple(reversed(events)), tuple(reversed(visited)), is_shortest)
 
-    def _first_layer(self, states: Any) -> int:
-        """Number of the first layer that has one of some states, which the last one has."""
-        return bisect_left(
-            range(len(self._layers)),
-            True,
-            key=lambda number: self._layers[number].reached & states != self._manager.false,
-        )
+    def _first_layer(self, states: Any) -> tuple[int, Any]:
+        """Number of the first layer that has some of the states, which the last one has, and those that it has."""
+        return first_of(self._manager, [layer.reached for layer in self._layers], states)
+
+    def _ring_effort(self) -> int:
+        """Effort that the next ring takes."""
+        return int(self._ring.dag_size) * len(self._steps)
 
     def _grow(self) -> bool:
         """One round outwards; whether it found more states."""
-        self._effort += self._ring.dag_size * len(self._steps)
-        before = self._layers[-1].reached
+        self._effort += self._ring_effort()
+        before = self.reached
         if self._effort <= MAXIMUM_EFFORT:
             self._add_ring()
         else:
             self._add_chain()
-        if self._layers[-1].reached == before:
+        if self.reached == before:
             return False
         self._rounds += 1
-        self._monitor.tell("shortest runs", self._rounds, self._layers[-1].reached)
+        self._monitor.tell("shortest runs", self._rounds, self.reached)
         return True
 
     def _add_ring(self) -> None:
         """All states one event after the last ring's."""
-        before = found = self._layers[-1].reached
+        before = found = self.reached
         for steps in self._steps:
             found = found | self._image(steps, self._ring)
         self._ring = found & ~before
@@ -153,7 +177,9 @@ class ShortestRuns:
     def _add_chain(self) -> None:
         """A layer for each event, which works on what the ones before it have found."""
         for steps in self._steps:
-            before = self._layers[-1].reached
+            before = self.reached
+            if self._chained is not None:
+                self._chained.check_stop(before.dag_size)
             found = before | self._image(steps, before)
             if found != before:
                 self._layers.append(_Layer(found, (steps,)))
@@ -167,37 +193,53 @@ class ShortestRuns:
         before = self._layers[number - 1].reached
         for steps in self._layers[number].events:
             self._monitor.check_stop()
-            sources = before & self._possible[steps.event.name] & steps.some(state)
+            sources = self._backwards(steps)(state) & before
             if sources != self._manager.false:
                 return steps.event.name, sources
         raise InternalError("a state of a layer has no predecessor in the layers before")
 
-    def _one(self, states: Any) -> Any:
-        """One of some states."""
-        return one_of(self._encoding, states)
+    def _backwards(self, steps: Steps) -> Image:
+        """The image that leads from states to those before them in which an event may happen."""
+        name = steps.event.name
+        if name not in self._images:
+            self._images[name] = steps.backwards(self._possible[name])
+        return self._images[name]
 
 
-def one_of(encoding: Encoding, states: Any) -> Any:
-    """One of some states: the one whose bits read as the lowest number, in the order of the variables."""
-    manager = encoding.manager
-    return encoding.all_of(
-        manager.var(name) if value else ~manager.var(name)
-        for name, value in reversed(_lowest(encoding, states).items())
-    )
+def first_of(manager: Manager, layers: Sequence[Any], states: Any) -> tuple[int, Any]:
+    """Number of the first of some layers that has some of the states, and those of them that it has.
+
+    Args:
+        manager: The manager of all predicates.
+        layers: The layers, each of which has all states of the ones before it.
+        states: The states, of which the last layer has some.
+    """
+    number = bisect_left(range(len(layers) - 1), True, key=lambda place: not implies(manager, states, ~layers[place]))
+    return number, states & layers[number]
+
+
+def one_of(encoding: Encoding, states: Any) -> tuple[Any, State]:
+    """One of some states: the one whose bits read as the lowest number, in the order of the variables.
+
+    Its values come with it, in the order of `subjects`.
+    """
+    values = _lowest(encoding, states)
+    return encoding.manager.cube(values), _decoded(encoding, values)
 
 
 def decoded(encoding: Encoding, states: Any) -> State:
     """The values of the state that `one_of` chooses, in the order of `subjects`."""
-    values = _lowest(encoding, states)
+    return _decoded(encoding, _lowest(encoding, states))
 
+
+def _decoded(encoding: Encoding, values: Mapping[str, bool]) -> State:
     def value(bits: Bits) -> int:
         index = 0
         for name in bits.names:
             index = 2 * index + values[name]
         return index
 
-    chosen = (encoding.subjects[subject] for subject in subjects(encoding.system))
-    return tuple(bits.domain[value(bits)] for bits in chosen)
+    return tuple(bits.domain[value(bits)] for bits in encoding.places)
 
 
 def _lowest(encoding: Encoding, states: Any) -> dict[str, bool]:

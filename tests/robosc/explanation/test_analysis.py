@@ -2,19 +2,22 @@
 
 from collections import Counter
 from dataclasses import replace
+from random import Random
 
 import pytest
 
 from robosc.automata import Semantics, System
 from robosc.automata.compile import NO_DATA, State, compile_expression
-from robosc.automata.state import Subject, subjects
+from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.explanation.analysis import Analysis, Hindrance, HindranceKind
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, relaxable_constraints, without_ranges
 from robosc.explanation.problems import Problems
 from robosc.explanation.requirement_automata import as_conditions
+from robosc.synthesis import runs, ways
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import make_manager
 from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
+from robosc.synthesis.ways import WayNotFoundError
 from support.effort import seeds
 from support.random_systems import explicit_supervisor, random_system, wide_system
 
@@ -54,6 +57,9 @@ class Twin:
         good = fixed_point.good_states(problem, manager.false)
         assert bool(good.reason) == supervisor.is_empty
         self.false = manager.false
+        # The plants alone, as the analysis takes them: what leaves a range goes on at its end.
+        self.free = Semantics(without_ranges(system, self.ranges))
+        self.initial = fixed_point.initial & good.states
         self.analysis = Analysis(encoding, monitor, problems, self.constraints, good.states)
 
     def check(self, state: State, event: str, met: Counter[str]) -> None:
@@ -77,6 +83,45 @@ class Twin:
         if can_happen and self.system.event(event).is_controllable:
             assert self.supervisor.allows(state, event)
         met["can happen"] += can_happen
+
+    def allowed(self, states: set[State], event: str) -> set[State]:
+        """The states that a supervisor lets an event lead to."""
+        is_controllable = self.system.event(event).is_controllable
+        happens = self.supervisor.allows if is_controllable else self.semantics.enabled
+        return {item for state in states if happens(state, event) for item in self.semantics.targets(state, event)}
+
+    def unrestrained(self, states: set[State], event: str) -> set[State]:
+        """The states that the plants let an event lead to."""
+        return {item for state in states if self.free.enabled(state, event) for item in self.free.targets(state, event)}
+
+    def within_reach(self) -> set[State]:
+        """The states that the plants get to by themselves."""
+        found = {state for state in self.semantics.initial_states if state in self.supervisor.good}
+        waiting = found
+        while waiting:
+            waiting = {item for event in self.system.events for item in self.unrestrained(waiting, event.name)} - found
+            found = found | waiting
+        return found
+
+    def check_detour(self, goal: set[State], *, is_there: bool) -> bool:
+        """Return whether the analysis finds a way to states that the supervisor never lets the system reach."""
+        predicate = self.false
+        for state in goal:
+            predicate = predicate | self.analysis.predicate(state)
+        detour = self.analysis.detour(self.initial, predicate, self.analysis.good)
+        assert (detour is not None) == is_there
+        if detour is None:
+            return False
+        states = set(self.semantics.initial_states) & self.supervisor.reachable
+        for event in detour.events[: detour.stopped_at]:
+            states = self.allowed(states, event)
+        assert detour.state in states
+        states = {detour.state}
+        # It leaves for good what the supervisor allows.
+        for event in detour.events[detour.stopped_at :]:
+            states = self.unrestrained(states, event) - self.supervisor.reachable
+        assert states & goal
+        return True
 
     def _behaviours(self, state: State, event: str) -> list[tuple[HindranceKind, object]]:
         found = [
@@ -174,3 +219,43 @@ def test_what_would_follow_runs_into_trouble() -> None:
                     met["forced" if forced else "not forced"] += 1
                     met["blocking" if counterexample.is_blocking else "bad"] += 1
     assert all(met[name] for name in ("forced", "blocking", "bad")), met
+
+
+@pytest.mark.random
+@pytest.mark.parametrize("effort", [0, runs.MAXIMUM_EFFORT])
+def test_ways_of_the_plants_leave_what_is_allowed(effort: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Check ways to states that the supervisor keeps the system from: shortest ones, and those led by layers."""
+    monkeypatch.setattr(runs, "MAXIMUM_EFFORT", effort)
+    met: Counter[bool] = Counter()
+    for seed in seeds(EXAMPLES):
+        twin = Twin(system_of(seed))
+        if twin.supervisor.is_empty:
+            continue
+        within_reach = twin.within_reach()
+        kept_from = sorted(within_reach - twin.supervisor.reachable)
+        for goal in ({state} for state in kept_from[:STATES]):
+            met[twin.check_detour(goal, is_there=True)] += 1
+        dice = Random(seed)
+        domains = [subject_domain(twin.system, subject) for subject in subjects(twin.system)]
+        anywhere = {tuple(dice.choice(values) for values in domains) for _ in range(STATES)}
+        for goal in ({state} for state in sorted(anywhere - within_reach)):
+            met[twin.check_detour(goal, is_there=False)] += 1
+    assert met[True], met
+    assert met[False], met
+
+
+@pytest.mark.random
+def test_ways_are_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Check that what takes too long is told as that, and never as no way at all."""
+    met: Counter[str] = Counter()
+    monkeypatch.setattr(runs, "MAXIMUM_EFFORT", 0)
+    monkeypatch.setattr(ways, "MAXIMUM_NODES", 0)
+    for seed in seeds(EXAMPLES):
+        twin = Twin(system_of(seed))
+        kept_from = [] if twin.supervisor.is_empty else sorted(twin.within_reach() - twin.supervisor.reachable)
+        for state in kept_from[:STATES]:
+            try:
+                twin.check_detour({state}, is_there=True)
+            except WayNotFoundError:
+                met["given up"] += 1
+    assert met["given up"], met

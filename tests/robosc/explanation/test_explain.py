@@ -17,6 +17,7 @@ from robosc.explanation.explanations import EventReport, document
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model, is_tau
 from robosc.source import Location
+from robosc.synthesis import runs, ways
 from robosc.verification import ExplicitSupervisor, synthesize_explicit
 from support.effort import seeds
 from support.models import checked, marked_place
@@ -272,6 +273,41 @@ def test_never_because_of_behaviours_requirements_or_the_supervisor() -> None:
     assert [item.part.text for item in report.reasons if item.part] == [needs[0], needs[2]]
     report = event(robot(LIFT.replace("integer(0..2)", "integer(0..2) = 2")), "arm")
     assert (report.status, [item.kind for item in report.reasons]) == ("never", ["supervisor"])
+
+
+def test_ways_that_take_too_long_to_find(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Check that each place that would show a way of the behaviours says that it shows none."""
+    unfound = "no way of the behaviours is shown: finding one takes too long"
+    once = """component Once { incoming message go with type: none
+        behaviour { initial marked state before { on request to go goto after } state after { }
+        state never { on request to go goto before } } }"""
+    back = once.replace("state after { }", "state after { on request to go goto never }")
+    text = robot(back, "requirement go needs !Once.after")
+    for limits in ((runs.MAXIMUM_EFFORT, ways.MAXIMUM_NODES), (0, 0)):
+        monkeypatch.setattr(runs, "MAXIMUM_EFFORT", limits[0])
+        monkeypatch.setattr(ways, "MAXIMUM_NODES", limits[1])
+        is_given_up = limits[0] == 0
+        (reason,) = event(text, "go").reasons
+        assert reason.trouble is not None
+        assert (unfound in reason.trouble.messages) == is_given_up
+        assert (reason.trouble.stopped is None) == is_given_up
+        (remark, *_) = (item for item in explained(text).remarks if item.kind == "unreachable-state")
+        assert remark.message == "Once never gets to 'after'" + (f": {unfound}" if is_given_up else "")
+        assert (remark.stopped is None) == is_given_up
+        with pytest.raises(RequestError, match=f"; {unfound}" if is_given_up else "would have the way"):
+            explained(text, state="Once.never")
+    door = DOOR.replace("goto closed }", "goto closed }\n state ajar { on request to slam goto closed }")
+    door = door.replace("behaviour", "incoming message slam with type: none\n behaviour")
+    reachable = robot(door.replace("to shut goto closed", "to shut goto ajar"), "requirement shut needs Door.closed")
+    report = event(reachable, "slam")
+    assert (report.status, report.stopped, report.unfound) == ("never", None, unfound)
+    assert f"slam.request: can never happen\n  {report.reasons[0].message}" in str(explained(reachable, event="slam"))
+    assert f"\n  {unfound}" in str(explained(reachable, event="slam"))
+    # Where it is known that there is none, that is told.
+    (ajar, *_) = explained(
+        robot(DOOR.replace("marked state opened", "marked state ajar { }\n marked state opened"))
+    ).remarks
+    assert ajar.message == "Door never gets to 'ajar': its behaviour has no way there"
 
 
 def test_a_guard_that_is_not_true() -> None:

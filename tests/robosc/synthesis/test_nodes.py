@@ -8,7 +8,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.synthesis.engines import make_manager
-from robosc.synthesis.nodes import cofactors, count_models, renamed, restrict
+from robosc.synthesis.nodes import cofactors, count_models, met, renamed, restrict
 from support.effort import examples
 
 NAMES = tuple(f"x{number}" for number in range(6))
@@ -64,6 +64,18 @@ def test_renaming(manager: Any, formula: Any, places: set[int]) -> None:
     own = with_names(formula, {f"x{2 * place + 1}": f"x{2 * place}" for place in range(3)})
     names = {f"x{2 * place}": f"x{2 * place + 1}" for place in places}
     assert renamed(manager, names, build(manager, own)) == build(manager, with_names(own, names))
+
+
+@settings(max_examples=examples(60))
+@given(formula=formulas, other=formulas, names=st.sets(st.sampled_from(NAMES)))
+def test_what_two_predicates_meet_in(manager: Any, formula: Any, other: Any, names: set[str]) -> None:
+    found = met(manager, sorted(names), build(manager, formula), build(manager, other))
+    for values in VALUATIONS:
+        others = [
+            values | dict(zip(sorted(names), bits, strict=True)) for bits in product((False, True), repeat=len(names))
+        ]
+        expected = any(truth(formula, item) and truth(other, item) for item in others)
+        assert (manager.let(values, found) == manager.true) == expected
 
 
 def _chosen(manager: Any, names: tuple[str, ...], table: int) -> Any:

@@ -396,7 +396,7 @@ def assemble(
     if is_dry:
         base = DryBase(base, limits.separation_m, host.monotonic)
     lidar = None if configuration.scanner is None else range_scanner(configuration.scanner, host)
-    timing = Timing(host.monotonic, _line_counts(base, lidar))
+    timing = Timing(host.monotonic, _line_counts(base, lidar), decides_at_once=settings.every == "event")
     try:
         daemon = Daemon(job, safety, Rotate(rotate), stop, host, log, feed, host.queue(), timing)
     except (DeploymentError, SettingsError) as error:

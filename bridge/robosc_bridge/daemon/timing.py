@@ -104,12 +104,18 @@ class Timing:
     Args:
         clock: Clock that returns the time, in seconds.
         lines: Functions that return the counts of a device's line, by device.
+        decides_at_once: True if the supervisor has decided on a scan once it has received it.
     """
 
     def __init__(
-        self, clock: Callable[[], float], lines: Mapping[str, Callable[[], Mapping[str, int]]] | None = None
+        self,
+        clock: Callable[[], float],
+        lines: Mapping[str, Callable[[], Mapping[str, int]]] | None = None,
+        *,
+        decides_at_once: bool = False,
     ) -> None:
         self._clock = clock
+        self._decides_at_once = decides_at_once
         self._lines = lines or {}
         self._histograms = {name: Histogram(name) for name in MEANINGS}
         # Of the loop: scan that no decision was made on yet, and whether one is being made.
@@ -128,6 +134,8 @@ class Timing:
 
     def scan_passed(self) -> None:
         """The executor has the scan."""
+        if self._decides_at_once:
+            self.decided()
         self._is_deciding = False
 
     def reading_taken(self, time_s: float) -> None:

@@ -114,6 +114,21 @@ def test_a_scan_that_is_decided_on_at_once_is_followed_too() -> None:
     timing.commanding()
     timing.scan_passed()
     assert timing.take_command() == 9.9
+    assert "scan_to_decision" not in measured(timing, clock)
+
+
+def test_a_decision_at_once_is_measured_when_it_is_made() -> None:
+    clock = Clock()
+    timing = Timing(clock, decides_at_once=True)
+    timing.scan_taken(9.9)
+    clock.now_s = 10.002
+    timing.scan_passed()
+    clock.now_s = 10.02
+    # The next period decides on no scan.
+    timing.deciding()
+    timing.decided()
+    assert measured(timing, clock)["scan_to_decision"].max_s == pytest.approx(0.102)
+    assert measured(timing, clock)["scan_to_decision"].count == 1
 
 
 def test_figures_are_worked_out_once_a_second() -> None:

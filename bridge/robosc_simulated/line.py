@@ -21,7 +21,7 @@ from robosc_simulated.virtual_host import VirtualHost
 # As much as the line discipline holds: what is beyond it waits deeper in the kernel, where no host can flush it, and
 # would be old news for the next one that opens the port.
 _BUFFER = 4095
-# Of a byte on the wire, with a start and a stop bit.
+# Bits of a byte on the wire, with a start and a stop bit.
 _BITS = 10
 # A world that passes faster is lived in fewer and larger pieces: a wake-up for each frame would be thousands a second.
 _COARSE_S = 0.002

@@ -284,7 +284,7 @@ def test_transforms_lead_from_the_odometry_to_the_laser(robot: SimulatedTurtleBo
             peer.spin_until(lambda: bool(heard.odometry), START_LIMIT_S, "readings", process)
             client.request(RequestedCommand.START)
             peer.spin_until(lambda: heard.odometry[-1][1].pose.pose.position.x > 0.1, LIMIT_S, "it to drive", process)
-            # Whoever comes late hears where the parts are, too.
+            # Late joiners receive the places of the parts, too.
             listen = workspace.python("-c", LISTENER)
             with RosProcess(listen, {}, tmp_path / "listener", program="/bin/bash") as listener:
 

@@ -160,6 +160,18 @@ def _rotate(file: Path) -> None:
             part(file, number - 1).replace(part(file, number))
 
 
+def _read(line: Port | NetworkPort, limit_s: float, tap: Tap) -> bytes:
+    """Return what has come on a line, recorded; so is the end of the line."""
+    try:
+        data = line.read(limit_s)
+    except LineError as error:
+        tap(Kind.EVENTS, event("lost line", problem=error.problem))
+        raise
+    if data:
+        tap(Kind.IN, data)
+    return data
+
+
 class RecordedPort:
     """A serial port whose bytes are recorded: a `Port`.
 
@@ -184,14 +196,7 @@ class RecordedPort:
 
     def read(self, limit_s: float) -> bytes:
         """Return what has come, waiting for the first byte."""
-        try:
-            data = self._port.read(limit_s)
-        except LineError as error:
-            self._tap(Kind.EVENTS, event("lost line", problem=error.problem))
-            raise
-        if data:
-            self._tap(Kind.IN, data)
-        return data
+        return _read(self._port, limit_s, self._tap)
 
     def write(self, data: bytes, limit_s: float = 0.1) -> None:
         """Send all of it."""
@@ -250,14 +255,7 @@ class RecordedNetwork(NetworkPort):
 
     def read(self, limit_s: float) -> bytes:
         """Return what has come, waiting for the first of it."""
-        try:
-            data = self._line.read(limit_s)
-        except LineError as error:
-            self._tap(Kind.EVENTS, event("lost line", problem=error.problem))
-            raise
-        if data:
-            self._tap(Kind.IN, data)
-        return data
+        return _read(self._line, limit_s, self._tap)
 
     def reply(self, data: bytes) -> None:
         """Send one datagram to where the last one came from."""

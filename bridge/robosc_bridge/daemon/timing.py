@@ -118,7 +118,7 @@ class Timing:
         self._decides_at_once = decides_at_once
         self._lines = lines or {}
         self._histograms = {name: Histogram(name) for name in MEANINGS}
-        # Of the loop: scan that no decision was made on yet, and whether one is being made.
+        # Scan that the loop has not decided on yet, and whether it is deciding.
         self._scan_s: float | None = None
         self._is_deciding = False
         self._decided_s: float | None = None

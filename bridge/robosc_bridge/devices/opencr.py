@@ -44,7 +44,7 @@ _CALIBRATION_LIMIT_S = 6.0
 _SLOW_LIMIT_S = 0.65
 # Exchanges in a row without an answer after which it is seen whether the board is slow.
 _SILENT_LIMIT = 3
-# Of buttons that drive when they are held for 3 s: for half of that, there is time to let go.
+# Time after which a held button is warned of: half of the 3 s after which it drives, so that one can let go.
 _HELD_S = 1.5
 _DRIVES = {"button_1": "0.3 m forward", "button_2": "half a turn to the right"}
 _REST_RAW = 2
@@ -110,7 +110,7 @@ class OpenCrBase:
         self._silent = 0
         self._late = 0
         self._asked_s = 0.0
-        # Whether the board was too slow last: what it was asked then may still be answered in the next session.
+        # True if the board was too slow last: old requests may still be answered in the next session.
         self._is_slow = False
 
     @property
@@ -211,7 +211,7 @@ class OpenCrBase:
             DeviceError: The wheels do not come to rest.
         """
         self._is_torque_wanted = False
-        # What does not obey does not come to rest either.
+        # Wheels that do not obey do not come to rest either.
         is_awaited = is_on or not self._is_driven_otherwise
         self._is_driven_otherwise = False
         if is_awaited and not self._comes_to_rest() and is_on:
@@ -346,7 +346,7 @@ class OpenCrBase:
     def _check_identity(self, bus: DynamixelBus) -> None:
         bus.begin(self._exchange_limit_s)
         model, firmware = bus.ping(opencr.DEVICE)
-        # What came before may have been an answer to another session.
+        # An earlier answer may have been one to another session.
         bus.settle(opencr.DEVICE)
         if model != opencr.MODEL_NUMBER:
             raise WrongDeviceError(f"{self._path}: this is device model {model}, not an OpenCR ({opencr.MODEL_NUMBER})")

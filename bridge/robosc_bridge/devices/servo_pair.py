@@ -81,7 +81,7 @@ class ServoPair:
     def _write_modes(self, drive_modes: tuple[int, int]) -> None:
         for motor, mode in zip(self.motors, drive_modes, strict=True):
             self._bus.begin(self._limit_s)
-            # What came before may have been an answer to another session.
+            # An earlier answer may have been one to another session.
             self._bus.settle(motor)
             if self._bus.read(motor, servo.DRIVE_MODE, 1).data[0] != mode:
                 # It lets nothing of its EEPROM be written while it has torque, and must not drive meanwhile.

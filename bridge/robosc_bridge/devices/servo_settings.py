@@ -48,7 +48,7 @@ def read_settings(bus: DynamixelBus, device: int, name: str, is_mirrored: bool, 
     """
     bus.begin(limit_s)
     model_number, firmware = bus.ping(device)
-    # What came before may have been an answer to another session.
+    # An earlier answer may have been one to another session.
     bus.settle(device)
     if model_number not in SERVOS:
         known = ", ".join(f"{model} ({number})" for number, model in sorted(SERVOS.items()))

@@ -111,7 +111,7 @@ def _ask(question: str) -> str:
     return sys.stdin.readline().strip()
 
 
-# What is plugged in.
+# Devices that are plugged in.
 
 
 def _probe(arguments: argparse.Namespace, host: Host = SYSTEM_HOST) -> int:

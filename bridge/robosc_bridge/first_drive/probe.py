@@ -173,7 +173,7 @@ def _lidar(path: str, host: Host, model: Model[Any]) -> Iterator[FoundDevice]:
         scan, end_s = None, host.monotonic() + _SCAN_S
         while scan is None and host.monotonic() < end_s:
             scan = scanner.receive(end_s - host.monotonic())
-            # Where another device speaks, there are no frames either: it is not waited for.
+            # Another device sends no frames either: it is not waited for.
             if scan is None and not scanner.counters.frames and host.monotonic() > end_s - _SCAN_S / 2:
                 break
         baud, counters = scanner.baud, scanner.counters

@@ -137,7 +137,7 @@ def read_servo(bus: DynamixelBus, device: int, baud: int, model_number: int, fir
         registers["voltage_v"] /= 10
     problems = list(_problems(registers, baud))
     try:
-        # What the driver itself would say.
+        # Problems that the driver itself would report.
         read_settings(bus, device, f"servo {device}", device % 2 == 0, LIMIT_S)
     except WrongDeviceError as error:
         problems.append(str(error))

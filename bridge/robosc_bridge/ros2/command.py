@@ -106,7 +106,7 @@ def _metres(text: str) -> float:
     return number
 
 
-# How argparse calls them in "invalid ... value".
+# Name that argparse uses in "invalid ... value".
 _rate.__name__ = _metres.__name__ = "number"
 
 

@@ -64,7 +64,8 @@ def has_few_fields(content: bytes, nested: Nested, limit: int) -> bool:
                 size, place = content[place], place + 1
                 if size >= _MORE:
                     size, place = _varint(content, place - 1)
-                inner = nested.get(tag >> 3)
+                # The parser knows no field of a group, and reads none of the messages that its content might be.
+                inner = None if groups else nested.get(tag >> 3)
                 if inner is None:
                     place += size
                 elif size:

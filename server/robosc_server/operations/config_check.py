@@ -40,6 +40,7 @@ from robosc_server.signing import SigningError, read_signing_key
 from robosc_server.store.errors import StoreError
 from robosc_server.store.factory import DATABASE_FILE, is_in_use
 from robosc_server.store.inspection import inspect_postgresql, inspect_sqlite
+from robosc_server.store.migrate import latest_version
 
 _CONNECT_S = 5.0
 _TRY_S = 20.0
@@ -194,14 +195,22 @@ def _postgresql(text: str) -> tuple[Grade, str]:
     try:
         url = make_url(text)
         name = url.render_as_string(hide_password=True)
-        version = inspect_postgresql(url, _CONNECT_S)
+        server, version = inspect_postgresql(url, _CONNECT_S)
     except (ArgumentError, ValueError):
         return Grade.ERROR, "database_url must have the form postgresql://USER:PASSWORD@HOST:PORT/NAME"
     except (ImportError, NoSuchModuleError):
         return Grade.ERROR, "PostgreSQL needs the extra `postgresql`: pip install 'robosc[postgresql]'"
     except StoreError as error:
         return Grade.ERROR, f"{name}: {error}"
-    return Grade.OK, f"{name}: PostgreSQL {version}"
+    return Grade.OK, f"{name}: PostgreSQL {server}{_migration(version)}"
+
+
+def _migration(version: int | None) -> str:
+    """Return a clause about the migration at the next start; empty: there will be none."""
+    latest = latest_version()
+    if version is None or version == latest:
+        return ""
+    return f"; the next start migrates the tables from schema version {version} to {latest}"
 
 
 def _sqlite(file: Path) -> tuple[Grade, str]:
@@ -215,13 +224,12 @@ def _sqlite(file: Path) -> tuple[Grade, str]:
         if problem is not None:
             return Grade.ERROR, f"{there} cannot be written: {problem}"
         is_there = file.exists()
-        if is_there:
-            inspect_sqlite(file)
+        version = inspect_sqlite(file) if is_there else None
         if is_in_use(file):
             return Grade.WARNING, f"{file} is in use by another robosc-server"
     except (OSError, StoreError) as error:
         return Grade.ERROR, f"{file}: {getattr(error, 'strerror', None) or error}"
-    return Grade.OK, f"SQLite in {file}" if is_there else f"{file} will be created"
+    return Grade.OK, f"SQLite in {file}{_migration(version)}" if is_there else f"{file} will be created"
 
 
 def _unwritable(folder: Path) -> str | None:

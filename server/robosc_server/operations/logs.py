@@ -30,7 +30,7 @@ _LEVELS = {
     LogLevel.ERROR: logging.ERROR,
 }
 # Their lines at the level info help only their developers.
-_VERBOSE_LIBRARIES = ("asyncio", "distributed", "opentelemetry", "sqlalchemy")
+_VERBOSE_LIBRARIES = ("alembic", "asyncio", "distributed", "opentelemetry", "sqlalchemy")
 _FRAMES = 12
 _PLAIN = re.compile(r"[A-Za-z0-9._:/+@,%'()\[\]-]+\Z")
 

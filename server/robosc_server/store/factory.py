@@ -20,7 +20,7 @@ from sqlalchemy.exc import ArgumentError, DBAPIError, NoSuchModuleError
 from robosc_server.clock import wall_clock_s
 from robosc_server.store.database import Database
 from robosc_server.store.errors import StoreError
-from robosc_server.store.schema import prepare
+from robosc_server.store.migrate import prepare
 from robosc_server.store.store import Store
 
 DATABASE_FILE = "jobs.sqlite"

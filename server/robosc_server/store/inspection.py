@@ -7,13 +7,13 @@ from sqlalchemy.exc import DBAPIError
 from sqlalchemy.pool import NullPool
 
 from robosc_server.store.errors import StoreError
-from robosc_server.store.schema import version_of
+from robosc_server.store.migrate import version_of
 
 _BUSY_S = 1.0
 
 
-def inspect_sqlite(file: Path) -> None:
-    """Inspect an existing file; a server may have it open.
+def inspect_sqlite(file: Path) -> int | None:
+    """Inspect an existing file, which a server may have open, and return its schema version; None: it has no tables.
 
     Raises:
         StoreError: It is no database that a server of this version can use.
@@ -23,11 +23,11 @@ def inspect_sqlite(file: Path) -> None:
     has_log = _has_content(file.with_name(f"{file.name}-wal"))
     options = {"uri": "true", "mode": "ro"} | ({} if has_log else {"immutable": "1"})
     url = URL.create("sqlite+pysqlite", database=file.as_uri(), query=options)
-    _query(create_engine(url, poolclass=NullPool, connect_args={"timeout": _BUSY_S}))
+    return _query(create_engine(url, poolclass=NullPool, connect_args={"timeout": _BUSY_S}))[1]
 
 
-def inspect_postgresql(url: URL, connect_s: float) -> str:
-    """Inspect a PostgreSQL database and return the version of its server.
+def inspect_postgresql(url: URL, connect_s: float) -> tuple[str, int | None]:
+    """Inspect a PostgreSQL database; return the version of its server and its schema version; None: it has no tables.
 
     Args:
         url: URL of the database.
@@ -47,17 +47,17 @@ def inspect_postgresql(url: URL, connect_s: float) -> str:
     return _query(engine, "SHOW server_version")
 
 
-def _query(engine: Engine, statement: str = "SELECT sqlite_version()") -> str:
-    """Return a database's answer to a statement, if its tables are missing or ours."""
+def _query(engine: Engine, statement: str = "SELECT sqlite_version()") -> tuple[str, int | None]:
+    """Return a database's answer to a statement, and its schema version, if its tables are missing or ours."""
     try:
         with engine.connect() as connection:
             answer = str(connection.scalar(text(statement)))
-            version_of(connection)
+            version = version_of(connection)
     except DBAPIError as error:
         raise StoreError(" ".join(str(error.orig).split())) from error
     finally:
         engine.dispose()
-    return answer
+    return answer, version
 
 
 def _has_content(file: Path) -> bool:

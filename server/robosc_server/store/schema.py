@@ -1,5 +1,6 @@
-"""Tables of the database, the same in SQLite and PostgreSQL, and their schema version.
+"""Tables of the database, the same in SQLite and PostgreSQL.
 
+The scripts of `robosc_server/store/migrations/` make them, and number their schema versions; `migrate.py` runs them.
 Times are microseconds since 1970, in UTC. Requests and result messages have separate tables, so that lists and sweeps
 read no large values.
 """
@@ -8,7 +9,6 @@ from sqlalchemy import (
     BigInteger,
     Boolean,
     Column,
-    Connection,
     ForeignKey,
     Index,
     Integer,
@@ -17,23 +17,11 @@ from sqlalchemy import (
     Table,
     Text,
     UniqueConstraint,
-    insert,
-    inspect,
-    select,
-    text,
-    update,
 )
-
-from robosc_server.store.errors import StoreError
-
-VERSION = 2
-"""Schema version of the tables below. Earlier versions are upgraded; a later version is refused."""
-
-_LOCK = 0x726F626F7363
-"""PostgreSQL advisory lock for creating tables: several servers may start at the same time."""
 
 METADATA = MetaData()
 
+# Versions of RoboSC from before the migrations look here, and refuse tables that are newer than they are.
 SCHEMA = Table("robosc_schema", METADATA, Column("version", Integer, nullable=False))
 
 # Servers that share this database, with their heartbeats.
@@ -110,59 +98,3 @@ REQUESTS = Table(
     Column("job", Text, ForeignKey("jobs.id", ondelete="CASCADE"), primary_key=True),
     Column("content", LargeBinary, nullable=False),
 )
-
-
-# Upgrades from each version to the next. Running servers of the earlier version continue to work.
-_STEPS = {
-    1: (
-        "ALTER TABLE results ADD COLUMN owner TEXT NOT NULL DEFAULT ''",
-        "UPDATE results SET owner = COALESCE((SELECT MIN(owner) FROM jobs WHERE jobs.result_key = results.key), '')",
-        "CREATE INDEX results_of_owners ON results (owner, used_us)",
-        "DROP INDEX results_used",
-        "ALTER TABLE jobs ADD COLUMN losses INTEGER NOT NULL DEFAULT 0",
-        "CREATE INDEX jobs_ended ON jobs (owner, ended_us)",
-    ),
-}
-
-
-def prepare(connection: Connection) -> None:
-    """Make the tables, or bring them up to this version.
-
-    Raises:
-        StoreError: They are not.
-    """
-    if connection.dialect.name == "postgresql":
-        connection.execute(text("SELECT pg_advisory_xact_lock(:lock)"), {"lock": _LOCK})
-    version = version_of(connection)
-    if version is None:
-        METADATA.create_all(connection)
-        connection.execute(insert(SCHEMA).values(version=VERSION))
-        return
-    for earlier in range(version, VERSION):
-        for step in _STEPS[earlier]:
-            connection.execute(text(step))
-    if version != VERSION:
-        connection.execute(update(SCHEMA).values(version=VERSION))
-
-
-def version_of(connection: Connection) -> int | None:
-    """Return the version of the existing tables, usable here or after an upgrade; None: there are no tables.
-
-    Only reads.
-
-    Raises:
-        StoreError: There are other tables.
-    """
-    names = set(inspect(connection).get_table_names())
-    if SCHEMA.name not in names:
-        if names & set(METADATA.tables):
-            raise StoreError("foreign tables use RoboSC's table names: use another database")
-        return None
-    versions = list(connection.scalars(select(SCHEMA.c.version)))
-    if len(versions) == 1 and (versions[0] == VERSION or versions[0] in _STEPS):
-        return int(versions[0])
-    found = versions[0] if len(versions) == 1 else "unknown"
-    raise StoreError(
-        f"the tables have schema version {found}, but this server supports version {VERSION} and earlier: use the "
-        "version of RoboSC that created them, or another database"
-    )

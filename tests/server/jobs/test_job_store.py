@@ -50,16 +50,11 @@ def test_what_is_kept_is_for_its_owner_alone(tmp_path: Path) -> None:
         store.close()
 
 
-def test_a_newer_or_foreign_database_is_not_touched(tmp_path: Path) -> None:
+def test_a_foreign_database_is_not_touched(tmp_path: Path) -> None:
     open_store(tmp_path).close()
     path = tmp_path / "jobs.sqlite"
     with sqlite3.connect(path) as connection:
-        connection.execute("UPDATE robosc_schema SET version = 3")
-    connection.close()
-    with pytest.raises(StoreError, match="version 3, but this server supports version 2"):
-        open_store(tmp_path)
-    with sqlite3.connect(path) as connection:
-        connection.execute("DROP TABLE robosc_schema")
+        connection.executescript("DROP TABLE robosc_schema; DROP TABLE robosc_migrations")
     connection.close()
     with pytest.raises(StoreError, match="foreign tables"):
         open_store(tmp_path)

@@ -22,8 +22,9 @@ from robosc_server.operations.settings import Settings, settings_from, variable_
 from robosc_server.operations.settings_reference import example_file
 from robosc_server.store import StoreError, open_store
 from robosc_server.store.factory import DATABASE_FILE
-from robosc_server.store.schema import VERSION
+from robosc_server.store.migrate import latest_version
 from support.certificates import Authority
+from support.earlier_databases import script_of
 from support.held_store import held_store
 from support.job_workers import StartedWorkers
 from support.postgresql import postgresql
@@ -186,7 +187,7 @@ def test_tables_of_another_version_are_told_and_nothing_is_left_behind(
     store.close()
     assert open_now == [("warning", f"{state / DATABASE_FILE} is in use by another robosc-server")]
     assert found() == [("ok", f"SQLite in {state / DATABASE_FILE}")]
-    newer = "UPDATE robosc_schema SET version = version + 1"
+    newer = "UPDATE robosc_migrations SET version_num = '999'"
     # In the log of changes, which a server that was killed leaves, and later in the file itself.
     with contextlib.closing(sqlite3.connect(state / DATABASE_FILE)) as connection:
         connection.execute(newer)
@@ -200,7 +201,17 @@ def test_tables_of_another_version_are_told_and_nothing_is_left_behind(
     with pytest.raises(StoreError) as refused:
         open_store(state)
     assert message.removeprefix(f"{state / DATABASE_FILE}: ") in str(refused.value)
-    assert f"version {VERSION + 1}, but this server supports version {VERSION} and earlier" in message
+    assert f"version 999, but this server supports version {latest_version()} and earlier" in message
+
+
+def test_a_migration_is_announced(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    with contextlib.closing(sqlite3.connect(tmp_path / DATABASE_FILE)) as connection:
+        connection.executescript(script_of(1, "sqlite"))
+    told = f"; the next start migrates the tables from schema version 1 to {latest_version()}"
+    found = Checked(capsys, "--state-dir", str(tmp_path)).of("database")
+    assert found == [("ok", f"SQLite in {tmp_path / DATABASE_FILE}{told}")]
+    open_store(tmp_path).close()
+    assert Checked(capsys, "--state-dir", str(tmp_path)).of("database") == [("ok", found[0][1].removesuffix(told))]
 
 
 def test_a_database_that_a_running_server_has(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -273,11 +284,11 @@ def test_tables_of_another_version_in_postgresql(capsys: pytest.CaptureFixture[s
         assert (grade, "PostgreSQL" in message) == ("ok", True)
         engine = create_engine(url.replace("postgresql://", "postgresql+psycopg://"))
         with engine.begin() as connection:
-            connection.execute(text("UPDATE robosc_schema SET version = version + 1"))
+            connection.execute(text("UPDATE robosc_migrations SET version_num = '999'"))
         engine.dispose()
         ((grade, message),) = Checked(capsys, "--database-url", url).of("database")
         assert grade == "error"
-        assert f"version {VERSION + 1}, but this server supports version {VERSION} and earlier" in message
+        assert f"version 999, but this server supports version {latest_version()} and earlier" in message
         assert Checked(capsys, "--database-url", url.replace("test0", "nowhere")).grade("database") == "error"
 
 

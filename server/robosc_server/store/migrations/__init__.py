@@ -1,0 +1,1 @@
+"""Migrations of the database, one for each schema version, run by Alembic."""

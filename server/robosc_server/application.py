@@ -16,6 +16,7 @@ from robosc_api.layers import Layers
 from robosc_api.malformed import MalformedRequests
 from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts
 from robosc_api.security import Guard, Rule, Scope, SecurityError, TokenFile, add_port, caller_of, token_or_host_of
+from robosc_server.clock import wall_clock_s
 from robosc_server.jobs import (
     JOB_METHODS,
     JOB_SERVICE_NAME,
@@ -110,7 +111,11 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     if settings.metrics_address:
         check_metrics_address(settings.metrics_address, beyond_loopback=settings.metrics_beyond_loopback)
     finish = _finish(settings)
-    tokens = None if settings.tokens is None else TokenFile(settings.tokens, needed=Scope.SYNTHESIZE)
+    tokens = (
+        None
+        if settings.tokens is None
+        else TokenFile(settings.tokens, needed=Scope.SYNTHESIZE, wall_clock=wall_clock_s)
+    )
     request_limits = RequestLimits(
         bundle_bytes=settings.bundle_bytes, bundle_files=settings.bundle_files, nodes=settings.task_nodes
     )
@@ -199,6 +204,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         running=lambda: scheduler.running,
         jobs=lambda: {str(state): count for state, count in manager.counts.items()},
         conditions=health.conditions,
+        expiries=dict if tokens is None else tokens.seconds_to_expiry,
         restarts=lambda: getattr(workers, "restarts", 0),  # A cluster restarts its own workers.
     )
     await stack.enter_async_context(

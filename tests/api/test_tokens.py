@@ -82,11 +82,15 @@ def test_a_token_has_a_scope() -> None:
         ("robosc_secret", "tokens:1: expected NAME SCOPE,SCOPE sha256:DIGEST"),
         ("a watch sha256:1234", "tokens:1: expected NAME"),
         (f"a fly sha256:{'0' * 64}", "unknown scope 'fly': use watch, operate, synthesize, admin"),
-        (f"a watch sha256:{'0' * 64} secret", "tokens:1: only waiting=N, per_minute=N, cpu_"),
+        (f"a watch sha256:{'0' * 64} secret", "tokens:1: only expires=TIME, waiting=N, per_minute=N, cpu_"),
         (f"a watch sha256:{'0' * 64} waiting=secret", "tokens:1: waiting must be a whole number from 1 to"),
         (f"a watch sha256:{'0' * 64} waiting=0", "tokens:1: waiting must be a whole number from 1 to"),
         (f"a watch sha256:{'0' * 64} waiting=1 waiting=2", "tokens:1: waiting occurs twice"),
-        (f"a watch sha256:{'0' * 64}\na watch sha256:{'1' * 64}", "tokens:2: the name 'a' occurs twice"),
+        (f"a watch sha256:{'0' * 64}\nb watch sha256:{'0' * 64}", "tokens:2: the same token occurs twice"),
+        (f"a watch sha256:{'0' * 64}\na watch sha256:{'1' * 64} calls=1", "tokens:2: another token of 'a' has other"),
+        (f"a watch sha256:{'0' * 64} expires=2027-01-31", "tokens:1: expires must be a time in UTC such as"),
+        (f"a watch sha256:{'0' * 64} expires=2027-02-30T00:00:00Z", "tokens:1: expires must be a time in UTC such as"),
+        (f"a watch sha256:{'0' * 64}{2 * ' expires=2027-01-31T00:00:00Z'}", "tokens:1: expires occurs twice"),
     ],
 )
 def test_a_wrong_line_is_told_without_what_stands_there(text: str, problem: str) -> None:
@@ -135,7 +139,7 @@ def test_that_nobody_is_let_in_is_told_once_each_time_it_becomes_so(
         written(tmp_path, *lines)
         clock.now_s = number
         assert len(tokens.entries) == len(lines)
-        told = caplog.text.count(f"{file}: no token has the scope 'synthesize', so every call is refused")
+        told = caplog.text.count(f"{file}: no valid token has the scope 'synthesize', so every call is refused")
         assert told == times, lines
     caplog.clear()
     TokenFile(written(tmp_path, *useless))

@@ -276,6 +276,33 @@ class TestTokens:
         assert "the token 'caller' is not for" in caplog.text
         assert secret not in caplog.text + "".join(capfd.readouterr())
 
+    def test_a_token_that_has_expired_is_told(self, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+        token, line = make_token("caller", (Scope.SYNTHESIZE,), expires_s=1_000_000_000)
+        other, tokens = token_in(tmp_path, Scope.SYNTHESIZE, name="other")
+        tokens.write_text(f"{line}\n{tokens.read_text()}")
+        expired = tmp_path / "expired"
+        expired.write_text(token)
+        with serving(ServerSecurity(tokens=tokens)) as address:
+            for _ in range(3):
+                with pytest.raises(RequestRefusedError, match="has expired at 2001-09-09T01:46:40Z") as caught:
+                    check(address, token_file=expired)
+                assert caught.value.reason == "TOKEN_EXPIRED"
+            check(address, token_file=other)
+        assert caplog.text.count("of 'caller' has expired at 2001-09-09T01:46:40Z and is still used") == 1
+
+    def test_two_tokens_of_an_owner_are_one_caller(self, tmp_path: Path) -> None:
+        made = [make_token("caller", (Scope.SYNTHESIZE,)) for _ in range(2)]
+        _, tokens = token_in(tmp_path, Scope.SYNTHESIZE)
+        tokens.write_text("".join(f"{line}\n" for _, line in made))
+        files = [tmp_path / "first", tmp_path / "second"]
+        for file, (token, _) in zip(files, made, strict=True):
+            file.write_text(token)
+        with serving(ServerSecurity(tokens=tokens)) as address:
+            with Client(address, Credentials(token_file=files[0]), retries=ONCE) as client:
+                job = client.submit(Check(bundle_of("a"))).job
+            with Client(address, Credentials(token_file=files[1]), retries=ONCE) as client:
+                assert client.get_job(job.id).owner == "caller"
+
 
 class TestQuotas:
     def test_beyond_its_quota_a_caller_is_told_when_to_come_again_and_others_go_on(self, tmp_path: Path) -> None:

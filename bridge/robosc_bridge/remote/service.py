@@ -51,7 +51,8 @@ _RULES = {
     "GetStatus": _WATCH,
     "Watch": _WATCH,
     # Whoever sees the robot may stop it: a stop in vain is a nuisance, one that is refused is an accident.
-    "Stop": Rule(),
+    # A stop that is refused is an accident, also where somebody has forgotten a new token.
+    "Stop": Rule(admits_expired=True),
     "Command": _OPERATE,
     "Attach": _OPERATE,
 }

@@ -1,4 +1,4 @@
-"""`robosc-bridge status|start|standby|stop|resume|reset|watch|teleop|token`: commands for a terminal."""
+"""`robosc-bridge status|start|standby|stop|resume|reset|watch|teleop|token|tokens`: commands for a terminal."""
 
 import argparse
 import json
@@ -14,8 +14,10 @@ from robosc_api.security import (
     SecurityError,
     add_client_arguments,
     add_token_arguments,
+    add_tokens_arguments,
     credentials_of,
     issue_token,
+    run_tokens,
 )
 from robosc_api.security.addresses import BRIDGE_PORT, with_port
 
@@ -30,7 +32,7 @@ _COMMANDS = {
     "resume": "let the robot go on after a stop",
     "reset": "clear faults whose cause is gone; standby follows",
 }
-NAMES = ("stop", *_COMMANDS, "status", "watch", "teleop", "token")
+NAMES = ("stop", *_COMMANDS, "status", "watch", "teleop", "token", "tokens")
 """Names of the commands."""
 
 
@@ -59,6 +61,10 @@ def add_commands(commands: Any) -> None:
     token = commands.add_parser("token", help="make a token for a caller of a bridge", epilog=EPILOG)
     add_token_arguments(token, (Scope.WATCH, Scope.OPERATE))
     token.set_defaults(run=_token)
+
+    tokens = commands.add_parser("tokens", help="keep the token file of a bridge: add, rotate, list, revoke")
+    add_tokens_arguments(tokens, (Scope.WATCH, Scope.OPERATE))
+    tokens.set_defaults(run=run_tokens)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

@@ -17,6 +17,7 @@ from robosc_api.security.client import Credentials, check_credentials, close_cha
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.guard import Guard, Rule
 from robosc_api.security.listening import ServerSecurity, add_port, check_files, check_listening
+from robosc_api.security.token_commands import add_tokens_arguments, run_tokens
 from robosc_api.security.tokens import Entry, Quota, Scope, TokenFile, make_token, missing_scope
 
 __all__ = [
@@ -34,6 +35,7 @@ __all__ = [
     "add_client_arguments",
     "add_port",
     "add_token_arguments",
+    "add_tokens_arguments",
     "caller_of",
     "check_credentials",
     "check_files",
@@ -50,5 +52,6 @@ __all__ = [
     "network_of",
     "open_async_channel",
     "open_channel",
+    "run_tokens",
     "token_or_host_of",
 ]

@@ -11,13 +11,24 @@ from robosc_api.failures import failure_metadata
 from robosc_api.layers import Layer, behaviour_of, with_behaviour, writing
 from robosc_api.security.addresses import is_loopback_peer
 from robosc_api.security.callers import CALLER, ENTRY
-from robosc_api.security.tokens import Entry, Scope, TokenFile
+from robosc_api.security.tokens import Entry, Scope, TokenFile, time_text
 
 _log = logging.getLogger(__name__)
 
 _HEALTH = "/grpc.health.v1.Health/"
-_NO_TOKEN = grpc.StatusCode.UNAUTHENTICATED, "a valid token is needed"
 _SCHEME = "bearer "
+
+
+@dataclass(frozen=True, slots=True)
+class _Refusal:
+    """Refusal of a call; without a reason, that is the name of the code."""
+
+    code: grpc.StatusCode
+    message: str
+    reason: str = ""
+
+
+_NO_TOKEN = _Refusal(grpc.StatusCode.UNAUTHENTICATED, "a valid token is needed")
 
 
 @dataclass(frozen=True, slots=True)
@@ -27,10 +38,12 @@ class Rule:
     Attributes:
         scopes: Scopes of which a token needs one; empty: any token.
         is_open: True to admit callers from other machines if neither tokens nor client certificates are required.
+        admits_expired: True to admit tokens that have expired.
     """
 
     scopes: frozenset[Scope] = frozenset()
     is_open: bool = True
+    admits_expired: bool = False
 
 
 class Guard(Layer):
@@ -55,7 +68,8 @@ class Guard(Layer):
         method: str = details.method
         if inner is None or method.startswith(_HEALTH):
             return inner
-        if self._tokens is not None and self._entry(self._tokens, details.invocation_metadata) is None:
+        rule = self._rules.get(method, Rule())
+        if self._tokens is not None and self._entry(self._tokens, rule, details.invocation_metadata) is None:
             # Refuse at once: a handler of unary requests would wait for a request that may never arrive, and count as
             # an open call.
             return grpc.stream_stream_rpc_method_handler(self._refuse(method))
@@ -65,8 +79,7 @@ class Guard(Layer):
         async def refuse(requests: Any, context: Any) -> None:
             refusal = self._refusal(Rule(), method, context.invocation_metadata(), context.peer())
             # A token that has become valid meanwhile is refused once.
-            code, message = refusal or _NO_TOKEN
-            await context.abort(code, message, failure_metadata(code, message, code.name, context=context))
+            await _abort(context, refusal or _NO_TOKEN)
 
         return refuse
 
@@ -79,40 +92,61 @@ class Guard(Layer):
         async def admit(context: Any) -> None:
             refusal = self._refusal(rule, method, context.invocation_metadata(), context.peer())
             if refusal is not None:
-                code, message = refusal
-                await context.abort(code, message, failure_metadata(code, message, code.name, context=context))
+                await _abort(context, refusal)
 
         answer = behaviour_of(inner)
         return with_behaviour(inner, _guarded(writing(answer) if inner.response_streaming else answer, admit))
 
-    def _refusal(self, rule: Rule, method: str, metadata: Any, peer: str) -> tuple[grpc.StatusCode, str] | None:
+    def _refusal(self, rule: Rule, method: str, metadata: Any, peer: str) -> _Refusal | None:
         """Return the reason why a call is not admitted; None: it is."""
         if self._tokens is None:
             if rule.is_open or self._has_client_certificates or is_loopback_peer(peer):
                 return None
-            return (
+            return _Refusal(
                 grpc.StatusCode.PERMISSION_DENIED,
                 "without tokens, only callers on the same machine may call this method",
             )
-        entry = self._entry(self._tokens, metadata)
+        entry = self._entry(self._tokens, rule, metadata)
         if entry is None:
+            expired = self._expired(self._tokens, metadata)
+            if expired is not None and expired.expires_s is not None:
+                message = f"the token has expired at {time_text(expired.expires_s)}: a new one is needed"
+                return _Refusal(grpc.StatusCode.UNAUTHENTICATED, message, "TOKEN_EXPIRED")
             _log.warning("%s: no valid token for %s", peer, method)
             return _NO_TOKEN
         if rule.scopes and not rule.scopes & entry.scopes:
             _log.warning("%s: the token '%s' is not for %s", peer, entry.name, method)
             wanted = " or ".join(f"'{scope}'" for scope in sorted(rule.scopes))
-            return grpc.StatusCode.PERMISSION_DENIED, f"the token's scope does not include {wanted}"
+            return _Refusal(grpc.StatusCode.PERMISSION_DENIED, f"the token's scope does not include {wanted}")
         CALLER.set(entry.name)
         ENTRY.set(entry)
         return None
 
-    @staticmethod
-    def _entry(tokens: TokenFile, metadata: Any) -> Entry | None:
-        given = [value for key, value in metadata or () if key.lower() == "authorization"]
-        # Several tokens are refused: a proxy may have added one of them.
-        if len(given) != 1 or not isinstance(given[0], str) or not given[0].lower().startswith(_SCHEME):
+    def _entry(self, tokens: TokenFile, rule: Rule, metadata: Any) -> Entry | None:
+        given = _token_of(metadata)
+        if given is None:
             return None
-        return tokens.find(given[0][len(_SCHEME) :].strip())
+        found = tokens.find(given)
+        return tokens.find_expired(given) if found is None and rule.admits_expired else found
+
+    @staticmethod
+    def _expired(tokens: TokenFile, metadata: Any) -> Entry | None:
+        given = _token_of(metadata)
+        return None if given is None else tokens.find_expired(given)
+
+
+def _token_of(metadata: Any) -> str | None:
+    """Return the token that a call came with; None: it came with none."""
+    given = [value for key, value in metadata or () if key.lower() == "authorization"]
+    # Several tokens are refused: a proxy may have added one of them.
+    if len(given) != 1 or not isinstance(given[0], str) or not given[0].lower().startswith(_SCHEME):
+        return None
+    return given[0][len(_SCHEME) :].strip()
+
+
+async def _abort(context: Any, refusal: _Refusal) -> None:
+    code, message, reason = refusal.code, refusal.message, refusal.reason or refusal.code.name
+    await context.abort(code, message, failure_metadata(code, message, reason, context=context))
 
 
 def _guarded(answer: Any, admit: Callable[[Any], Awaitable[None]]) -> Any:

@@ -1,4 +1,4 @@
-"""Commands beside serving: `robosc-server health`, `token`, `check-config` and `example-config`."""
+"""Commands beside serving: `robosc-server health`, `token`, `tokens`, `check-config` and `example-config`."""
 
 import argparse
 import json
@@ -6,8 +6,15 @@ import sys
 from collections.abc import Callable, Sequence
 from typing import Any
 
-from robosc.cli.running import Parser, guarded
-from robosc_api.security import Scope, SecurityError, add_token_arguments, issue_token
+from robosc.cli.running import Parser, guarded, parse
+from robosc_api.security import (
+    Scope,
+    SecurityError,
+    add_token_arguments,
+    add_tokens_arguments,
+    issue_token,
+    run_tokens,
+)
 from robosc_server.operations.settings import (
     Settings,
     SettingsError,
@@ -41,6 +48,7 @@ def run_command(words: Sequence[str]) -> int | None:
     commands: dict[str, Callable[[Sequence[str]], int]] = {
         "health": _health,
         "token": new_token,
+        "tokens": keep_tokens,
         "check-config": check_config,
         "example-config": print_example,
     }
@@ -56,7 +64,7 @@ def make_whole_parser() -> Parser:
 
     parser = make_parser()
     commands = parser.add_subparsers(metavar="COMMAND")
-    for made in (health_check.make_parser(), _token_parser(), _check_parser(), _example_parser()):
+    for made in (health_check.make_parser(), _token_parser(), _tokens_parser(), _check_parser(), _example_parser()):
         name = made.prog.rpartition(" ")[2]
         commands.add_parser(name, parents=[made], add_help=False, help=made.description)
     return parser
@@ -92,6 +100,21 @@ def new_token(argv: Sequence[str]) -> int:
         )
     sys.stderr.write(line)
     return 0
+
+
+def _tokens_parser() -> Parser:
+    parser = Parser(
+        prog="robosc-server tokens",
+        description="Keep the token file of a server, which reads it again within a second after a change.",
+        allow_abbrev=False,
+    )
+    add_tokens_arguments(parser, (Scope.SYNTHESIZE,), has_quotas=True)
+    return parser
+
+
+def keep_tokens(argv: Sequence[str]) -> int:
+    """List, add, rotate or revoke tokens of a file; the exit status."""
+    return run_tokens(parse(_tokens_parser(), argv))
 
 
 def _example_parser() -> Parser:

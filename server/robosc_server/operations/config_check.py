@@ -34,6 +34,8 @@ from robosc_api.security import (
 )
 from robosc_api.security.addresses import split_address
 from robosc_api.security.listening import read
+from robosc_api.security.tokens import SOON_S, lasting_longer, time_text
+from robosc_server.clock import wall_clock_s
 from robosc_server.operations.metrics import check_metrics_address
 from robosc_server.operations.settings import Confinement, Settings, format_value
 from robosc_server.signing import SigningError, read_signing_key
@@ -161,12 +163,23 @@ def _tokens(settings: Settings) -> Iterator[tuple[Grade, str]]:
     except SecurityError as error:
         yield Grade.ERROR, str(error)
         return
-    problem = missing_scope(entries, Scope.SYNTHESIZE)
-    useful = sum(Scope.SYNTHESIZE in entry.scopes for entry in entries)
+    now_s = wall_clock_s()
+    valid = [entry for entry in entries if entry.is_valid(now_s)]
+    problem = missing_scope(valid, Scope.SYNTHESIZE)
+    useful = sum(Scope.SYNTHESIZE in entry.scopes for entry in valid)
     if problem is not None:
         yield Grade.WARNING, f"{settings.tokens}: {problem}"
     else:
         yield Grade.OK, f"{settings.tokens}: tokens with the scope '{Scope.SYNTHESIZE}': {useful}"
+    for entry in entries:
+        if entry.expires_s is None or entry.is_valid(now_s + SOON_S):
+            continue
+        verb = "expires" if entry.is_valid(now_s) else "has expired"
+        words = f"{settings.tokens}: the token {entry.id} of '{entry.name}' {verb} at {time_text(entry.expires_s)}"
+        if lasting_longer(entry, entries) is None:
+            yield Grade.WARNING, f"{words}: robosc-server tokens rotate {settings.tokens} {entry.name}"
+        else:
+            yield Grade.OK, f"{words}; another one replaces it"
 
 
 def _signing(settings: Settings) -> Iterator[tuple[Grade, str]]:

@@ -116,6 +116,7 @@ class Metrics:
         self._jobs: Callable[[], Mapping[str, int]] = dict
         self._conditions: Callable[[], Mapping[str, bool]] = dict
         self._restarts: Callable[[], int] = _zero
+        self._expiries: Callable[[], Mapping[str, float]] = dict
         Gauge("robosc_server_tasks_waiting", "Tasks waiting for a worker.", registry=registry).set_function(
             lambda: self._waiting()
         )
@@ -179,6 +180,7 @@ class Metrics:
         jobs: Callable[[], Mapping[str, int]] | None = None,
         conditions: Callable[[], Mapping[str, bool]] | None = None,
         restarts: Callable[[], int] | None = None,
+        expiries: Callable[[], Mapping[str, float]] | None = None,
     ) -> None:
         """Set the functions that are called for each request for metrics, on the event loop: they must be quick.
 
@@ -188,12 +190,14 @@ class Metrics:
             jobs: Number of jobs, by state.
             conditions: Conditions that the service needs, and whether they hold.
             restarts: Number of times that the process that starts workers had to be started again.
+            expiries: Seconds until tokens expire, by id of the token.
         """
         self._waiting = waiting or self._waiting
         self._running = running or self._running
         self._jobs = jobs or self._jobs
         self._conditions = conditions or self._conditions
         self._restarts = restarts or self._restarts
+        self._expiries = expiries or self._expiries
 
     def labelled_metrics(self) -> Iterable[Metric]:
         """Return the metrics whose values are asked for, and that have labels."""
@@ -207,7 +211,14 @@ class Metrics:
             conditions.add_metric((name,), float(holds))
         restarts = CounterMetricFamily("robosc_server_worker_restarts", "Restarts of the fork server of the workers.")
         restarts.add_metric((), self._restarts())
-        return jobs, conditions, restarts
+        expiries = GaugeMetricFamily(
+            "robosc_server_token_seconds_to_expiry",
+            "Time until a token expires that no other token replaces; negative if it has expired.",
+            labels=("token",),
+        )
+        for token, seconds in sorted(self._expiries().items()):
+            expiries.add_metric((token,), seconds)
+        return jobs, conditions, restarts, expiries
 
     def text(self) -> bytes:
         """All of it, in the text format of Prometheus."""

@@ -486,6 +486,7 @@ def description_of(name: str) -> str:
 _EPILOG = f"""\
 commands:
   robosc-server token NAME       create a token for a caller
+  robosc-server tokens COMMAND   add, rotate, list or revoke the tokens of a file
   robosc-server check-config     check whether the server can start with these settings
   robosc-server example-config   print a settings file with every setting and its default
   robosc-server health           query the health of the server that runs with these settings

@@ -104,6 +104,17 @@ def test_scopes_over_tls(tmp_path: Path, authority: Authority) -> None:
         assert outcomes(address) == dict.fromkeys(CALLS, "UNAVAILABLE")
 
 
+def test_an_expired_token_can_only_stop(tmp_path: Path) -> None:
+    token, line = make_token("caller", (Scope.OPERATE,), expires_s=1_000_000_000)
+    tokens, file = tmp_path / "tokens", tmp_path / "token"
+    tokens.write_text(line)
+    tokens.chmod(0o600)
+    file.write_text(token)
+    with bridge(ServerSecurity(tokens=tokens)) as (daemon, address):
+        assert outcomes(address, token_file=file) == {**dict.fromkeys(CALLS, "UNAUTHENTICATED"), "Stop": ADMITTED}
+        assert [order.command for order in daemon.orders] == [OperatorCommand.STOP]
+
+
 def test_who_ordered_stands_in_the_log_by_name(tmp_path: Path) -> None:
     tokens, (operate,) = tokens_of(tmp_path, (Scope.OPERATE,))
     with bridge(ServerSecurity(tokens=tokens)) as (daemon, address):

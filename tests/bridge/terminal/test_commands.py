@@ -15,7 +15,7 @@ from typing import Any
 
 import pytest
 
-from robosc_api.security import Scope, ServerSecurity, make_token
+from robosc_api.security import Scope, ServerSecurity, TokenFile, make_token
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.main import main as robosc_bridge
@@ -85,7 +85,7 @@ class TestWishes:
         assert main(["start", "--address", address]) == 1
         assert capsys.readouterr().err == "robosc-bridge: reset it first or [31mnot\n"
 
-    @pytest.mark.parametrize("name", [name for name in NAMES if name not in ("token", "teleop")])
+    @pytest.mark.parametrize("name", [name for name in NAMES if name not in ("token", "tokens", "teleop")])
     def test_where_nobody_answers_it_is_status_2(self, name: str, capsys: pytest.CaptureFixture[str]) -> None:
         assert main([name, "--address", NOWHERE]) == 2
         errors = capsys.readouterr().err
@@ -174,6 +174,16 @@ class TestSecurity:
         assert made.out.strip() not in made.err
         assert main(["token", "not a name"]) == 2
         assert make_token("a", (Scope.WATCH,))[0] != made.out.strip()
+
+    def test_a_token_file_is_kept_by_commands(self, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+        file = tmp_path / "tokens"
+        assert main(["tokens", "add", str(file), "me"]) == 0
+        entry = TokenFile(file).find(capsys.readouterr().out.strip())
+        assert entry is not None and entry.scopes == {Scope.WATCH, Scope.OPERATE}
+        assert main(["tokens", "list", str(file)]) == 0
+        assert f"me    {entry.id}  operate,watch  never    valid" in capsys.readouterr().out
+        assert main(["tokens", "revoke", str(file), "you"]) == 2
+        assert capsys.readouterr().err == f"robosc-bridge: {file}: no token with the name or id 'you'\n"
 
 
 class TestStatus:

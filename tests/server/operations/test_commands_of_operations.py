@@ -15,8 +15,9 @@ import pytest
 from cryptography import x509
 from sqlalchemy import create_engine, text
 
-from robosc_api.security import Quota, Scope, make_token
-from robosc_api.security.tokens import parse_tokens
+from robosc_api.security import Quota, Scope, TokenFile, make_token
+from robosc_api.security.tokens import parse_tokens, read_time
+from robosc_server.operations import config_check
 from robosc_server.operations.commands import run_command
 from robosc_server.operations.settings import Settings, settings_from, variable_of
 from robosc_server.operations.settings_reference import example_file
@@ -356,10 +357,60 @@ def test_a_server_that_lets_nobody_in_says_so(tmp_path: Path, caplog: pytest.Log
     file = tmp_path / "tokens"
     file.write_text(make_token("watcher", (Scope.WATCH, Scope.ADMIN))[1])
     file.chmod(0o600)
-    words = f"{file}: no token has the scope 'synthesize', so every call is refused"
+    words = f"{file}: no valid token has the scope 'synthesize', so every call is refused"
     with served(given_workers=StartedWorkers(), tokens=file):
         pass
     assert caplog.text.count(words) == 1
+
+
+def test_tokens_that_expire_are_told(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    now_s = read_time("2026-11-26T12:00:00Z")
+    monkeypatch.setattr(config_check, "wall_clock_s", lambda: float(now_s))
+    file = tmp_path / "tokens"
+    days = {"past": -1, "soon": 13, "later": 15, "rotated": 2}
+    lines = [make_token(name, (Scope.SYNTHESIZE,), expires_s=now_s + 86400 * day)[1] for name, day in days.items()]
+    file.write_text("\n".join([*lines, make_token("rotated", (Scope.SYNTHESIZE,))[1]]))
+    file.chmod(0o600)
+    past, soon, _, rotated = (line.partition("sha256:")[2][:8] for line in lines)
+    assert Checked(capsys, "--tokens", str(file)).of("tokens") == [
+        ("ok", f"{file}: tokens with the scope 'synthesize': 4"),
+        (
+            "warning",
+            f"{file}: the token {past} of 'past' has expired at 2026-11-25T12:00:00Z: robosc-server tokens rotate "
+            f"{file} past",
+        ),
+        (
+            "warning",
+            f"{file}: the token {soon} of 'soon' expires at 2026-12-09T12:00:00Z: robosc-server tokens rotate {file} "
+            "soon",
+        ),
+        ("ok", f"{file}: the token {rotated} of 'rotated' expires at 2026-11-28T12:00:00Z; another one replaces it"),
+    ]
+    file.write_text(lines[0])
+    ((grade, message), _) = Checked(capsys, "--tokens", str(file)).of("tokens")
+    assert (grade, message) == (
+        "warning",
+        f"{file}: no valid token has the scope 'synthesize', so every call is refused",
+    )
+
+
+def test_the_token_file_is_kept_by_commands(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    file = tmp_path / "tokens"
+    assert run_command(["tokens", "add", str(file), "laptop", "--calls", "3", "--json"]) == 0
+    made = json.loads(capsys.readouterr().out)
+    entry = TokenFile(file).find(made["token"])
+    assert entry is not None and entry.scopes == {Scope.SYNTHESIZE} and entry.quota == Quota(calls=3)
+    assert run_command(["tokens", "revoke", str(file), "nobody", "--json"]) == 2
+    message = f"{file}: no token with the name or id 'nobody'"
+    found = capsys.readouterr()
+    assert json.loads(found.out) == {"error": {"status": 2, "message": message}}
+    assert found.err == f"robosc-server: {message}\n"
+    with pytest.raises(SystemExit) as caught:
+        run_command(["tokens", "list", "--json"])
+    assert caught.value.code == 2
+    assert json.loads(capsys.readouterr().out)["error"]["status"] == 2
 
 
 def test_what_is_no_command_means_to_serve() -> None:

@@ -53,6 +53,7 @@ def test_prometheus_can_read_them() -> None:
         jobs=lambda: {"queued": 5},
         conditions=lambda: {"store": False},
         restarts=lambda: 7,
+        expiries=lambda: {"0f5c1d2e": -1.5},
     )
     metrics.cache_hit("memory")
     metrics.cache_miss()
@@ -72,6 +73,7 @@ def test_prometheus_can_read_them() -> None:
             ("robosc_server_jobs", {"state": "queued"}, 5),
             ("robosc_server_condition", {"name": "store"}, 0),
             ("robosc_server_worker_restarts_total", {}, 7),
+            ("robosc_server_token_seconds_to_expiry", {"token": "0f5c1d2e"}, -1.5),
             ("robosc_server_result_lookups_total", {"found": "memory"}, 1),
             ("robosc_server_result_lookups_total", {"found": "store"}, 0),
         ]:

@@ -1,4 +1,8 @@
-"""gRPC health service: the health of a service follows from the conditions that it needs."""
+"""gRPC health service: the health of a service follows from the conditions that it needs.
+
+It is not the servicer of grpcio-health-checking (1.85), which writes to watchers while it holds the lock of a status:
+one watcher that takes no bytes, and needs no token, would keep every change from everybody, even that of a shutdown.
+"""
 
 import asyncio
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping

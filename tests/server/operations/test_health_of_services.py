@@ -1,6 +1,7 @@
 """Health that follows what services need, over a real server; and how a server ends."""
 
 import asyncio
+import struct
 from typing import Any
 
 import grpc
@@ -67,6 +68,69 @@ def test_a_watcher_is_told_each_change_once() -> None:
             assert (await other.read()).status == health_pb2.HealthCheckResponse.SERVICE_UNKNOWN
             for stream in (watch, other):
                 stream.cancel()
+
+    limited(run())
+
+
+def frame(kind: int, flags: int, stream: int, content: bytes) -> bytes:
+    """A frame of HTTP/2 (RFC 9113, 4.1)."""
+    return struct.pack(">I", len(content))[1:] + struct.pack(">BBI", kind, flags, stream) + content
+
+
+def watch_without_taking(service: str) -> bytes:
+    """The bytes of a caller that watches a service and lets nothing be sent to it: its window is 0."""
+    headers = {
+        ":method": "POST",
+        ":scheme": "http",
+        ":path": "/grpc.health.v1.Health/Watch",
+        ":authority": "x",
+        "content-type": "application/grpc",
+        "te": "trailers",
+    }
+    # Literal fields without indexing (RFC 7541, 6.2.2).
+    block = b"".join(
+        b"\x00" + b"".join(struct.pack(">B", len(text)) + text.encode() for text in field) for field in headers.items()
+    )
+    request = health_pb2.HealthCheckRequest(service=service).SerializeToString()
+    return b"".join(
+        (
+            b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n",
+            frame(4, 0, 0, struct.pack(">HI", 4, 0)),
+            frame(4, 1, 0, b""),
+            frame(1, 4, 1, block),
+            frame(0, 1, 1, struct.pack(">BI", 0, len(request)) + request),
+        )
+    )
+
+
+def test_a_watcher_that_takes_nothing_keeps_nobody_from_the_truth() -> None:
+    async def run() -> None:
+        health, ports, watching = Health(SERVICES), list[int](), asyncio.Event()
+        watch = health.Watch
+
+        async def noted(request: Any, context: Any) -> None:
+            watching.set()
+            await watch(request, context)
+
+        health.Watch = noted  # type: ignore[method-assign]
+
+        def listen(server: grpc.aio.Server) -> None:
+            with_health(health)(server)
+            ports.append(server.add_insecure_port("127.0.0.1:0"))
+
+        async with small_server(setup=listen) as (channel, server):
+            _, writer = await asyncio.open_connection("127.0.0.1", ports[0])
+            writer.write(watch_without_taking("robosc.Works"))
+            await watching.wait()
+            told = health_pb2_grpc.HealthStub(channel).Watch(health_pb2.HealthCheckRequest(service="robosc.Works"))
+            assert (await told.read()).status == NOT_SERVING
+            health.set_condition("workers", True)
+            assert (await told.read()).status == SERVING
+            assert await status(channel, "robosc.Works") == SERVING
+            await drain(server, health, CallInterceptor(Metrics("1")), 0.0)
+            assert not health.is_serving("robosc.Works")
+            told.cancel()
+            writer.close()
 
     limited(run())
 

@@ -1,12 +1,10 @@
 """Metrics of the bridge for Prometheus: its latest snapshot, over HTTP at /metrics."""
 
 import logging
-import threading
 from collections.abc import Iterator
 from itertools import accumulate
-from typing import TYPE_CHECKING
 
-from prometheus_client import CollectorRegistry, GCCollector, PlatformCollector, ProcessCollector, start_http_server
+from prometheus_client import CollectorRegistry, GCCollector, PlatformCollector, ProcessCollector
 from prometheus_client.core import (
     CounterMetricFamily,
     GaugeMetricFamily,
@@ -18,6 +16,7 @@ from prometheus_client.core import (
 from prometheus_client.registry import Collector
 
 from robosc._version import __version__
+from robosc_api.metrics_server import MetricsServer
 from robosc_api.security import SecurityError, ServerSecurity, check_listening
 from robosc_api.security.addresses import split_address
 from robosc_bridge.daemon.feed import Feed, Snapshot
@@ -25,10 +24,6 @@ from robosc_bridge.daemon.states import State
 from robosc_bridge.daemon.timing import BOUNDS_S, Latency
 from robosc_bridge.errors import BridgeError
 
-if TYPE_CHECKING:
-    from wsgiref.simple_server import WSGIServer
-
-_JOIN_S = 3.0
 _log = logging.getLogger(__name__)
 
 
@@ -61,7 +56,7 @@ class MetricsEndpoint:
         PlatformCollector(registry=self._registry)
         GCCollector(registry=self._registry)
         self._registry.register(_SnapshotCollector(feed))
-        self._served: tuple[WSGIServer, threading.Thread] | None = None
+        self._server: MetricsServer | None = None
 
     @property
     def address(self) -> str:
@@ -80,21 +75,19 @@ class MetricsEndpoint:
             MetricsError: The address cannot be used.
         """
         try:
-            server, thread = start_http_server(self._port, self._host, self._registry)
+            server = MetricsServer(self._registry, self._host, self._port)
+            server.start()
         except OSError as error:
             raise MetricsError(f"remote.metrics_address: {self.address} cannot be used: {error.strerror}") from error
-        self._served = server, thread
-        self._port = server.server_port
+        self._server = server
+        self._port = server.port
         _log.info("metrics at http://%s/metrics", self.address)
 
     def stop(self) -> None:
         """End serving."""
-        served, self._served = self._served, None
-        if served is not None:
-            server, thread = served
-            server.shutdown()
-            server.server_close()
-            thread.join(_JOIN_S)
+        server, self._server = self._server, None
+        if server is not None:
+            server.stop()
 
 
 class _SnapshotCollector(Collector):

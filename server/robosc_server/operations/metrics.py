@@ -1,7 +1,6 @@
 """Metrics of the server, for Prometheus: in a registry of its own, asked for over HTTP at /metrics."""
 
 import asyncio
-import contextlib
 from collections.abc import Callable, Iterable, Mapping
 from types import TracebackType
 from typing import Any, Self
@@ -20,8 +19,9 @@ from prometheus_client import (
     generate_latest,
 )
 from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
-from prometheus_client.exposition import CONTENT_TYPE_LATEST
+from prometheus_client.registry import Collector
 
+from robosc_api.metrics_server import MetricsServer
 from robosc_api.security import SecurityError, is_loopback_host, joined
 from robosc_api.security.addresses import split_address
 from robosc_server.tasks.task import Failure, Outcome, TaskKind
@@ -29,9 +29,8 @@ from robosc_server.tasks.task import Failure, Outcome, TaskKind
 _CALL_SECONDS = (0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 300, 600)
 _TASK_SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120, 300, 600)
 
-_HEAD_BYTES = 8192
-_HEAD_SECONDS = 5.0
-_CONNECTIONS = 16
+_COLLECT_S = 4.0
+"""Time for the event loop to tell the metrics, in seconds: less than a connection has."""
 
 
 class MethodMetrics:
@@ -220,6 +219,10 @@ class Metrics:
             expiries.add_metric((token,), seconds)
         return jobs, conditions, restarts, expiries
 
+    def collector(self, loop: asyncio.AbstractEventLoop) -> Collector:
+        """Return a collector of all metrics for other threads; it asks for them on the event loop."""
+        return _OnLoop(self._registry, loop)
+
     def text(self) -> bytes:
         """All of it, in the text format of Prometheus."""
         return generate_latest(self._registry)
@@ -236,9 +239,39 @@ class _LabelledCollector:
     def collect(self) -> Iterable[Metric]:
         return self._metrics.labelled_metrics()
 
+    # By the names that this tells, a scraper can ask for a part of the metrics.
+    describe = collect
+
+
+class _OnLoop(Collector):
+    """Collector that asks a registry on the event loop, for the threads of the endpoint.
+
+    Args:
+        registry: Registry of the metrics, or a part of one.
+        loop: Event loop of the server.
+    """
+
+    def __init__(self, registry: Any, loop: asyncio.AbstractEventLoop) -> None:
+        self._registry, self._loop = registry, loop
+
+    def collect(self) -> Iterable[Metric]:
+        """Return the metrics.
+
+        Raises:
+            TimeoutError: The loop does not answer in time.
+        """
+        return asyncio.run_coroutine_threadsafe(self._collected(), self._loop).result(_COLLECT_S)
+
+    async def _collected(self) -> list[Metric]:
+        return list(self._registry.collect())
+
+    def restricted_registry(self, names: Iterable[str]) -> Self:
+        """Return a collector of the metrics with some names."""
+        return type(self)(self._registry.restricted_registry(names), self._loop)
+
 
 class MetricsEndpoint:
-    """HTTP/1.1 endpoint for Prometheus: one GET of /metrics for each connection; an asynchronous context.
+    """HTTP endpoint for Prometheus at /metrics; an asynchronous context.
 
     Args:
         metrics: Metrics that it shows.
@@ -252,8 +285,7 @@ class MetricsEndpoint:
     def __init__(self, metrics: Metrics, address: str, *, beyond_loopback: bool = False) -> None:
         self._metrics = metrics
         self._beyond_loopback = beyond_loopback
-        self._server: asyncio.Server | None = None
-        self._connections: set[asyncio.StreamWriter] = set()
+        self._server: MetricsServer | None = None
         self.address = address
 
     async def __aenter__(self) -> Self:
@@ -264,13 +296,15 @@ class MetricsEndpoint:
         """
         check_metrics_address(self.address, beyond_loopback=self._beyond_loopback)
         host, port = split_address(self.address)
+        server = MetricsServer(self._metrics.collector(asyncio.get_running_loop()), host, port)
         try:
-            self._server = await asyncio.start_server(self._answer, host, port, limit=_HEAD_BYTES)
+            await asyncio.to_thread(server.start)
         except OSError as error:
             raise SecurityError(
                 f"the metrics endpoint cannot listen on {self.address}: {error.strerror or error}"
             ) from error
-        self.address = joined(host, self._server.sockets[0].getsockname()[1])
+        self._server = server
+        self.address = joined(host, server.port)
         structlog.get_logger().info("metrics endpoint is listening", address=self.address)
         return self
 
@@ -278,42 +312,8 @@ class MetricsEndpoint:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._server is not None:
-            self._server.close()
-            for writer in tuple(self._connections):
-                writer.transport.abort()
-            await self._server.wait_closed()
-
-    async def _answer(self, reader: asyncio.StreamReader, writer: asyncio.StreamWriter) -> None:
-        if len(self._connections) >= _CONNECTIONS:
-            writer.transport.abort()
-            return
-        self._connections.add(writer)
-        try:
-            async with asyncio.timeout(_HEAD_SECONDS):
-                head = await reader.readuntil(b"\r\n\r\n")
-                writer.write(self._response(head.split(b"\r\n", 1)[0].split(b" ")))
-                await writer.drain()
-        except (OSError, TimeoutError, asyncio.IncompleteReadError, asyncio.LimitOverrunError):
-            writer.transport.abort()
-        finally:
-            self._connections.discard(writer)
-            writer.close()
-            with contextlib.suppress(OSError):
-                await writer.wait_closed()
-
-    def _response(self, words: list[bytes]) -> bytes:
-        if len(words) != 3 or not words[2].startswith(b"HTTP/1."):
-            return _http("400 Bad Request", b"")
-        if words[1].partition(b"?")[0] != b"/metrics":
-            return _http("404 Not Found", b"metrics are at /metrics\n")
-        if words[0] not in (b"GET", b"HEAD"):
-            return _http("405 Method Not Allowed", b"")
-        return _http("200 OK", self._metrics.text(), CONTENT_TYPE_LATEST, is_head=words[0] == b"HEAD")
-
-
-def _http(status: str, body: bytes, content: str = "text/plain", *, is_head: bool = False) -> bytes:
-    head = f"HTTP/1.1 {status}\r\nContent-Type: {content}\r\nContent-Length: {len(body)}\r\nConnection: close\r\n\r\n"
-    return head.encode() + (b"" if is_head else body)
+            # Not on the loop, which a thread may be asking for metrics.
+            await asyncio.to_thread(self._server.stop)
 
 
 def check_metrics_address(address: str, *, beyond_loopback: bool) -> None:

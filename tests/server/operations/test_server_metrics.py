@@ -1,7 +1,8 @@
 """Metrics over HTTP as Prometheus asks for them."""
 
 import asyncio
-import urllib.error
+import socket
+import threading
 import urllib.request
 from collections.abc import Awaitable, Callable
 
@@ -9,11 +10,11 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from robosc_api.security import SecurityError
+from robosc_server.operations import metrics as metrics_module
 from robosc_server.operations.instrumented_workers import InstrumentedWorkers
 from robosc_server.operations.metrics import Metrics, MetricsEndpoint, metric_names
 from robosc_server.tasks.task import Failure, Outcome, Reason, Result, Task, TaskKind, TaskLimits
-from support.held_time import HeldLoop, on_held_time
-from support.waiting import PATIENCE_S, limited, until
+from support.waiting import PATIENCE_S, limited
 
 
 def samples(text: str) -> dict[tuple[str, frozenset[tuple[str, str]]], float]:
@@ -83,55 +84,38 @@ def test_prometheus_can_read_them() -> None:
     asked(metrics, test)
 
 
-@pytest.mark.parametrize(
-    ("request_line", "status"),
-    [
-        (b"GET /metrics HTTP/1.1\r\nHost: x\r\n\r\n", b"200 OK"),
-        (b"HEAD /metrics?x=1 HTTP/1.0\r\n\r\n", b"200 OK"),
-        (b"GET / HTTP/1.1\r\n\r\n", b"404 Not Found"),
-        (b"POST /metrics HTTP/1.1\r\nContent-Length: 5\r\n\r\nhello", b"405 Method Not Allowed"),
-        (b"nonsense\r\n\r\n", b"400 Bad Request"),
-        (b"\x16\x03\x01\r\n\r\n", b"400 Bad Request"),
-    ],
-)
-def test_requests_of_all_kinds(request_line: bytes, status: bytes) -> None:
+def test_sources_are_asked_on_the_loop() -> None:
+    metrics = Metrics("1")
+    threads: list[int] = []
+
+    def jobs() -> dict[str, int]:
+        threads.append(threading.get_ident())
+        return {"queued": len(threads)}
+
+    metrics.set_sources(jobs=jobs)
+
     async def test(address: str) -> None:
-        answer = await sent(address, request_line)
-        assert answer.startswith(b"HTTP/1.1 " + status)
-        assert (b"robosc_server" in answer) is request_line.startswith(b"GET /metrics")
+        for query in ("", "?name[]=robosc_server_jobs"):
+            answer = await sent(address, f"GET /metrics{query} HTTP/1.1\r\n\r\n".encode())
+            assert b" 200 OK" in answer
+            assert f'robosc_server_jobs{{state="queued"}} {len(threads)}.0'.encode() in answer
+            assert (b"robosc_server_calls_under_way" in answer) is (query == "")
+        assert set(threads) == {threading.get_ident()}
+
+    asked(metrics, test)
+
+
+def test_a_loop_that_does_not_answer_is_a_failure(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(metrics_module, "_COLLECT_S", 0.01)
+
+    async def test(address: str) -> None:
+        host, _, port = address.rpartition(":")
+        # The loop stands still until the answer is there.
+        with socket.create_connection((host, int(port)), timeout=PATIENCE_S) as connection:
+            connection.sendall(b"GET /metrics HTTP/1.1\r\n\r\n")
+            assert b" 500 " in connection.recv(100)
 
     asked(Metrics("1"), test)
-
-
-def test_a_head_without_end_is_dropped() -> None:
-    async def test(address: str) -> None:
-        with pytest.raises(ConnectionError):
-            assert await sent(address, b"GET /metrics HTTP/1.1\r\n" + b"X: y\r\n" * 20_000) == b""
-            raise ConnectionError
-
-    asked(Metrics("1"), test)
-
-
-def test_who_keeps_connections_open_leaves_others_none_for_a_while_and_then_is_dropped() -> None:
-    async def dropped(reader: asyncio.StreamReader) -> None:
-        with pytest.raises(ConnectionError):
-            assert await reader.read() == b""
-            raise ConnectionError
-
-    async def test(loop: HeldLoop) -> None:
-        async with MetricsEndpoint(Metrics("1"), "127.0.0.1:0") as endpoint:
-            host, _, port = endpoint.address.rpartition(":")
-            silent = [await asyncio.open_connection(host, int(port)) for _ in range(40)]
-            ends = [asyncio.create_task(dropped(reader)) for reader, _ in silent]
-            # Those that there is no room for.
-            await until(lambda: sum(end.done() for end in ends) == 24)
-            await loop.passed(5.0)
-            await asyncio.gather(*ends)
-            for _, writer in silent:
-                writer.close()
-            assert b"200 OK" in await sent(endpoint.address, b"GET /metrics HTTP/1.1\r\n\r\n")
-
-    on_held_time(test)
 
 
 def test_where_other_machines_reach_it_only_if_it_is_told() -> None:

@@ -14,6 +14,9 @@ class TaskKind(StrEnum):
     EXPLAIN = "explain"
     FORMAT = "format"
 
+    # That of an enumeration is a function in Python, which every look-up in a dictionary would call.
+    __hash__ = str.__hash__
+
 
 class JobState(StrEnum):
     """State of a job."""

@@ -1,6 +1,7 @@
 """The command `robosc-server`: serves until a signal, or runs another command."""
 
 import asyncio
+import gc
 import logging
 import os
 import sys
@@ -14,6 +15,9 @@ from robosc_server.operations.logs import configure_logging
 from robosc_server.operations.settings import Settings, load_settings
 from robosc_server.operations.shutdown import ShutdownSignals
 from robosc_server.workers.kernel import keep_memory_private
+
+_COLLECT_EVERY = 20_000
+"""Number of new Python objects between two runs of the cyclic garbage collector; of calls, some megabytes."""
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -31,6 +35,8 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _serve(settings: Settings) -> int:
     """Serve until a signal; returns the exit status."""
     # Other commands do not need the application, which is slow to import.
+    import uvloop
+
     from robosc_server.application import StartError, running_server
 
     shutdown = ShutdownSignals(settings.drain_seconds)
@@ -38,17 +44,29 @@ def _serve(settings: Settings) -> int:
     async def serve_until_signal() -> None:
         shutdown.listen()
         async with running_server(settings) as address:
+            _collect_less_often()
             _announce(address)
             await shutdown.requested()
 
     try:
-        asyncio.run(serve_until_signal())
+        with asyncio.Runner(loop_factory=uvloop.new_event_loop) as runner:
+            runner.run(serve_until_signal())
     except StartError as error:
         sys.stderr.write(f"robosc-server: {error}\n")
         return 1
     finally:
         shutdown.finished()
     return 0
+
+
+def _collect_less_often() -> None:
+    """Have the cyclic garbage collector run less often, and leave out what lives as long as the server.
+
+    A call leaves few objects in cycles, and most of what a run looks at are modules.
+    """
+    gc.collect()
+    gc.freeze()
+    gc.set_threshold(_COLLECT_EVERY, *gc.get_threshold()[1:])
 
 
 def _announce(address: str) -> None:

@@ -4,6 +4,7 @@ One interceptor does all of this, since each one takes some microseconds of ever
 """
 
 import asyncio
+import logging
 from typing import Any
 
 import grpc
@@ -86,7 +87,7 @@ class CallInterceptor(Layer):
             begun_s = monotonic()
             given_s = context.time_remaining()
             metrics.under_way += 1
-            code = grpc.StatusCode.OK
+            code = _OK
             try:
                 context.set_trailing_metadata(((REQUEST_ID_HEADER, REQUEST_ID.get()),))
                 if self._is_refusing:
@@ -128,23 +129,31 @@ class CallInterceptor(Layer):
         return traced
 
     def _ended(self, method: str, metrics: MethodMetrics, context: Any, code: grpc.StatusCode, seconds: float) -> None:
-        reason = "" if code in _WITHOUT_REASON else reason_of(context.trailing_metadata())
+        reason, level = "", logging.INFO
+        if code is not _OK:
+            if code is not _CANCELLED:
+                reason = reason_of(context.trailing_metadata())
+            if code in _FAULTS:
+                level = logging.WARNING
+        if method.startswith(_HEALTH):
+            level = logging.DEBUG
         metrics.ended(code, reason, seconds)
+        # The words of a line that is not logged would take longer than the rest.
+        if not self._log.is_enabled_for(level):
+            return
         words: dict[str, Any] = {"method": method, "code": code.name, "seconds": round(seconds, 6)}
         if reason:
             words["reason"] = reason
         if caller := CALLER.get():
             words["caller"] = caller
-        if method.startswith(_HEALTH):
-            self._log.debug("call", **words, peer=context.peer())
-        elif code in _FAULTS:
-            self._log.warning("call", **words, peer=context.peer())
-        else:
-            self._log.info("call", **words, peer=context.peer())
+        self._log.log(level, "call", **words, peer=context.peer())
 
 
-_CANCELLED, _DEADLINE_EXCEEDED = grpc.StatusCode.CANCELLED, grpc.StatusCode.DEADLINE_EXCEEDED
-_WITHOUT_REASON = frozenset({grpc.StatusCode.OK, _CANCELLED})
+_OK, _CANCELLED, _DEADLINE_EXCEEDED = (
+    grpc.StatusCode.OK,
+    grpc.StatusCode.CANCELLED,
+    grpc.StatusCode.DEADLINE_EXCEEDED,
+)
 _FAULTS = frozenset({grpc.StatusCode.INTERNAL, grpc.StatusCode.UNKNOWN, grpc.StatusCode.DATA_LOSS})
 _CODES = {code.value[0]: code for code in grpc.StatusCode}
 

@@ -1,7 +1,9 @@
 """Metrics of the server, for Prometheus: in a registry of its own, asked for over HTTP at /metrics."""
 
 import asyncio
+from bisect import bisect_left
 from collections.abc import Callable, Iterable, Mapping
+from itertools import accumulate
 from types import TracebackType
 from typing import Any, Self
 
@@ -18,8 +20,9 @@ from prometheus_client import (
     ProcessCollector,
     generate_latest,
 )
-from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Metric
+from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
 from prometheus_client.registry import Collector
+from prometheus_client.utils import floatToGoString
 
 from robosc_api.metrics_server import MetricsServer
 from robosc_api.security import SecurityError, is_loopback_host, joined
@@ -36,16 +39,21 @@ _COLLECT_S = 4.0
 class MethodMetrics:
     """Metrics of one method, looked up once and not for each call.
 
+    The calls of the event loop count in plain numbers: a counter with a lock takes several times as long.
+
     Attributes:
         under_way: Calls that have begun and not ended.
+        codes: Number of completed calls, by status code.
+        seconds: Duration of all completed calls together, in seconds.
     """
 
-    __slots__ = ("_calls", "_method", "_ok", "_refusals", "_seconds", "under_way")
+    __slots__ = ("_numbers", "_refusals", "codes", "seconds", "under_way")
 
-    def __init__(self, method: str, calls: Counter, refusals: Counter, seconds: Histogram) -> None:
-        self._method, self._calls, self._refusals = method, calls, refusals
-        self._ok = calls.labels(method, "OK")
-        self._seconds = seconds.labels(method)
+    def __init__(self, refusals: Counter) -> None:
+        self._refusals = refusals
+        self._numbers = [0] * (len(_CALL_SECONDS) + 1)
+        self.codes: dict[str, int] = {"OK": 0}
+        self.seconds = 0.0
         self.under_way = 0
 
     def ended(self, code: grpc.StatusCode, reason: str, seconds: float) -> None:
@@ -57,12 +65,18 @@ class MethodMetrics:
             seconds: Duration of the call, in seconds.
         """
         if code is grpc.StatusCode.OK:
-            self._ok.inc()
+            self.codes["OK"] += 1
         else:
-            self._calls.labels(self._method, code.name).inc()
+            self.codes[code.name] = self.codes.get(code.name, 0) + 1
             if reason:
                 self._refusals.labels(reason).inc()
-        self._seconds.observe(seconds)
+        self._numbers[bisect_left(_CALL_SECONDS, seconds)] += 1
+        self.seconds += seconds
+
+    def buckets(self) -> list[tuple[str, float]]:
+        """Return the number of calls that took no longer than each limit of the histogram."""
+        limits = [*map(floatToGoString, _CALL_SECONDS), "+Inf"]
+        return list(zip(limits, accumulate(map(float, self._numbers)), strict=True))
 
 
 class Metrics:
@@ -78,16 +92,8 @@ class Metrics:
         PlatformCollector(registry=registry)
         GCCollector(registry=registry)
         Info("robosc_server", "Version of the server.", registry=registry).info({"version": version})
-        self._calls = Counter("robosc_server_calls", "Completed calls.", ("method", "code"), registry=registry)
         self._refusals = Counter(
             "robosc_server_failures", "Failed calls, by reason (ErrorInfo).", ("reason",), registry=registry
-        )
-        self._seconds = Histogram(
-            "robosc_server_call_seconds",
-            "Duration of calls.",
-            ("method",),
-            buckets=_CALL_SECONDS,
-            registry=registry,
         )
         self._outcomes = Counter(
             "robosc_server_tasks", "Completed tasks, by outcome.", ("kind", "outcome"), registry=registry
@@ -99,14 +105,7 @@ class Metrics:
             buckets=_TASK_SECONDS,
             registry=registry,
         )
-        self._lookups = Counter(
-            "robosc_server_result_lookups",
-            "Result lookups by location: memory, store, or none (a worker runs the task).",
-            ("found",),
-            registry=registry,
-        )
-        for where in ("memory", "store", "none"):
-            self._lookups.labels(where)
+        self._lookups = {"memory": 0, "store": 0, "none": 0}
         Gauge("robosc_server_calls_under_way", "Calls in progress.", registry=registry).set_function(
             lambda: self.calls_under_way
         )
@@ -124,17 +123,18 @@ class Metrics:
         )
         registry.register(_LabelledCollector(self))
         self._methods: dict[str, MethodMetrics] = {}
+        self._unknown = 0
 
     def method(self, name: str) -> MethodMetrics:
         """Return the metrics of one method; only for methods that exist, since each stays."""
         found = self._methods.get(name)
         if found is None:
-            found = self._methods[name] = MethodMetrics(name, self._calls, self._refusals, self._seconds)
+            found = self._methods[name] = MethodMetrics(self._refusals)
         return found
 
     def unknown_method(self) -> None:
         """Count a call of a method that there is not; its name is the caller's, and kept nowhere."""
-        self._calls.labels("unknown", grpc.StatusCode.UNIMPLEMENTED.name).inc()
+        self._unknown += 1
 
     @property
     def calls_under_way(self) -> int:
@@ -165,11 +165,11 @@ class Metrics:
         Args:
             where: `memory` or `store`.
         """
-        self._lookups.labels(where).inc()
+        self._lookups[where] += 1
 
     def cache_miss(self) -> None:
         """Count a request whose result was not there."""
-        self._lookups.labels("none").inc()
+        self._lookups["none"] += 1
 
     def set_sources(
         self,
@@ -200,6 +200,21 @@ class Metrics:
 
     def labelled_metrics(self) -> Iterable[Metric]:
         """Return the metrics whose values are asked for, and that have labels."""
+        calls = CounterMetricFamily("robosc_server_calls", "Completed calls.", labels=("method", "code"))
+        seconds = HistogramMetricFamily("robosc_server_call_seconds", "Duration of calls.", labels=("method",))
+        for method, found in self._methods.items():
+            for code, number in found.codes.items():
+                calls.add_metric((method, code), number)
+            seconds.add_metric((method,), found.buckets(), found.seconds)
+        if self._unknown:
+            calls.add_metric(("unknown", grpc.StatusCode.UNIMPLEMENTED.name), self._unknown)
+        lookups = CounterMetricFamily(
+            "robosc_server_result_lookups",
+            "Result lookups by location: memory, store, or none (a worker runs the task).",
+            labels=("found",),
+        )
+        for where, number in self._lookups.items():
+            lookups.add_metric((where,), number)
         jobs = GaugeMetricFamily("robosc_server_jobs", "Stored jobs, by state.", labels=("state",))
         for state, number in sorted(self._jobs().items()):
             jobs.add_metric((state,), number)
@@ -215,9 +230,9 @@ class Metrics:
             "Time until a token expires that no other token replaces; negative if it has expired.",
             labels=("token",),
         )
-        for token, seconds in sorted(self._expiries().items()):
-            expiries.add_metric((token,), seconds)
-        return jobs, conditions, restarts, expiries
+        for token, remaining_s in sorted(self._expiries().items()):
+            expiries.add_metric((token,), remaining_s)
+        return calls, seconds, lookups, jobs, conditions, restarts, expiries
 
     def collector(self, loop: asyncio.AbstractEventLoop) -> Collector:
         """Return a collector of all metrics for other threads; it asks for them on the event loop."""

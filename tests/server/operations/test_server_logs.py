@@ -11,7 +11,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc_server.failures import public_failure
-from robosc_server.operations.logs import REQUEST_ID, log_fault
+from robosc_server.operations.logs import REQUEST_ID, log_fault, request_id_of
 from robosc_server.operations.settings import LogFormat, LogLevel
 from robosc_server.tasks.task import Failure, Reason
 from robosc_server.workers.exit_reasons import ProcessExit, exit_description
@@ -169,3 +169,10 @@ def test_talkative_libraries_tell_warnings_alone() -> None:
             assert not logger.isEnabledFor(logging.INFO)
         logging.getLogger("robosc_server").debug("told")
     assert [line["event"] for line in log.lines()] == ["told"]
+
+
+def test_random_request_ids_differ() -> None:
+    # More than are drawn at once.
+    ids = [request_id_of(()) for _ in range(2000)]
+    assert len(set(ids)) == len(ids)
+    assert all(len(identity) == 16 and set(identity) <= set("0123456789abcdef") for identity in ids)

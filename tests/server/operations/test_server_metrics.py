@@ -6,6 +6,7 @@ import threading
 import urllib.request
 from collections.abc import Awaitable, Callable
 
+import grpc
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
@@ -82,6 +83,31 @@ def test_prometheus_can_read_them() -> None:
         assert ("process_resident_memory_bytes", frozenset()) in found
 
     asked(metrics, test)
+
+
+def test_calls_are_counted_by_code_and_duration() -> None:
+    metrics = Metrics("1")
+    check = metrics.method("/s/Check")
+    metrics.method("/s/Idle")
+    # Limits of the histogram are included.
+    for seconds in (0.0001, 0.0005, 0.002, 700.0):
+        check.ended(grpc.StatusCode.OK, "", seconds)
+    check.ended(grpc.StatusCode.INTERNAL, "WORKER_DIED", 0.25)
+    metrics.unknown_method()
+    found = samples(metrics.text().decode())
+
+    def of(name: str, **labels: str) -> float | None:
+        return found.get((f"robosc_server_{name}", frozenset(labels.items())))
+
+    assert of("calls_total", method="/s/Check", code="OK") == 4
+    assert of("calls_total", method="/s/Check", code="INTERNAL") == 1
+    assert of("calls_total", method="/s/Idle", code="OK") == 0
+    assert of("calls_total", method="unknown", code="UNIMPLEMENTED") == 1
+    assert of("failures_total", reason="WORKER_DIED") == 1
+    buckets = {"0.0005": 2, "0.001": 2, "0.0025": 3, "0.1": 3, "0.25": 4, "600.0": 4, "+Inf": 5}
+    assert {limit: of("call_seconds_bucket", method="/s/Check", le=limit) for limit in buckets} == buckets
+    assert of("call_seconds_count", method="/s/Check") == 5
+    assert of("call_seconds_sum", method="/s/Check") == pytest.approx(700.2526)
 
 
 def test_sources_are_asked_on_the_loop() -> None:

@@ -71,17 +71,19 @@ HOPS = (
     Hop(LOOP, "robosc_bridge.daemon.robot.motion:MotionTarget.drive", "the wanted velocity"),
     Hop(LOOP, "robosc_bridge.safety.layer:SafetyLayer.command", "brought within the limits"),
     Hop(LOOP, "robosc_bridge.daemon.threads.device_thread:DeviceThread.hurry", "another velocity: at once"),
+    Hop(LOOP, "robosc_bridge.daemon.threads.workers:DriveWorker.wake", "also into an exchange under way"),
     Hop(
         DRIVE,
         "robosc_bridge.daemon.threads.workers:DriveWorker.step",
         f"hurried, or each {_EXCHANGE}",
-        "an exchange under way: 2 to 5 ms",
+        "answers on a bus of servos: up to 3 ms",
     ),
     Hop(DRIVE, "robosc_bridge.safety.layer:SafetyLayer.output", "zero for any reason; else a ramp"),
     Hop(DRIVE, "robosc_bridge.devices.opencr:OpenCrBase.exchange", "or of another drive base"),
     Hop(DRIVE, "robosc_bridge.devices.kinematics:opencr_words", "in units of the board"),
-    Hop(DRIVE, "robosc_bridge.devices.dynamixel_bus:DynamixelBus.write", "a packet; waits for its answer"),
+    Hop(DRIVE, "robosc_bridge.devices.dynamixel_bus:DynamixelBus.write", "a packet; its answer is awaited later"),
     Hop(DRIVE, "robosc_bridge.transport.serial_line:SerialLine.write", "bytes on the way to the wheel"),
+    Hop(DRIVE, "robosc_bridge.daemon.threads.workers:DriveWorker.written", "the time `scan_to_wheel` ends here"),
 )
 """The way, in the order in which functions are entered."""
 

@@ -19,6 +19,8 @@ from robosc.execution.runtime.event_log import NullLog
 from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.configuration.structure import Execution
 from robosc_bridge.daemon.assembly import EXCHANGE_S, assemble
+from robosc_bridge.daemon.threads.workers import DriveWorker
+from robosc_bridge.daemon.timing import MEANINGS
 from robosc_simulated import SimulatedTurtleBot3, VirtualHost
 from support.daemons import supervisor_of
 
@@ -56,6 +58,13 @@ def test_times_are_those_of_the_code() -> None:
     told = " ".join(hop.note + hop.time for hop in HOPS)
     assert f"up to {Execution().period_s * 1000:g} ms" in told
     assert f"each {EXCHANGE_S * 1000:g} ms" in told
+
+
+def test_it_ends_where_the_measured_time_ends() -> None:
+    assert HOPS[-1].function == f"{DriveWorker.__module__}:{DriveWorker.written.__qualname__}"
+    assert "`scan_to_wheel`" in HOPS[-1].note
+    assert "bytes" in MEANINGS["scan_to_wheel"]
+    assert HOPS[-2].function.endswith(":SerialLine.write")
 
 
 @contextmanager

@@ -106,7 +106,7 @@ SNAPSHOT = Snapshot(
     scan=None,
     overruns=4,
     timing=TimingFigures(
-        (Latency("exchange", tuple(int(index in (10, 17)) for index in range(len(BOUNDS_S) + 1)), 0.012, 0.01),),
+        (Latency("exchange", tuple(int(index in (22, 39)) for index in range(len(BOUNDS_S) + 1)), 0.012, 0.01),),
         {"drive": {"requests": 70, "unanswered": 3}},
     ),
 )

@@ -2,7 +2,7 @@
 
 import logging
 from collections.abc import Iterator
-from itertools import accumulate
+from itertools import accumulate, chain
 
 from prometheus_client import CollectorRegistry, GCCollector, PlatformCollector, ProcessCollector
 from prometheus_client.core import (
@@ -152,5 +152,7 @@ def _metrics(snapshot: Snapshot) -> Iterator[Metric]:
 
 
 def _buckets(latency: Latency) -> Iterator[tuple[str, float]]:
-    bounds = [*(f"{bound_s:g}" for bound_s in BOUNDS_S), "+Inf"]
-    return zip(bounds, map(float, accumulate(latency.counts)), strict=True)
+    """Return every second bound, which is enough for a graph, with the number of times up to it."""
+    *counts, total = map(float, accumulate(latency.counts))
+    bounds = (f"{bound_s:g}" for bound_s in BOUNDS_S[::2])
+    return chain(zip(bounds, counts[::2], strict=True), [("+Inf", total)])

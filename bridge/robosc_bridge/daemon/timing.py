@@ -1,24 +1,25 @@
 """Times of the bridge, measured by itself as histograms.
 
 Each histogram is filled by one thread, and read by any, without waiting: a reader may miss a time that is being added.
-Percentiles are the upper bounds of their buckets, which are a quarter wide, so that they are never too good.
+Percentiles are the upper bounds of their buckets, which are a tenth wide, so that they are never too good, and at most
+a tenth too bad; what is below the first bound counts as that.
 """
 
 from bisect import bisect_left
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 
-_FIRST_S, _FACTOR, _COUNT = 0.00025, 1.25, 41
+_FIRST_S, _FACTOR, _COUNT = 0.00025, 1.1, 95
 
 BOUNDS_S = tuple(round(_FIRST_S * _FACTOR**index, 6) for index in range(_COUNT))
-"""Upper bounds of the buckets, 0.25 ms to 1.9 s; what is longer is in one more."""
+"""Upper bounds of the buckets, 0.25 ms to 1.95 s; what is longer is in one more."""
 
 SHOWN_S = 1.0
 """Time between figures that are worked out."""
 
 MEANINGS = {
-    "scan_to_wheel": "from the last byte of a revolution until the exchange is over that carries the new velocity "
-    "which was decided on it",
+    "scan_to_wheel": "from the last byte of a revolution until the bytes of the new velocity that was decided on it "
+    "have been written to the line of the drive base; of a driver that does not tell, until the end of its exchange",
     "scan_to_decision": "from the last byte of a revolution until the supervisor has decided on it",
     "decision_period": "from one decision of the supervisor to the next",
     "queueing": "from the last byte of a reading until the loop takes it up",
@@ -99,7 +100,7 @@ class Timing:
     """Measurement of the times of the loop, and of those from a scan through the loop to the wheels.
 
     The loop reports when it has taken up a scan, decides, and commands another velocity; the thread of the drive base
-    reports the end of an exchange.
+    reports that it has written a velocity, and the end of an exchange.
 
     Args:
         clock: Clock that returns the time, in seconds.
@@ -167,26 +168,17 @@ class Timing:
             self._commanded_s = self._scan_s
 
     def take_command(self) -> float | None:
-        """Return the time of the scan that the velocity about to be sent was decided on; None: it is on its way."""
+        """Return the time of the scan that the velocity about to be sent was decided on; None: of none, or taken."""
         commanded_s, self._commanded_s = self._commanded_s, None
         return commanded_s
 
-    def put_back(self, scan_s: float | None) -> None:
-        """Take back the time that `take_command` has given: the exchange has failed, and will be made again."""
-        if self._commanded_s is None:
-            self._commanded_s = scan_s
+    def written(self, scan_s: float) -> None:
+        """The line has taken the velocity of the scan whose time `take_command` has given."""
+        self._histograms["scan_to_wheel"].observe(max(self._clock() - scan_s, 0.0))
 
-    def exchanged(self, began_s: float, scan_s: float | None) -> None:
-        """An exchange is over.
-
-        Args:
-            began_s: Time at which it began.
-            scan_s: Time that `take_command` has given for it.
-        """
-        now_s = self._clock()
-        self._histograms["exchange"].observe(now_s - began_s)
-        if scan_s is not None:
-            self._histograms["scan_to_wheel"].observe(max(now_s - scan_s, 0.0))
+    def exchanged(self, began_s: float) -> None:
+        """An exchange that began at that time is over."""
+        self._histograms["exchange"].observe(self._clock() - began_s)
 
     def figures(self) -> TimingFigures:
         """Return the figures, at most `SHOWN_S` old; asked by the loop."""

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Literal
 
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, BusCounters, DynamixelBus, exchange_limit_s
-from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFault, Velocity
+from robosc_bridge.devices.interface import CONSTANT, DriveLimits, DriveReading, MotorFault, Velocity, VelocitySource
 from robosc_bridge.devices.kinematics import body_velocity, wheel_goals
 from robosc_bridge.devices.odometry import Odometry, velocity_variances
 from robosc_bridge.devices.robots import ACCELERATION_RAW_RAD_S2, SERVOS, Body, Robot, Wheels
@@ -40,7 +40,7 @@ _log = logging.getLogger(__name__)
 
 
 class DynamixelBase:
-    """A `DriveBase`. Used from one thread.
+    """An `AttentiveDriveBase`. Used from one thread.
 
     Args:
         path: Path of the adapter's port.
@@ -109,6 +109,7 @@ class DynamixelBase:
         self._line: Port | None = None
         self._bus: DynamixelBus | None = None
         self._pair: ServoPair | None = None
+        self._source: VelocitySource = CONSTANT
         self._is_torque_wanted = False
         self._is_torque_on = False
         # Why they stay at a standstill until torque is switched on anew.
@@ -129,6 +130,13 @@ class DynamixelBase:
         """Health of the line since it was opened."""
         bus = self._bus
         return BusCounters() if bus is None else bus.counters
+
+    def attend(self, source: VelocitySource) -> None:
+        """Command what this source has that is newer, also between the requests of an exchange."""
+        self._source = source
+
+    def wake(self) -> None:
+        """Do nothing: while motors answer, nothing can be sent on their bus."""
 
     def open(self) -> None:
         """Find both motors, check that they can be driven, and set them up; wheels at rest, torque off.
@@ -283,14 +291,8 @@ class DynamixelBase:
             self._check_torque(pair)
             self._check_watchdogs(pair)
             self._is_doubtful = False
-        goals = (0, 0)
-        if self._is_torque_wanted:
-            if not self._stops:
-                goals = wheel_goals(velocity, self._limits, self._wheels.separation_m, self._wheels.raw_m_s)
-            if self._host.monotonic() > velocity.until_s:
-                goals = (0, 0)
-            pair.command(goals)
-            self._commanded_s = self._host.monotonic()
+            velocity = self._source.newer() or velocity
+        goals = self._commanded(pair, velocity)
         answers = pair.measure()
         time_s = bus.received_s
         for motor, (_, is_alert) in zip(pair.motors, answers, strict=True):
@@ -298,9 +300,30 @@ class DynamixelBase:
         measured = [measurement for measurement, _ in answers]
         if any(self._odometry.jumps(*(one.ticks for one in measured))):
             # Of its own motion, or of a restart.
+            goals = self._renewed(pair, goals)
             self._check_torque(pair)
-        self._check_alternately(pair)
+        if self._host.monotonic() >= self._check_s:
+            goals = self._renewed(pair, goals)
+            self._check_alternately(pair)
         return self._reading(pair, measured, goals, time_s)
+
+    def _commanded(self, pair: ServoPair, velocity: Velocity) -> tuple[int, int]:
+        """Command a velocity, where the motors are to obey; returns their goals."""
+        goals = (0, 0)
+        if not self._is_torque_wanted:
+            return goals
+        if not self._stops and self._host.monotonic() <= velocity.until_s:
+            goals = wheel_goals(velocity, self._limits, self._wheels.separation_m, self._wheels.raw_m_s)
+        pair.command(goals)
+        self._commanded_s = self._host.monotonic()
+        if not self._stops:
+            self._source.written()
+        return goals
+
+    def _renewed(self, pair: ServoPair, goals: tuple[int, int]) -> tuple[int, int]:
+        """Command what is newer than these goals before something else is asked; returns the goals now."""
+        velocity = self._source.newer() if self._is_torque_wanted else None
+        return goals if velocity is None else self._commanded(pair, velocity)
 
     def _has_paused(self) -> bool:
         return (
@@ -317,10 +340,7 @@ class DynamixelBase:
             self._stop_for(pair, faults)
 
     def _check_alternately(self, pair: ServoPair) -> None:
-        now_s = self._host.monotonic()
-        if now_s < self._check_s:
-            return
-        self._check_s = now_s + CHECK_PERIOD_S / 2
+        self._check_s = self._host.monotonic() + CHECK_PERIOD_S / 2
         if self._is_watchdog_next:
             self._check_watchdogs(pair)
         else:

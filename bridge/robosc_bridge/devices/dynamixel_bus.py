@@ -9,6 +9,9 @@ A request whose length was damaged on its way makes a device wait for bytes that
 requests for these bytes. So a device that does not answer twice in a row is sent as many zeros as may be missing: a
 packet that they complete has a wrong checksum, and between packets they are skipped.
 
+A device on a line of its own, to which one can write while it answers, takes up requests one after the other. So a
+write may be interjected: sent while the answer to another request is awaited, and heard after that.
+
 Packets are those of dynamixel-sdk. Its `readTxRx`, `writeTxRx` and `GroupSyncRead` are not used: they take any answer
 of a device for the expected one, and the last one loses the error bytes and all answers behind a missing device.
 """
@@ -104,6 +107,9 @@ class DynamixelBus:
     Attributes:
         counters: Health of the line.
         stranger: Device that has answered to requests for others since the last `begin`; None: none has.
+        interruption: Function that is called while the answer to a request is awaited for the first time, and that may
+            `interject`; None: none.
+        unheard: Number of interjected writes in a row that were not answered though the request before them was.
     """
 
     def __init__(
@@ -116,6 +122,10 @@ class DynamixelBus:
         self.counters = BusCounters()
         self._host = host
         self.stranger: int | None = None
+        self.interruption: Callable[[], None] | None = None
+        self.unheard = 0
+        # True if something was interjected, and its answer was not looked for yet.
+        self._is_interjected = False
         self._port = DynamixelPort(line, answer_limit_s, host)
         self._handler = PacketHandler()
         self._name_of = name_of
@@ -196,7 +206,14 @@ class DynamixelBus:
             f"does not let {length} bytes at {address} be read",
         )
 
-    def write(self, device: int, address: int, data: bytes, limit_s: float | None = None) -> StatusPacket:
+    def write(
+        self,
+        device: int,
+        address: int,
+        data: bytes,
+        limit_s: float | None = None,
+        sent: Callable[[], None] | None = None,
+    ) -> StatusPacket:
         """Write to an address.
 
         Args:
@@ -204,6 +221,7 @@ class DynamixelBus:
             address: Address of the first byte.
             data: Data to write.
             limit_s: Longest wait for the answer, where it is not the usual one.
+            sent: Function that is called whenever the line has taken it; None: none.
 
         Raises:
             LineError: The line is gone.
@@ -212,11 +230,36 @@ class DynamixelBus:
         """
 
         def transmit() -> int:
-            return int(self._handler.writeTxOnly(self._port, device, address, len(data), list(data)))
+            result = int(self._handler.writeTxOnly(self._port, device, address, len(data), list(data)))
+            if sent is not None:
+                sent()
+            return result
 
         return self._accepted(
             self._asked(device, transmit, 0, limit_s), f"does not let {len(data)} bytes at {address} be written"
         )
+
+    def interject(self, device: int, address: int, data: bytes) -> None:
+        """Write to an address of the device whose answer is awaited; only as, and once in, an `interruption`.
+
+        Its own answer is heard after that one. If none comes, the request is not repeated: a device that is slow works
+        off each of them, and an older write must not follow a newer one.
+
+        Args:
+            device: Id of the device.
+            address: Address of the first byte.
+            data: Data to write.
+
+        Raises:
+            LineError: The line is gone.
+        """
+        self._is_interjected = True
+        self.counters.requests += 1
+        self._port.keeps_input = True
+        try:
+            self._sent(int(self._handler.writeTxOnly(self._port, device, address, len(data), list(data))))
+        finally:
+            self._port.keeps_input = False
 
     def is_late(self, device: int, limit_s: float) -> bool:
         """Return True if a device that has not answered in time does so after all.
@@ -324,17 +367,35 @@ class DynamixelBus:
         self, device: int, transmit: Callable[[], int], length: int, limit_s: float | None = None
     ) -> StatusPacket:
         """The answer to a request, which is made again if there is none; never that to an older one."""
+        self._is_interjected = False
         try:
-            return self._asked_once(device, transmit, length, limit_s)
+            return self._asked_once(device, transmit, length, limit_s, self._interrupted)
         except DeviceSilentError:
-            if not self._may_repeat():
+            if self._is_interjected or not self._may_repeat():
                 raise
             return self._asked_once(device, transmit, length, limit_s)
 
-    def _asked_once(self, device: int, transmit: Callable[[], int], length: int, limit_s: float | None) -> StatusPacket:
+    def _interrupted(self) -> None:
+        if self.interruption is not None and not self._is_interjected and not self._port.is_late:
+            self.interruption()
+
+    def _asked_once(
+        self,
+        device: int,
+        transmit: Callable[[], int],
+        length: int,
+        limit_s: float | None,
+        interrupted: Callable[[], None] | None = None,
+    ) -> StatusPacket:
         if device in self._unsettled:
             self.settle(device)
-        status = self._answered(device, transmit, lambda status: _fits(status, length), length, limit_s)
+        self._port.looked = interrupted
+        try:
+            status = self._answered(device, transmit, lambda status: _fits(status, length), length, limit_s)
+        finally:
+            self._port.looked = None
+        if self._is_interjected:
+            self._hear_interjected(device)
         if status.number == DAMAGED_REQUEST:
             raise DeviceSilentError(f"{self._name_of(device)} received damaged bytes")
         return status
@@ -356,10 +417,29 @@ class DynamixelBus:
                 self._unsettled.discard(device)
                 self._silent = 0
                 return status
+            if self._is_interjected and _is_done(status, device):
+                # Devices answer in their order: the answer that was awaited is lost.
+                self._is_interjected = False
+                break
             self._is_foreign(status, (device,))
         self.counters.unanswered += 1
         self._silent += 1
         raise self.silence_of(self._name_of(device), "does")
+
+    def _hear_interjected(self, device: int) -> None:
+        """Await the answer to what was interjected; without one, the next request first settles the device."""
+        self._is_interjected = False
+        self._unsettled.add(device)
+        self._port.wait_for(_EMPTY_STATUS)
+        while (status := self._received()) is not None:
+            if _is_done(status, device):
+                self._unsettled.discard(device)
+                self.unheard = 0
+                return
+            self._is_foreign(status, (device,))
+        self.counters.unanswered += 1
+        self._silent += 1
+        self.unheard += 1
 
     def _is_foreign(self, status: StatusPacket, devices: Collection[int]) -> None:
         """Count an answer that is to another request, or comes from another device than these."""
@@ -411,6 +491,11 @@ class DynamixelBus:
         # The port raises for itself; what is left is a packet that is too long.
         if result != COMM_SUCCESS:
             raise ValueError(f"dynamixel-sdk does not send this packet: {result}")
+
+
+def _is_done(status: StatusPacket, device: int) -> bool:
+    """Return True if an answer is a device's to a write that it has carried out."""
+    return status.device == device and status.number == 0 and not status.data
 
 
 def _fits(status: StatusPacket, length: int) -> bool:

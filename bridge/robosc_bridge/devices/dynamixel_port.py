@@ -6,7 +6,7 @@ and stays busy forever after one. This port waits in `poll`, by the monotonic cl
 never busy, because it is used from one thread.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 from robosc_bridge.host import Host, Port
 
@@ -26,6 +26,8 @@ class DynamixelPort:
         answer_limit_s: The same.
         end_s: Latest time of any wait, so that several requests together stay within a limit.
         received_s: Time when the last byte came, in seconds.
+        looked: Function that is called after each look for bytes while there is time; None: none.
+        keeps_input: True while a packet is sent that must not discard what has come.
     """
 
     def __init__(self, line: Port, answer_limit_s: float, host: Host) -> None:
@@ -34,6 +36,8 @@ class DynamixelPort:
         self.answer_limit_s = answer_limit_s
         self.end_s = self._host.monotonic()
         self.received_s = self._host.monotonic()
+        self.looked: Callable[[], None] | None = None
+        self.keeps_input = False
         self._found = b""
         self._answer_end_s = 0.0
         self._is_over = False
@@ -56,6 +60,8 @@ class DynamixelPort:
 
     def clearPort(self) -> None:  # noqa: N802
         """Forget what has come; called before each request."""
+        if self.keeps_input:
+            return
         self.line.discard_input()
         self._found = b""
 
@@ -84,6 +90,8 @@ class DynamixelPort:
             self._found = self.line.read(limit_s)
             if self._found:
                 self.received_s = self._host.monotonic()
+            if self.looked is not None and not self._is_over:
+                self.looked()
         taken, self._found = self._found[:length], self._found[length:]
         return taken
 

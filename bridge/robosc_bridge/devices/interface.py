@@ -8,7 +8,7 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from enum import StrEnum
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 
 @dataclass(frozen=True)
@@ -176,6 +176,43 @@ class DriveBase(Protocol):
 
     def close(self) -> None:
         """Stop the wheels, torque off, give the line back; never raises, may be called at any time and again."""
+
+
+class VelocitySource(Protocol):
+    """Source of the velocity to command now, for a drive base that asks during an exchange, too."""
+
+    def newer(self) -> Velocity | None:
+        """Return the velocity to command instead of the last one; None: there is no other one."""
+
+    def written(self) -> None:
+        """Note that the line has taken the bytes of the last velocity, or that the device has that velocity already."""
+
+
+class _ConstantSource:
+    """Source for a drive base that is used alone: each velocity holds until the next exchange."""
+
+    def newer(self) -> Velocity | None:
+        return None
+
+    def written(self) -> None:
+        pass
+
+
+CONSTANT: VelocitySource = _ConstantSource()
+
+
+@runtime_checkable
+class AttentiveDriveBase(DriveBase, Protocol):
+    """A drive base that commands a newer velocity also during an exchange, and tells when a velocity was written.
+
+    Of any other drive base, a velocity counts as written when its exchange is over, and a newer one waits for that.
+    """
+
+    def attend(self, source: VelocitySource) -> None:
+        """Ask this source from now on, only within `exchange` and in its thread."""
+
+    def wake(self) -> None:
+        """Let an exchange under way ask its source soon; from any thread or signal handler, at any time."""
 
 
 @dataclass(frozen=True)

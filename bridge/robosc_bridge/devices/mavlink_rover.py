@@ -12,7 +12,16 @@ import logging
 import math
 from collections.abc import Callable, Mapping
 
-from robosc_bridge.devices.interface import STANDSTILL, BatteryLevel, DriveLimits, DriveReading, MotorFault, Velocity
+from robosc_bridge.devices.interface import (
+    CONSTANT,
+    STANDSTILL,
+    BatteryLevel,
+    DriveLimits,
+    DriveReading,
+    MotorFault,
+    Velocity,
+    VelocitySource,
+)
 from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
 from robosc_bridge.devices.mavlink_link import (
     BAUD,
@@ -72,9 +81,12 @@ _REST_LIMIT_S = 3.0
 _REST_M_S = 0.05
 _REST_RAD_S = 0.1
 _CLOSE_TRIALS = 1
-# Five times a second is asked for; a new velocity goes out at once, unless a slow radio would be filled by it.
+# Five times a second is asked for. A new velocity goes out at once, but no more than one each 20 ms in the long run,
+# and no more than one ahead of that, so that a slow radio is not filled. That one may be a little earlier still, since
+# exchanges are about as often.
 _TARGET_S = 0.1
 _NEW_TARGET_S = 0.02
+_AHEAD_S = 0.021
 _WARNING = 4
 _FOLLOWING_LIMIT_S = 2.0
 _MM = 1000
@@ -96,7 +108,7 @@ _log = logging.getLogger(__name__)
 
 
 class MavlinkRover:
-    """A `DriveBase`. Used from one thread.
+    """An `AttentiveDriveBase`. Used from one thread.
 
     Args:
         path: Path of a serial port; or `udpin:HOST:PORT`, `udpout:HOST:PORT`, `tcp:HOST:PORT`.
@@ -144,13 +156,23 @@ class MavlinkRover:
         self._is_torque_lost = False
         self._target = STANDSTILL
         self._target_s = -math.inf
+        # Until when the radio has to do with the targets so far.
+        self._filled_s = -math.inf
         self._is_warned = False
+        self._source: VelocitySource = CONSTANT
 
     @property
     def counters(self) -> FrameCounts:
         """Health of the line since it was opened."""
         link = self._link
         return FrameCounts() if link is None else link.counts
+
+    def attend(self, source: VelocitySource) -> None:
+        """Tell this source when a target was sent; no exchange takes long enough to ask it for a newer one."""
+        self._source = source
+
+    def wake(self) -> None:
+        """Do nothing: no exchange waits."""
 
     def open(self) -> None:
         """Find the vehicle and check that it is a rover that tells where it is and that nobody else drives.
@@ -241,12 +263,15 @@ class MavlinkRover:
         if self._is_torque_wanted:
             self._is_torque_lost = self._is_torque_lost or not is_obeying
             # Nor is one driven that no longer tells what it does.
-            target = STANDSTILL if self._is_torque_lost or told is None else velocity
+            is_driven = not self._is_torque_lost and told is not None
+            target = velocity if is_driven else STANDSTILL
             target = within_limits(target, self.limits, self._robot.wheel_separation_m)
             if self._host.monotonic() > velocity.until_s:
                 target = STANDSTILL
             if self._is_due(target):
                 self._send_target(target)
+            if is_driven and target == self._target:
+                self._source.written()
         if told is None:
             raise DeviceSilentError(
                 f"{self._path}: the rover has not reported its motion for {self._motion_limit_s:g} s"
@@ -425,10 +450,10 @@ class MavlinkRover:
                 return False
 
     def _is_due(self, target: Velocity) -> bool:
-        since_s = self._host.monotonic() - self._target_s
+        now_s = self._host.monotonic()
         if target == self._target:
-            return since_s >= _TARGET_S
-        return target == STANDSTILL or since_s >= _NEW_TARGET_S
+            return now_s - self._target_s >= _TARGET_S
+        return target == STANDSTILL or self._filled_s <= now_s + _AHEAD_S
 
     def _send_target(self, target: Velocity) -> None:
         link = self._used_link
@@ -436,6 +461,7 @@ class MavlinkRover:
         if state.system is None or state.component is None:
             return
         self._target, self._target_s = target, self._host.monotonic()
+        self._filled_s = max(self._filled_s, self._target_s) + _NEW_TARGET_S
         boot_ms = int((self._target_s - self._began_s) * 1000) % 2**32
         link.send(velocity_target(state.system, state.component, boot_ms, target.linear_m_s, target.angular_rad_s))
 

@@ -12,6 +12,11 @@ firmware handles one packet in a pass: the board answers, but only after the lim
 no more requests than it needs to distinguish this board from a silent one, since the board must process every request
 before it receives any other.
 
+A request waits for the end of the firmware's pass, up to 10 ms. A velocity that is newer than that of the exchange
+under way is therefore written at once, behind the request that waits: the port is a USB device, which is read and
+written at the same time, and the firmware reads one packet from its buffer in each pass. The next exchange, which
+follows at once, carries the velocity as well. A board that does not answer such packets is sent no more of them.
+
 The board adds the motion of its own inputs to every command: of its two buttons, held for 3 s, one drives 0.3 m and the
 other one makes half a turn, and an RC-100 remote control steers. A command of zero does not end that motion, torque off
 does.
@@ -26,7 +31,15 @@ from typing import Literal, NoReturn
 
 from robosc_bridge.devices.board_yaw import UPTIME_MODULUS, BoardYaw
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, BusCounters, DynamixelBus, exchange_limit_s
-from robosc_bridge.devices.interface import DriveLimits, DriveReading, MotorFault, Velocity
+from robosc_bridge.devices.interface import (
+    CONSTANT,
+    STANDSTILL,
+    DriveLimits,
+    DriveReading,
+    MotorFault,
+    Velocity,
+    VelocitySource,
+)
 from robosc_bridge.devices.kinematics import body_velocity, opencr_words, wheel_speeds
 from robosc_bridge.devices.odometry import Odometry, velocity_variances
 from robosc_bridge.devices.robots import Robot
@@ -44,6 +57,8 @@ _CALIBRATION_LIMIT_S = 6.0
 _SLOW_LIMIT_S = 0.65
 # Exchanges in a row without an answer after which it is seen whether the board is slow.
 _SILENT_LIMIT = 3
+# Packets in a row behind another one that are not answered, after which none is sent there any more.
+_UNHEARD_LIMIT = 3
 # Time after which a held button is warned of: half of the 3 s after which it drives, so that one can let go.
 _HELD_S = 1.5
 _DRIVES = {"button_1": "0.3 m forward", "button_2": "half a turn to the right"}
@@ -61,7 +76,7 @@ _log = logging.getLogger(__name__)
 
 
 class OpenCrBase:
-    """A `DriveBase`. Used from one thread.
+    """An `AttentiveDriveBase`. Used from one thread, but for `wake`.
 
     Args:
         path: Path of its port.
@@ -102,6 +117,9 @@ class OpenCrBase:
         # Since when each button is pressed, until a person was warned.
         self._pressed_s: dict[str, float] = {}
         self._heartbeat = 0
+        self._source: VelocitySource = CONSTANT
+        # What was commanded last.
+        self._words = (0, 0)
         # The uptime in the last block, and when that was asked for and received.
         self._uptime: tuple[int, float, float] | None = None
         self._is_torque_wanted = False
@@ -118,6 +136,16 @@ class OpenCrBase:
         """Health of the line since it was opened."""
         bus = self._bus
         return BusCounters() if bus is None else bus.counters
+
+    def attend(self, source: VelocitySource) -> None:
+        """Command what this source has that is newer, also during an exchange."""
+        self._source = source
+
+    def wake(self) -> None:
+        """Let an exchange under way ask its source now."""
+        line = self._line
+        if line is not None:
+            line.wake()
 
     def open(self) -> None:
         """Find the board and check that it is the one that is meant; wheels at rest, torque off.
@@ -254,16 +282,24 @@ class OpenCrBase:
 
     def _exchange(self, velocity: Velocity) -> DriveReading:
         is_obeying = self._is_torque_wanted and not self._is_torque_lost
-        words = opencr_words(velocity, self.limits, self._robot.wheel_separation_m) if is_obeying else (0, 0)
-        block = self._cycle(words if self._is_torque_wanted else None, velocity.until_s)
+        bus = self._used_bus
+        is_interrupted = is_obeying and bus.unheard < _UNHEARD_LIMIT
+        bus.interruption = self._renew if is_interrupted else None
+        try:
+            if is_obeying:
+                block = self._cycle(velocity, self._source.written)
+            else:
+                block = self._cycle(STANDSTILL if self._is_torque_wanted else None)
+        finally:
+            bus.interruption = None
         if self._is_torque_wanted and not block.is_torque_on and not self._is_torque_lost:
             self._is_torque_lost = True
             # A motor that has lost its power counts within one revolution afterwards.
             self._odometry = self._odometry.rebased()
-            self._command((0, 0))
+            self._command(STANDSTILL)
         faults = {MotorFault.TORQUE_LOST} if self._is_torque_lost else set()
         if is_obeying and not self._is_torque_lost:
-            goals_raw = self._wheels_raw(words)
+            goals_raw = self._wheels_raw(self._words)
             faults |= self._unfollowed(goals_raw, block)
             self._watch_buttons(block)
             left_m_s, right_m_s = (raw * self._robot.raw_m_s for raw in goals_raw)
@@ -413,11 +449,11 @@ class OpenCrBase:
 
     def _cycles_until(self, is_done: Callable[[Block], bool], limit_s: float) -> bool:
         """Exchange with a command of zero until it has the effect; whether it had in time."""
-        begin_ms = self._cycle((0, 0)).uptime_ms
+        begin_ms = self._cycle(STANDSTILL).uptime_ms
         end_s = self._host.monotonic() + limit_s
         while True:
             self._host.sleep(_POLL_S)
-            block = self._cycle((0, 0))
+            block = self._cycle(STANDSTILL)
             # Before, the board tells what was written or how it was, and not what the motors do.
             is_refreshed = (block.uptime_ms - begin_ms) % UPTIME_MODULUS >= _REFRESHED_MS
             if is_refreshed and is_done(block):
@@ -425,12 +461,12 @@ class OpenCrBase:
             if self._host.monotonic() > end_s:
                 return False
 
-    def _cycle(self, words: tuple[int, int] | None, until_s: float = math.inf) -> Block:
-        """Command, if there is anything to and it is not too late for it, change the heartbeat, and read."""
+    def _cycle(self, velocity: Velocity | None, sent: Callable[[], None] | None = None) -> Block:
+        """Command, if there is anything to, change the heartbeat, and read."""
         bus = self._used_bus
         bus.begin(self._exchange_limit_s)
-        if words is not None:
-            self._command(words if self._host.monotonic() <= until_s else (0, 0))
+        if velocity is not None:
+            self._command(velocity, sent)
         self._heartbeat = (self._heartbeat + 1) % 256
         bus.write(opencr.DEVICE, opencr.HEARTBEAT, bytes((self._heartbeat,)))
         asked_s = self._host.monotonic()
@@ -438,8 +474,22 @@ class OpenCrBase:
         self._check_uptime(block.uptime_ms, asked_s)
         return block
 
-    def _command(self, words: tuple[int, int]) -> None:
-        self._used_bus.write(opencr.DEVICE, opencr.COMMAND, encode_command(*words))
+    def _command(self, velocity: Velocity, sent: Callable[[], None] | None = None) -> None:
+        self._words = self._words_of(velocity)
+        self._used_bus.write(opencr.DEVICE, opencr.COMMAND, encode_command(*self._words), sent=sent)
+
+    def _renew(self) -> None:
+        """Command what is newer than what was commanded in this exchange; called while an answer is awaited."""
+        velocity = self._source.newer()
+        if velocity is not None:
+            self._words = self._words_of(velocity)
+            self._used_bus.interject(opencr.DEVICE, opencr.COMMAND, encode_command(*self._words))
+            self._source.written()
+
+    def _words_of(self, velocity: Velocity) -> tuple[int, int]:
+        if self._host.monotonic() > velocity.until_s:
+            return 0, 0
+        return opencr_words(velocity, self.limits, self._robot.wheel_separation_m)
 
     def _check_uptime(self, uptime_ms: int, asked_s: float) -> None:
         received_s = self._used_bus.received_s

@@ -28,7 +28,8 @@ class PolledLine(ABC):
         self._poll.register(file, select.POLLIN)
         self._poll.register(self._woken, select.POLLIN)
         # Another thread may wake the line while it is being closed: its file's number may be somebody else's then.
-        self._guard = threading.Lock()
+        # A signal handler may wake it, too, while its own thread is inside.
+        self._guard = threading.RLock()
         self._is_open = True
 
     @abstractmethod

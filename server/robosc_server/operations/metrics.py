@@ -105,6 +105,8 @@ class Metrics:
             buckets=_TASK_SECONDS,
             registry=registry,
         )
+        self._methods: dict[str, MethodMetrics] = {}
+        self._unknown = 0
         self._lookups = {"memory": 0, "store": 0, "none": 0}
         Gauge("robosc_server_calls_under_way", "Calls in progress.", registry=registry).set_function(
             lambda: self.calls_under_way
@@ -122,8 +124,6 @@ class Metrics:
             lambda: self._running()
         )
         registry.register(_LabelledCollector(self))
-        self._methods: dict[str, MethodMetrics] = {}
-        self._unknown = 0
 
     def method(self, name: str) -> MethodMetrics:
         """Return the metrics of one method; only for methods that exist, since each stays."""

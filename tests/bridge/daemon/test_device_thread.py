@@ -41,9 +41,12 @@ def test_it_steps_at_the_start_and_whenever_it_is_hurried() -> None:
     thread.start()
     assert worker.stepped.acquire(timeout=LIMIT_S)
     assert not worker.stepped.acquire(blocking=False)
+    assert not worker.is_woken
     for _ in range(3):
         thread.hurry()
         assert worker.stepped.acquire(timeout=LIMIT_S)
+    # A step under way may have something to do with it.
+    assert worker.is_woken
     assert thread.stop(LIMIT_S)
     assert worker.is_closed.is_set()
     assert not thread.is_alive

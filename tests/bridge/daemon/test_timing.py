@@ -41,10 +41,16 @@ def test_a_share_is_the_bound_of_the_bucket_that_sorting_finds(times_s: list[flo
     assert found.sum_s == pytest.approx(math.fsum(times_s))
 
 
-def test_the_buckets_are_a_quarter_wide_from_a_quarter_of_a_millisecond_to_two_seconds() -> None:
+def test_the_buckets_are_a_tenth_wide_from_a_quarter_of_a_millisecond_to_two_seconds() -> None:
     assert BOUNDS_S[0] == 0.00025
     assert 1.5 < BOUNDS_S[-1] < 2.0
-    assert all(later / one == pytest.approx(1.25, rel=0.01) for one, later in pairwise(BOUNDS_S))
+    assert all(later / one == pytest.approx(1.1, rel=0.01) for one, later in pairwise(BOUNDS_S))
+
+
+@given(st.lists(st.floats(BOUNDS_S[0], BOUNDS_S[-1]), min_size=1, max_size=50), st.sampled_from([0.5, 0.99]))
+def test_a_share_is_a_tenth_too_long_at_most(times_s: list[float], share: float) -> None:
+    exact_s = sorted(times_s)[math.ceil(share * len(times_s)) - 1]
+    assert exact_s <= latency(*times_s).share_s(share) <= 1.1 * exact_s + 1e-6
 
 
 def test_of_nothing_there_is_nothing_to_show() -> None:
@@ -65,7 +71,7 @@ def measured(timing: Timing, clock: Clock) -> dict[str, Latency]:
     return {one.name: one for one in timing.figures().latencies if one.count}
 
 
-def test_a_scan_is_followed_to_the_exchange_that_carries_what_was_decided_on_it() -> None:
+def test_a_scan_is_followed_to_the_bytes_of_what_was_decided_on_it() -> None:
     clock = Clock()
     timing = Timing(clock)
     timing.scan_taken(9.9)
@@ -75,13 +81,13 @@ def test_a_scan_is_followed_to_the_exchange_that_carries_what_was_decided_on_it(
     timing.decided()
     scan_s = timing.take_command()
     assert (scan_s, timing.take_command()) == (9.9, None)
-    # It fails, and is made again.
-    timing.put_back(scan_s)
-    scan_s = timing.take_command()
+    assert scan_s is not None
+    clock.now_s = 10.006
+    timing.written(scan_s)
     clock.now_s = 10.010
-    timing.exchanged(10.005, scan_s)
+    timing.exchanged(10.005)
     found = measured(timing, clock)
-    assert found["scan_to_wheel"].max_s == pytest.approx(0.110)
+    assert found["scan_to_wheel"].max_s == pytest.approx(0.106)
     assert found["scan_to_decision"].max_s == pytest.approx(0.104)
     assert found["exchange"].max_s == pytest.approx(0.005)
     assert "decision_period" not in found
@@ -98,7 +104,7 @@ def test_what_no_scan_has_caused_is_not_counted() -> None:
     timing.scan_passed()
     timing.commanding()
     assert timing.take_command() is None
-    timing.exchanged(10.0, None)
+    timing.exchanged(10.0)
     assert "scan_to_wheel" not in measured(timing, clock)
     # Nor does a run go on from the one before.
     timing.rested()
@@ -224,7 +230,15 @@ def test_prometheus_reads_what_the_bridge_measures() -> None:
     assert samples["robosc_bridge_stopped", "SCAN_STALE"] == 1.0
     assert samples["robosc_bridge_device_up", "scanner"] == 0.0
     assert samples["robosc_bridge_overruns_total",] == 4.0
-    assert samples["robosc_bridge_latency_seconds_bucket", "exchange", f"{BOUNDS_S[10]:g}"] == 1.0
+    # Every second bound is told.
+    buckets = {
+        key[2]: value
+        for key, value in samples.items()
+        if key[:2] == ("robosc_bridge_latency_seconds_bucket", "exchange")
+    }
+    assert list(buckets) == [*(f"{bound_s:g}" for bound_s in BOUNDS_S[::2]), "+Inf"]
+    for bound_s, count in ((BOUNDS_S[20], 0.0), (BOUNDS_S[22], 1.0), (BOUNDS_S[38], 1.0), (BOUNDS_S[40], 2.0)):
+        assert buckets[f"{bound_s:g}"] == count
     assert samples["robosc_bridge_latency_seconds_bucket", "exchange", "+Inf"] == 2.0
     assert samples["robosc_bridge_latency_seconds_sum", "exchange"] == pytest.approx(0.012)
     assert samples["robosc_bridge_line_total", "unanswered", "drive"] == 3.0

@@ -9,8 +9,10 @@ import pytest
 from robosc_bridge.daemon.threads.backoff import Backoff
 from robosc_bridge.daemon.threads.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
 from robosc_bridge.daemon.threads.workers import RESTART_LIMIT, VALID_LIMIT, DriveWorker, ScannerWorker
+from robosc_bridge.daemon.timing import Latency, Timing
 from robosc_bridge.devices.interface import (
     BINS,
+    CONSTANT,
     STANDSTILL,
     DriveLimits,
     DriveReading,
@@ -19,12 +21,14 @@ from robosc_bridge.devices.interface import (
     Scan,
     ScannerCounters,
     Velocity,
+    VelocitySource,
 )
 from robosc_bridge.errors import DeviceFaultError, DeviceSilentError, LineLostError, LineMissingError
 from robosc_bridge.safety import Caution, Reason
 
 PERIOD_S = 0.02
 FORWARD = Velocity(0.1, 0.0)
+BACKWARD = Velocity(-0.1, 0.0)
 
 
 class Clock:
@@ -109,16 +113,56 @@ class Base:
         self._called("close")
 
 
-class Scene:
-    """A drive base's worker with everything around it."""
+class AttentiveBase(Base):
+    """One that asks for a newer velocity during an exchange, after what happens meanwhile."""
 
-    def __init__(self) -> None:
+    def __init__(self, clock: Clock) -> None:
+        super().__init__(clock)
+        self.source: VelocitySource = CONSTANT
+        self.meanwhile: Callable[[], None] = lambda: None
+        self.is_written = True
+
+    def attend(self, source: VelocitySource) -> None:
+        self.source = source
+
+    def wake(self) -> None:
+        self._called("wake")
+
+    def exchange(self, velocity: Velocity) -> DriveReading:
+        self._clock.now_s += 0.001
+        if self.is_written:
+            self.source.written()
+        self._clock.now_s += 0.002
+        self.meanwhile()
+        newer = self.source.newer()
+        if newer is not None:
+            self._called("newer", newer)
+            self.source.written()
+        self._clock.now_s += 0.003
+        return super().exchange(velocity)
+
+
+class Scene:
+    """A drive base's worker with everything around it.
+
+    Args:
+        kind: Kind of its drive base.
+    """
+
+    def __init__(self, kind: type[Base] = Base) -> None:
         self.clock = Clock()
         self.gate = SafetyGate()
-        self.base = Base(self.clock)
+        self.base = kind(self.clock)
+        self.timing = Timing(self.clock)
         self.reports: list[Report] = []
         self.worker = DriveWorker(
-            self.base, self.gate, self.reports.append, PERIOD_S, self.clock, Backoff(first_s=0.5, limit_s=1.5)
+            self.base,
+            self.gate,
+            self.reports.append,
+            PERIOD_S,
+            self.clock,
+            Backoff(first_s=0.5, limit_s=1.5),
+            self.timing,
         )
 
     def step(self) -> float:
@@ -171,6 +215,119 @@ def test_torque_comes_before_motion_and_goes_after_it(scene: Scene) -> None:
     scene.gate.next = Output(STANDSTILL, False)
     scene.step()
     assert scene.taken() == [("torque", False), ("exchange", STANDSTILL)]
+
+
+class AttentiveScene(Scene):
+    """A scene whose drive base asks during an exchange, and drives."""
+
+    base: AttentiveBase
+
+    def __init__(self) -> None:
+        super().__init__(AttentiveBase)
+        self.up()
+        self.gate.next = Output(FORWARD, True)
+        self.step()
+        self.taken()
+        self.gate.asked.clear()
+
+    def command(self, velocity: Velocity, *, is_torque_wanted: bool = True) -> None:
+        """Let a scan of now be decided on, and another velocity through."""
+        self.timing.scan_taken(self.clock.now_s)
+        self.timing.commanding()
+        self.gate.next = Output(velocity, is_torque_wanted)
+        self.worker.wake()
+
+    def scan_to_wheel(self) -> Latency:
+        self.clock.now_s += 2.0
+        (found,) = [one for one in self.timing.figures().latencies if one.name == "scan_to_wheel"]
+        return found
+
+
+def test_what_is_let_through_during_an_exchange_is_commanded_within_it() -> None:
+    scene = AttentiveScene()
+    scene.base.meanwhile = lambda: scene.command(BACKWARD)
+    began_s = scene.clock.now_s
+    scene.step()
+    assert scene.taken() == ["wake", ("newer", BACKWARD), ("exchange", FORWARD)]
+    # The safety layer is asked at the very time.
+    assert scene.gate.asked == pytest.approx([began_s, began_s + 0.003])
+    assert (scene.scan_to_wheel().count, scene.scan_to_wheel().max_s) == (1, 0.0)
+
+
+def test_without_another_velocity_nothing_is_commanded_within_an_exchange() -> None:
+    scene = AttentiveScene()
+    scene.step()
+    assert scene.taken() == [("exchange", FORWARD)]
+    assert len(scene.gate.asked) == 1
+    # Something else was to be done at once.
+    scene.base.meanwhile = scene.worker.wake
+    scene.step()
+    assert scene.taken() == ["wake", ("exchange", FORWARD)]
+
+
+def test_torque_that_was_to_go_during_an_exchange_goes_also_if_it_is_wanted_again() -> None:
+    scene = AttentiveScene()
+    scene.base.meanwhile = lambda: scene.command(STANDSTILL, is_torque_wanted=False)
+    scene.step()
+    assert scene.taken() == ["wake", ("newer", STANDSTILL), ("exchange", FORWARD)]
+    scene.base.meanwhile = lambda: None
+    scene.gate.next = Output(FORWARD, True)
+    scene.step()
+    assert scene.taken() == [("torque", False), ("torque", True), ("exchange", FORWARD)]
+    scene.step()
+    assert scene.taken() == [("exchange", FORWARD)]
+
+
+def test_a_velocity_counts_as_written_when_the_drive_base_says_so() -> None:
+    scene = AttentiveScene()
+    scene.command(BACKWARD)
+    # It goes out with a later exchange only.
+    scene.base.is_written = False
+    scene.step()
+    scene.base.is_written = True
+    scene.step()
+    found = scene.scan_to_wheel()
+    assert found.count == 1
+    assert found.max_s == pytest.approx(0.007)
+
+
+def test_a_velocity_that_has_not_gone_out_when_the_base_fails_does_not_count() -> None:
+    scene = AttentiveScene()
+    scene.command(BACKWARD)
+    scene.base.is_written = False
+    scene.base.failing["exchange"] = LineLostError("/dev/x", "the line is gone")
+    scene.step()
+    scene.base.failing.clear()
+    scene.base.is_written = True
+    scene.clock.now_s += 5.0
+    for _ in range(3):
+        scene.clock.now_s += scene.step()
+    assert ("exchange", BACKWARD) in scene.taken()
+    assert scene.scan_to_wheel().count == 0
+
+
+def test_of_a_drive_base_that_does_not_tell_the_end_of_the_exchange_counts(scene: Scene) -> None:
+    scene.up()
+    for is_torque_wanted, count in ((False, 0), (True, 1)):
+        scene.gate.next = Output(FORWARD, is_torque_wanted)
+        scene.step()
+        scene.timing.scan_taken(scene.clock.now_s)
+        scene.timing.commanding()
+        scene.worker.wake()
+        scene.clock.now_s += 0.01
+        scene.step()
+        scene.clock.now_s += 2.0
+        (found,) = [one for one in scene.timing.figures().latencies if one.name == "scan_to_wheel"]
+        assert found.count == count
+        assert found.max_s == pytest.approx(0.01 * count)
+
+
+def test_a_driver_that_fails_when_it_is_woken_does_not_fail_who_wakes_it(caplog: pytest.LogCaptureFixture) -> None:
+    scene = AttentiveScene()
+    scene.base.failing["wake"] = RuntimeError("a mistake")
+    scene.worker.wake()
+    assert "the drive base's driver failed when it was woken" in caplog.text
+    assert scene.step() > 0.0
 
 
 def test_cycles_keep_their_places_in_time_and_late_ones_are_left_out(scene: Scene) -> None:

@@ -1,5 +1,6 @@
 """Requests and answers in virtual time, and every way in which an answer can be wrong."""
 
+import itertools
 import math
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -8,6 +9,7 @@ import pytest
 
 from robosc_bridge.devices.dynamixel_bus import DynamixelBus, RefusedError
 from robosc_bridge.errors import DeviceSilentError, LineLostError
+from robosc_bridge.host import Port
 from support.peer import Answers, VirtualPeer, asked, packet, status
 
 LIMIT_S = 0.1
@@ -198,6 +200,144 @@ def test_a_late_answer_is_not_taken_for_that_to_the_next_request() -> None:
             bus.read(1, 132, 4)
         assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
         assert bus.counters.foreign == 1
+
+
+class _Interrupter:
+    """Interruption that writes as soon as there is an answer to wait for; the wait is woken for it at once.
+
+    Args:
+        bus: Bus of the device.
+        line: Its line.
+        data: Data to interject, one after the other.
+    """
+
+    def __init__(self, bus: DynamixelBus, line: Port, *data: bytes) -> None:
+        self._bus = bus
+        self._line = line
+        self.left = list(data)
+        bus.interruption = self._interrupt
+        line.wake()
+
+    def _interrupt(self) -> None:
+        if self.left:
+            self._bus.interject(1, 150, self.left.pop(0))
+            self._line.wake()
+
+
+def _line_of(bus: DynamixelBus) -> Port:
+    return bus._port.line
+
+
+def _slow(request: bytes) -> Answers:
+    """One that works off its requests one after the other, each in 10 ms."""
+    return [0.01, _memory(request) if request[7] == 0x02 else status(1)]
+
+
+def test_what_is_interjected_goes_out_while_an_answer_is_awaited_and_is_heard_after_it() -> None:
+    with VirtualPeer(_slow) as peer, _bus(peer) as bus:
+        interrupter = _Interrupter(bus, _line_of(bus), b"new", b"newer")
+        begin_s = peer.time.monotonic()
+        assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
+        assert peer.time.monotonic() - begin_s == pytest.approx(0.02)
+        assert [request[7] for request in peer.requests] == [0x02, 0x03]
+        assert peer.requests[1][8:-2] == b"\x96\0new"
+        # The next one waits for the next answer that is awaited.
+        assert interrupter.left == [b"newer"]
+        assert bus.read(1, 4, 1).data == b"\4"
+        assert peer.requests[3][8:-2] == b"\x96\0newer"
+        assert (bus.counters.unanswered, bus.counters.foreign, bus.counters.requests) == (0, 0, 4)
+
+
+def test_an_answer_of_which_a_part_has_come_is_kept() -> None:
+    whole = status(1, b"good")
+    with VirtualPeer(_Scripted([whole[:8], 0.01, whole[8:]])) as peer, _bus(peer) as bus:
+        _Interrupter(bus, _line_of(bus), b"new")
+        # Not woken: the first look is the one that finds a part.
+        _line_of(bus).read(0.0)
+        assert bus.read(1, 132, 4).data == b"good"
+        assert [request[7] for request in peer.requests] == [0x02, 0x03]
+        assert bus.counters.repeated == 0
+
+
+def test_an_interjection_discards_nothing_that_has_come() -> None:
+    whole = status(1, b"good")
+    # Both parts are there, one of them unread, when it is sent.
+    with VirtualPeer(_Scripted([whole[:8]])) as peer, _bus(peer) as bus:
+        line = _line_of(bus)
+
+        def interrupt() -> None:
+            if not interrupted:
+                interrupted.append(True)
+                peer.send(whole[8:])
+                bus.interject(1, 150, b"new")
+
+        interrupted: list[bool] = []
+        bus.interruption = interrupt
+        assert bus.read(1, 132, 4).data == b"good"
+        assert line.read(0.0) == b""
+        assert bus.counters.repeated == 0
+
+
+def test_where_the_answer_is_lost_behind_which_something_was_interjected_the_request_is_made_again() -> None:
+    reads = itertools.count()
+
+    def lossy(request: bytes) -> Answers:
+        return [0.01] if request[7] == 0x02 and next(reads) == 0 else _slow(request)
+
+    with VirtualPeer(lossy) as peer, _bus(peer) as bus:
+        _Interrupter(bus, _line_of(bus), b"new")
+        begin_s = peer.time.monotonic()
+        assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
+        # Answers keep their order: nobody waits for one once the next one is there.
+        assert peer.time.monotonic() - begin_s == pytest.approx(0.04)
+        assert (bus.counters.unanswered, bus.counters.repeated) == (1, 1)
+
+
+def test_a_device_that_is_silent_is_not_asked_again_behind_what_was_interjected() -> None:
+    with VirtualPeer(_Scripted([], [])) as peer, _bus(peer) as bus:
+        _Interrupter(bus, _line_of(bus), b"new")
+        with pytest.raises(DeviceSilentError):
+            bus.read(1, 132, 4)
+        assert [request[7] for request in peer.requests] == [0x02, 0x03]
+        assert bus.counters.repeated == 0
+        # What follows is as after any silence.
+        bus.interruption = None
+        bus.begin(10.0)
+        assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
+
+
+def test_what_was_interjected_and_is_not_answered_spoils_no_later_answer() -> None:
+    late: Answers = [1.5 * LIMIT_S, status(1)]
+    with VirtualPeer(_Scripted([0.01, status(1, b"good")], late)) as peer, _bus(peer) as bus:
+        bus.begin(10.0)
+        _Interrupter(bus, _line_of(bus), b"new")
+        assert bus.read(1, 132, 4).data == b"good"
+        assert bus.counters.unanswered == 1
+        bus.interruption = None
+        # Its late answer would confirm this one.
+        bus.write(1, 64, b"\1")
+        assert bus.counters.foreign == 1
+
+
+def test_an_older_write_does_not_follow_one_that_was_interjected() -> None:
+    with VirtualPeer(_Scripted([], [])) as peer, _bus(peer) as bus:
+        _Interrupter(bus, _line_of(bus), b"new")
+        with pytest.raises(DeviceSilentError):
+            bus.write(1, 150, b"old")
+        assert [request[10:-2] for request in peer.requests] == [b"old", b"new"]
+    # One answer of two is that to the newer one: each comes as the other one.
+    with VirtualPeer(_Scripted([], [0.01, status(1)])) as peer, _bus(peer) as bus:
+        _Interrupter(bus, _line_of(bus), b"new")
+        bus.write(1, 150, b"old")
+        assert [request[10:-2] for request in peer.requests] == [b"old", b"new"]
+
+
+def test_a_write_is_told_when_the_line_has_it() -> None:
+    sent: list[int] = []
+    with VirtualPeer(_Scripted([])) as peer, _bus(peer) as bus:
+        bus.write(1, 64, b"\1", sent=lambda: sent.append(len(peer.requests)))
+        # Before the device has heard it, and again with the one that is made again, behind the one that settles.
+        assert sent == [0, 2]
 
 
 def test_an_answer_that_comes_twice_is_not_taken_for_that_to_the_next_request() -> None:

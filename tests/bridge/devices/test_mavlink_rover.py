@@ -57,6 +57,39 @@ def test_targets_are_repeated_and_new_ones_go_at_once(bench: Bench) -> None:
     assert len(bench.rover.targets) - before < 15
 
 
+class _Source:
+    """Source without anything newer that counts what was written."""
+
+    count = 0
+
+    def newer(self) -> Velocity | None:
+        return None
+
+    def written(self) -> None:
+        self.count += 1
+
+
+def test_a_velocity_counts_as_written_when_the_rover_was_sent_it(bench: Bench) -> None:
+    bench.start()
+    bench.drive(STANDSTILL, 0.2)
+    source = _Source()
+    bench.base.attend(source)
+    bench.host.sleep(0.05)
+    # One goes out ahead of the second one's turn, and the third one waits.
+    for step, count in enumerate((1, 2, 2)):
+        bench.base.exchange(Velocity(0.1 + step / 100))
+        assert source.count == count
+        bench.host.sleep(0.001)
+    bench.host.sleep(0.02)
+    bench.base.exchange(Velocity(0.12))
+    assert source.count == 3
+    # It has that one.
+    bench.base.exchange(Velocity(0.12))
+    assert source.count == 4
+    bench.host.sleep(0.001)
+    assert [round(target["vx"], 2) for target in bench.rover.targets[-3:]] == [0.1, 0.11, 0.12]
+
+
 def test_a_vehicle_that_does_not_tell_its_motion_is_stopped_and_told_after_1_s(bench: Bench) -> None:
     bench.start()
     last_s = bench.drive(FORWARD, 0.2).time_s

@@ -1,18 +1,20 @@
 """A stock TurtleBot3 through its OpenCR: what it is told byte for byte, and what can be wrong with it."""
 
+import contextlib
 import itertools
 import math
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import pytest
 
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S
-from robosc_bridge.devices.interface import MotorFault, Velocity
+from robosc_bridge.devices.interface import STANDSTILL, MotorFault, Velocity
 from robosc_bridge.devices.opencr import OpenCrBase
 from robosc_bridge.devices.robots import BURGER, WAFFLE
 from robosc_bridge.errors import DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
 from robosc_simulated import OpenCr
+from robosc_simulated.line import Sending
 from support.drive import PATIENT_S, Rig, rig
 from support.peer import Answers, VirtualPeer, asked, status
 
@@ -561,3 +563,137 @@ def test_commands_that_change_at_once_are_followed(bench: Rig) -> None:
     bench.start()
     for velocity in (Velocity(0.2), Velocity(-0.2), Velocity(0.0, 2.0), Velocity(), Velocity(0.2, -1.0)):
         assert bench.drive(velocity, 0.8).faults == frozenset()
+
+
+class _Source:
+    """Source that has a newer velocity as soon as the first answer of an exchange is awaited.
+
+    Args:
+        bench: Rig whose base asks.
+        velocity: The velocity; None: there is none.
+    """
+
+    def __init__(self, bench: Rig, velocity: Velocity | None) -> None:
+        assert isinstance(bench.base, OpenCrBase)
+        bench.base.attend(self)
+        bench.tap.packets.clear()
+        self._bench = bench
+        self._velocity = velocity
+        self.written_after: list[int] = []
+        bench.base.wake()
+
+    def newer(self) -> Velocity | None:
+        velocity, self._velocity = self._velocity, None
+        return velocity
+
+    def written(self) -> None:
+        self.written_after.append(len(self._bench.tap.packets))
+
+
+def _words(packet: str) -> tuple[int, ...]:
+    """Words of a command; none: it is another packet."""
+    data = bytes.fromhex(packet)
+    return struct.unpack_from("<i16xi", data, 10) if packet.startswith(ZERO[:29]) else ()
+
+
+def _kinds(bench: Rig) -> list[str | tuple[int, ...]]:
+    return [_words(packet) or ("beat" if packet.startswith(_HEARTBEAT) else packet) for packet in bench.tap.packets]
+
+
+def test_a_newer_velocity_is_written_while_the_board_answers() -> None:
+    with rig("opencr", profile="typical") as bench:
+        bench.start()
+        source = _Source(bench, Velocity(0.05, 0.5))
+        began_s = bench.host.monotonic()
+        reading = bench.base.exchange(Velocity(0.1, 0.5))
+        assert _kinds(bench) == [(10, 50), (5, 50), "beat", BLOCK]
+        # The goals are those that hold now.
+        assert reading.goals_m_s == pytest.approx((0.01, 0.09), abs=0.001)
+        assert source.written_after == [0, 1]
+        # It is over in the time of one more pass.
+        assert bench.host.monotonic() - began_s < 0.02
+        assert isinstance(bench.base, OpenCrBase)
+        assert bench.base.counters.unanswered == 0
+
+
+def test_a_newer_velocity_that_is_too_late_is_none() -> None:
+    with rig("opencr", profile="typical") as bench:
+        bench.start()
+        _Source(bench, Velocity(0.05, 0.5, until_s=bench.host.monotonic() - 1.0))
+        bench.base.exchange(Velocity(0.1, 0.5))
+        assert _kinds(bench) == [(10, 50), (0, 0), "beat", BLOCK]
+
+
+@pytest.mark.parametrize("lost", [1, 2])
+def test_a_command_is_not_repeated_after_a_newer_one(lost: int) -> None:
+    with rig("opencr", profile="typical") as bench:
+        bench.start()
+        bench.hurry()
+        _Source(bench, STANDSTILL)
+        bench.robot.base_line.faults.drop_next = lost
+        # Without any answer, it is told to stop.
+        with pytest.raises(DeviceSilentError) if lost == 2 else contextlib.nullcontext():
+            bench.base.exchange(Velocity(0.1, 0.5))
+        bench.host.sleep(0.02)
+        commands = [kind for kind in _kinds(bench) if isinstance(kind, tuple)]
+        assert commands == [(10, 50), (0, 0), (0, 0)][: lost + 1]
+
+
+def test_a_board_that_is_slow_is_sent_no_more_than_without_a_newer_velocity() -> None:
+    counts = []
+    for newer in (None, STANDSTILL):
+        with rig("opencr") as bench:
+            bench.start()
+            bench.hurry()
+            _Source(bench, newer)
+            _mute(bench, "left")
+            with pytest.raises(DeviceSilentError):
+                bench.base.exchange(Velocity(0.1, 0.5))
+            bench.host.sleep(0.001)
+            assert _kinds(bench)[-1] == (0, 0)
+            counts.append(len(bench.tap.packets))
+            # After a silence nothing is interjected.
+            _Source(bench, Velocity(0.05, 0.5))
+            with pytest.raises(DeviceSilentError):
+                bench.base.exchange(Velocity(0.1, 0.5))
+            assert (5, 50) not in _kinds(bench)
+    assert counts[0] == counts[1]
+
+
+class _Forgetful:
+    """A board that loses what comes while it has a packet to answer."""
+
+    def __init__(self, board: OpenCr) -> None:
+        self._board = board
+        self.lost = 0
+        self.baud = board.baud
+        self.update, self.due_s, self.plug_in = board.update, board.due_s, board.plug_in
+
+    def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
+        if self._board._waiting:
+            self.lost += 1
+            return []
+        return self._board.receive(data, baud)
+
+
+def test_a_board_that_loses_what_comes_before_it_has_answered_is_sent_no_more_of_it() -> None:
+    with rig("opencr", profile="typical") as bench:
+        bench.start()
+        bench.hurry()
+        bench.tap.device = board = _Forgetful(_board(bench))
+        for number in range(5):
+            velocity = Velocity(0.1, 0.1 * number)
+            _Source(bench, velocity)
+            assert bench.base.exchange(STANDSTILL).is_torque_on
+            reading = bench.base.exchange(velocity)
+            assert reading.goals_m_s == pytest.approx((0.1 - 0.008 * number, 0.1 + 0.008 * number), abs=0.001)
+        # The last two waited for an answer.
+        assert board.lost == 3
+
+
+def test_with_torque_off_no_source_is_asked(bench: Rig) -> None:
+    bench.base.open()
+    source = _Source(bench, Velocity(0.1))
+    bench.base.exchange(Velocity(0.1))
+    assert [packet.split()[7] for packet in bench.tap.packets] == ["03", "02"]
+    assert source.written_after == []

@@ -204,7 +204,7 @@ class TestStatus:
             "  at x 1.00 m, y 2.00 m, heading 29 degrees",
             "  moves at 0.10 m/s, -0.20 rad/s",
             "  decisions left out: 4",
-            "  exchange: p50 2.3 ms, p99 10.0 ms, at most 10.0 ms",
+            "  exchange: p50 2.0 ms, p99 10.0 ms, at most 10.0 ms",
             "  line of the drive: requests 70, unanswered 3",
             "  Desk  idle count=3",
             "  allowed now: drive",

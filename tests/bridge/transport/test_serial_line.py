@@ -162,6 +162,25 @@ def test_waking_a_line_that_nobody_reads_never_blocks(pty: PtyEnd, line: SerialL
     assert _everything(line, 1) == b"x"
 
 
+def test_a_signal_handler_may_wake_a_line_that_its_own_thread_is_waking(
+    line: SerialLine, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    real = os.write
+    handled: list[bytes] = []
+
+    def interrupted(file: int, data: bytes) -> int:
+        if not handled:
+            handled.append(data)
+            # As the handler would, in the midst of it.
+            line.wake()
+        return real(file, data)
+
+    monkeypatch.setattr(os, "write", interrupted)
+    line.wake()
+    assert handled == [b"\0"]
+    assert line.read(LIMIT_S) == b""
+
+
 def test_wake_does_not_take_bytes_along(pty: PtyEnd, line: SerialLine) -> None:
     pty.send(b"x")
     line.wake()

@@ -31,10 +31,11 @@ class DeviceThread:
         self._thread.start()
 
     def hurry(self) -> None:
-        """Take the next step now: something has changed that must not wait for a period."""
+        """Take the next step now, and wake the one under way: something has changed that must not wait."""
         with self._condition:
             self._is_hurried = True
             self._condition.notify()
+        self._worker.wake()
 
     def stop(self, limit_s: float) -> bool:
         """End after the step under way, with the worker closed; whether that was done in time."""

@@ -14,7 +14,16 @@ from robosc_bridge.daemon.threads.backoff import Backoff
 from robosc_bridge.daemon.threads.frame_errors import FrameErrorMonitor
 from robosc_bridge.daemon.threads.reports import Device, DeviceDown, DeviceUp, Report, ResetDone, SafetyNotice
 from robosc_bridge.daemon.timing import Timing
-from robosc_bridge.devices.interface import DriveBase, DriveReading, MotorFault, RangeScanner, Scan, Velocity
+from robosc_bridge.devices.interface import (
+    STANDSTILL,
+    AttentiveDriveBase,
+    DriveBase,
+    DriveReading,
+    MotorFault,
+    RangeScanner,
+    Scan,
+    Velocity,
+)
 from robosc_bridge.errors import BridgeError, DeviceSilentError
 from robosc_bridge.safety import Caution, Reason
 
@@ -98,7 +107,7 @@ class Worker(Protocol):
         """Do what is due; when the next step is."""
 
     def wake(self) -> None:
-        """Let a step that waits in its thread end soon; called from other threads."""
+        """Let a step that waits in its thread go on with what is new, or end soon; called from other threads."""
 
     def close(self) -> None:
         """Give everything back; never raises."""
@@ -107,7 +116,8 @@ class Worker(Protocol):
 class DriveWorker:
     """Worker that keeps a drive base in its cycle.
 
-    It sends the velocities that the safety layer lets through, and reports the readings.
+    It sends the velocities that the safety layer lets through, and reports the readings. For a drive base that asks
+    during an exchange, too, it is the `VelocitySource`.
 
     Args:
         base: The drive base.
@@ -139,6 +149,9 @@ class DriveWorker:
         self.is_exchanging = False
         self._timing = timing or Timing(clock)
         self._base = base
+        self._attentive = base if isinstance(base, AttentiveDriveBase) else None
+        if self._attentive is not None:
+            self._attentive.attend(self)
         self._gate = gate
         self._report = report
         self._period_s = period_s
@@ -150,6 +163,14 @@ class DriveWorker:
         self._silent = 0
         self._due_s = self._open_at_s = -math.inf
         self._notice = SafetyNotice((), ())
+        # True from `wake` until the safety layer is asked.
+        self._is_newer = False
+        # The velocity that the drive base was given last, and the time of the scan that it was decided on, until it is
+        # written.
+        self._given = STANDSTILL
+        self._scan_s: float | None = None
+        # True if torque was to go during an exchange: it goes, whatever is wanted afterwards.
+        self._must_let_go = False
         # Faults that a person was told of since it was opened or reset: one that comes and goes is told once.
         self._told: frozenset[MotorFault] = frozenset()
 
@@ -207,21 +228,26 @@ class DriveWorker:
         if is_reset:
             self._is_reset_wanted = False
             self._reset()
-        scan_s = self._timing.take_command()
-        command = self._ask(now_s)
+        if self._must_let_go:
+            self._must_let_go = False
+            if self._has_torque:
+                self._switch_torque(False)
+                now_s = self._clock()
+        command = self._take(now_s)
         if command.is_torque_wanted != self._has_torque:
-            self._base.set_torque(command.is_torque_wanted)
-            self._has_torque = command.is_torque_wanted
+            self._switch_torque(command.is_torque_wanted)
             # That took a while: what was to be done then may be wrong now.
-            command = self._ask(self._clock())
+            command = self._take(self._clock())
         began_s = self._clock()
         self.is_exchanging, self.stepped_s = True, began_s
-        try:
-            reading = self._base.exchange(command.velocity)
-        except BridgeError:
-            self._timing.put_back(scan_s)
-            raise
-        self._timing.exchanged(began_s, scan_s)
+        self._given = command.velocity
+        reading = self._base.exchange(command.velocity)
+        self._timing.exchanged(began_s)
+        if not self._has_torque:
+            # With torque off no velocity is written.
+            self._scan_s = None
+        elif self._attentive is None:
+            self.written()
         self._silent = 0
         if news := reading.faults - self._told:
             _log.warning("the motors report: %s", ", ".join(sorted(news)))
@@ -236,6 +262,37 @@ class DriveWorker:
         if self._due_s <= now_s:
             # Too late for one cycle or more: they are left out.
             self._due_s = now_s + self._period_s
+
+    def _switch_torque(self, is_on: bool) -> None:
+        # A velocity from before does not count.
+        self._scan_s = None
+        self._base.set_torque(is_on)
+        self._has_torque = is_on
+
+    def newer(self) -> Velocity | None:
+        """Return the velocity that the safety layer lets through now, if `wake` was called and it is another one."""
+        if not self._is_newer:
+            return None
+        command = self._take(self._clock())
+        self._must_let_go = self._must_let_go or not command.is_torque_wanted
+        if command.velocity == self._given:
+            return None
+        self._given = command.velocity
+        return command.velocity
+
+    def written(self) -> None:
+        """Note that the bytes of the last velocity are on the line."""
+        scan_s, self._scan_s = self._scan_s, None
+        if scan_s is not None:
+            self._timing.written(scan_s)
+
+    def _take(self, now_s: float) -> DriveCommand:
+        """Return the command of the safety layer, and remember the scan that it was decided on."""
+        self._is_newer = False
+        scan_s = self._timing.take_command()
+        if scan_s is not None:
+            self._scan_s = scan_s
+        return self._ask(now_s)
 
     def _ask(self, now_s: float) -> DriveCommand:
         """Return the command of the safety layer; new reasons and warnings in it are reported."""
@@ -267,7 +324,13 @@ class DriveWorker:
         return min(self._open_at_s, now_s + _CLOSED_S)
 
     def wake(self) -> None:
-        """Do nothing: no step waits longer than its line's limit."""
+        """Let an exchange under way command what the safety layer lets through now."""
+        self._is_newer = True
+        if self._attentive is not None:
+            try:
+                self._attentive.wake()
+            except Exception:  # Who wants to hurry it must not end by it: it may be the loop.
+                _log.exception("the drive base's driver failed when it was woken")
 
     def close(self) -> None:
         """Stop the wheels, torque off, give the line back."""

@@ -31,6 +31,7 @@ class Body:
         ids: Ids of the left and the right servo.
         baud_code: Value of their register Baud Rate.
         velocity_limit: Value of their register Velocity Limit; None: the factory's.
+        scanner_y_m: The laser's place to the left of the middle.
     """
 
     name: str
@@ -47,6 +48,7 @@ class Body:
     ids: tuple[int, int] = (1, 2)
     baud_code: int = 3
     velocity_limit: int | None = None
+    scanner_y_m: float = 0.0
 
 
 BODIES = {
@@ -71,6 +73,7 @@ class _BodyFile(Struct, frozen=True, kw_only=True, forbid_unknown_fields=True):
     wheel_separation_m: Annotated[float, Meta(ge=0.01, le=5)]
     radius_m: Annotated[float, Meta(ge=0.01, le=5)]
     scanner_x_m: Annotated[float, Meta(ge=-5, le=5)] = 0.0
+    scanner_y_m: Annotated[float, Meta(ge=-5, le=5)] = 0.0
     servo_model: str = "XL430-W250"
     gear_ratio: Annotated[float, Meta(ge=0.01, le=100)] = 1.0
     are_mirrored: tuple[bool, bool] = (False, True)
@@ -119,4 +122,5 @@ def find_body(source: str | Path) -> Body:
         said.ids,
         BAUDS.index(said.baud),
         said.velocity_limit,
+        said.scanner_y_m,
     )

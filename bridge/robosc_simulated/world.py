@@ -407,5 +407,6 @@ class World:
             return self._sweep.lengths_m(x_m, y_m, self.heading_rad, self._discs)
 
     def _scanner_place(self) -> tuple[float, float]:
-        aside_m = self.body.scanner_x_m
-        return self.x_m + math.cos(self.heading_rad) * aside_m, self.y_m + math.sin(self.heading_rad) * aside_m
+        cosine, sine = math.cos(self.heading_rad), math.sin(self.heading_rad)
+        ahead_m, left_m = self.body.scanner_x_m, self.body.scanner_y_m
+        return self.x_m + cosine * ahead_m - sine * left_m, self.y_m + sine * ahead_m + cosine * left_m

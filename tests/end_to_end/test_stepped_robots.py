@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 from robosc.model.structure import Deployment
-from robosc_simulated import Motion, Obstacle, Scene, load_scene, maze_scene, room
+from robosc_simulated import PROFILES, Motion, Obstacle, Scene, load_scene, maze_scene, room
 from robosc_simulated.motion_checks import Halt, check_line, check_maze
 from support.models import EXAMPLES
 from support.stepped_twin import SteppedTwin
@@ -73,8 +73,9 @@ def follow_the_person(twin: SteppedTwin) -> Judge:
     twin.tell("/button")
     twin.drive(0.03, "the robot to back off on")
     twin.stand("the robot to be far enough away")
-    # From the LiDAR, which is behind its middle, to the middle of the arc that it sees of the person: 0.8 m.
-    assert 0.6 < gap_m() < 0.75
+    # From the LiDAR, which is behind its middle, to the middle of the arc that it sees of the person: 0.8 m; more with
+    # noise, since one near sample is enough to back off on.
+    assert 0.6 < gap_m() < 0.85
     twin.world.move_obstacle(PERSON, x_m + 1.8, y_m)
     twin.drive(0.2, "the robot to follow again")
     twin.world.put_obstacle(PERSON, False)
@@ -123,10 +124,13 @@ NOT_CARRIED = {"object_finder/object_finder", "ball_pusher/ball_pusher"}
 """The camera has no colours and nothing can be pushed; docs/twin.md tells more."""
 
 
+@pytest.mark.parametrize(("profile", "seed"), [("ideal", 0), ("typical", 1), ("bad-day", 2), ("bad-day", 3)])
 @pytest.mark.parametrize("model", PLAYS)
-def test_it_does_what_it_is_for_and_only_what_its_supervisor_allows(model: str, tmp_path: Path) -> None:
+def test_it_does_what_it_is_for_and_only_what_its_supervisor_allows(
+    model: str, profile: str, seed: int, tmp_path: Path
+) -> None:
     play = PLAYS[model]
-    with SteppedTwin(model, play.scene(), tmp_path, play.deployment) as twin:
+    with SteppedTwin(model, play.scene(), tmp_path, play.deployment, seed, PROFILES[profile]) as twin:
         check = play.act(twin)
         motion, wrong = twin.finish()
     assert wrong == ()

@@ -105,3 +105,24 @@ def test_a_scan_that_tells_nothing_is_blindness(scan: Scan, blind: bool) -> None
 def test_no_scan_breaks_it(ranges: list[float], start: float, step: float) -> None:
     person = find_person(Scan(ranges, start, step, 0.1, FARTHEST_M), PersonSettings(0.0, 10.0, 0.15, 2))
     assert person is None or 0.0 <= person.distance_m <= FARTHEST_M
+
+
+@pytest.mark.parametrize("start_rad", [0.0, 1.0])
+@given(lost=st.lists(st.integers(0, 359), max_size=12))
+def test_beams_that_are_lost_make_no_person_of_a_wall(start_rad: float, lost: list[int]) -> None:
+    """A wall ahead, as far as it is seen, in which single beams return nothing."""
+    ranges = list(scan_of([(3.0, 0.0, 1.5)], start_rad=start_rad).ranges)
+    for beam in lost:
+        # No three of them side by side.
+        if math.isfinite(ranges[beam - 1]) and math.isfinite(ranges[beam - 2]):
+            ranges[beam] = math.inf if math.isfinite(ranges[(beam + 1) % 360]) else ranges[beam]
+    assert find_person(Scan(ranges, start_rad, math.tau / 360, 0.1, FARTHEST_M)) is None
+
+
+def test_what_is_hidden_for_longer_ends_a_thing() -> None:
+    ranges = [math.inf] * 360
+    for beam in (*range(10, 16), *range(19, 25)):
+        ranges[beam] = 1.0
+    person = find_person(Scan(ranges, 0.0, math.tau / 360, 0.1, FARTHEST_M), PersonSettings(widest_m=0.15))
+    assert person is not None
+    assert person.left_m == pytest.approx(math.sin(math.radians(12.5)), abs=0.01)

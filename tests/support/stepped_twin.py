@@ -27,6 +27,7 @@ from robosc_examples.motion import Turn, clamped, steered, turning_speed, wrappe
 from robosc_examples.persons import Scan, find_person
 from robosc_simulated import (
     BODIES,
+    IDEAL,
     Motion,
     MotionRecorder,
     Mount,
@@ -37,6 +38,7 @@ from robosc_simulated import (
     read_motion,
 )
 from robosc_simulated.motion_checks import STILL_M_S, STILL_RAD_S
+from robosc_simulated.profile import Profile
 from support.generated import example_supervisor
 from support.layers import BothSides
 
@@ -61,6 +63,7 @@ class SteppedTwin:
         folder: Folder for its event log and its motion.
         deployment: Deployment of its supervisor.
         seed: Seed of what the scene leaves to chance.
+        profile: Distance of wheels and sensors from ideal.
 
     Attributes:
         world: World that it is in.
@@ -76,6 +79,7 @@ class SteppedTwin:
         folder: Path,
         deployment: Deployment = Deployment.CONTROLLER,
         seed: int = 0,
+        profile: Profile = IDEAL,
     ) -> None:
         self.held_back = 0
         self.called: list[str] = []
@@ -85,7 +89,7 @@ class SteppedTwin:
         self._stack = ExitStack()
         clock = ManualClock(epoch_s=1_000_000.0)
         self._time = Timebase(clock)
-        self.world = World(BODIES["burger"], scene, self._time, seed=seed)
+        self.world = World(BODIES["burger"], scene, self._time, seed=seed, profile=profile)
         self.world.left.is_driven = self.world.right.is_driven = True
         self._eye = PinholeCamera(Mount(), scene, seed)
         self._detector = LineDetector(LineSettings(), 0.0)

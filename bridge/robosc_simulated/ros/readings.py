@@ -103,6 +103,7 @@ class Mounted:
         x_m: Distance forward.
         z_m: Distance up.
         pitch_rad: Pitch downwards.
+        y_m: Distance to the left.
     """
 
     parent: str
@@ -110,6 +111,7 @@ class Mounted:
     x_m: float
     z_m: float
     pitch_rad: float = 0.0
+    y_m: float = 0.0
 
 
 ODOM, FOOTPRINT, BASE, SCANNER, CAMERA = "odom", "base_footprint", "base_link", "base_scan", "camera_link"

@@ -132,7 +132,7 @@ class RosRobot:
         body = self.world.body
         found = [
             Mounted(FOOTPRINT, BASE, 0.0, _BASE_Z_M),
-            Mounted(BASE, SCANNER, body.scanner_x_m, _SCANNER_Z_M),
+            Mounted(BASE, SCANNER, body.scanner_x_m, _SCANNER_Z_M, y_m=body.scanner_y_m),
         ]
         if self._camera is not None:
             mount = self._mount

@@ -172,7 +172,7 @@ def mounting(message: Any, frame: Mounted) -> Any:
     message.child_frame_id = frame.child
     _set_header(message.header, 0.0, frame.parent)
     place = message.transform
-    place.translation.x, place.translation.z = frame.x_m, frame.z_m
+    place.translation.x, place.translation.y, place.translation.z = frame.x_m, frame.y_m, frame.z_m
     place.rotation.y, place.rotation.w = _turned(frame.pitch_rad)
     return message
 

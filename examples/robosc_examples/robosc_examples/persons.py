@@ -6,6 +6,8 @@ from typing import NamedTuple
 
 FULL_CIRCLE_RAD = math.tau - 0.1
 SURE_BEAMS = 5
+# So many beams that return nothing do not end a thing: a LiDAR loses some, and parts of a wall are no persons.
+LOST_BEAMS = 2
 
 
 class PersonSettings(NamedTuple):
@@ -75,16 +77,20 @@ def _things(scan: Scan, gap_m: float) -> list[list[int]]:
     for beam, range_m in enumerate(scan.ranges):
         if not scan.nearest_m <= range_m <= scan.farthest_m:
             continue
-        if things and things[-1][-1] == beam - 1 and abs(scan.ranges[beam - 1] - range_m) <= gap_m:
+        if things and _go_on(scan, things[-1][-1], beam, gap_m):
             things[-1].append(beam)
         else:
             things.append([beam])
-    last = len(scan.ranges) - 1
-    is_circle = abs(scan.step_rad) * (last + 1) >= FULL_CIRCLE_RAD
-    meet = len(things) > 1 and things[0][0] == 0 and things[-1][-1] == last
-    if is_circle and meet and abs(scan.ranges[0] - scan.ranges[last]) <= gap_m:
+    count = len(scan.ranges)
+    is_circle = abs(scan.step_rad) * count >= FULL_CIRCLE_RAD
+    if is_circle and len(things) > 1 and _go_on(scan, things[-1][-1] - count, things[0][0], gap_m):
         things[0] = things.pop() + things[0]
     return things
+
+
+def _go_on(scan: Scan, before: int, beam: int, gap_m: float) -> bool:
+    """Return True if a beam shows the same thing as the last one before it that has returned."""
+    return beam - before <= 1 + LOST_BEAMS and abs(scan.ranges[before] - scan.ranges[beam]) <= gap_m
 
 
 def _person(scan: Scan, beams: list[int]) -> tuple[float, Person]:

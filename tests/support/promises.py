@@ -239,9 +239,9 @@ def _clock_jumps(bridge: Driven, stack: ExitStack) -> Cause:
 
 LINE = {"options": "{}"}
 ITSELF = {
-    "opencr": "OpenCR, when its host's heartbeat is missing for 0.5 s",
+    "opencr": "OpenCR, 0.5 s after its host's last heartbeat",
     "dynamixel": "the servos' bus watchdogs, after 0.5 s",
-    "mavlink-rover": "the autopilot, when its target is 3 s old",
+    "mavlink-rover": "the autopilot, when its velocity target is 3 s old",
 }
 LONE_S = {"opencr": 0.56, "dynamixel": 0.56, "mavlink-rover": 3.06}
 LAYER = "the safety layer: "
@@ -264,8 +264,8 @@ _ROWS: tuple[tuple[str, Mapping[str, str] | str, Times, Prepare, dict[str, objec
      {"opencr": 0.2, "dynamixel": 0.2, "mavlink-rover": 0.4},
      _after(lambda bridge: wires(bridge, drop_share=1.0)), {"sections": LINE}),
     ("a servo is mute, or a rover's motor is gone",
-     {"opencr": "OpenCR, which works off its host's last word of zero late",
-      "dynamixel": "the driver, which halts the other one",
+     {"opencr": "OpenCR, which carries out the host's last command (zero) late",
+      "dynamixel": "the driver, which stops the other motor",
       "mavlink-rover": LAYER + "`WHEEL_ASTRAY`"},
      {"opencr": 1.1, "dynamixel": 0.2, "mavlink-rover": 2.3}, _dies, {"sections": LINE}),
     ("a motor is dead: its wheel is held", LAYER + "`MOTOR_FAULT`, `WHEEL_ASTRAY`",
@@ -283,9 +283,9 @@ _ROWS: tuple[tuple[str, Mapping[str, str] | str, Times, Prepare, dict[str, objec
     ("the supervisor fails", LAYER + "`SUPERVISOR_FAULT`", _all(0.1), _fails, {}),
     ("the operator is gone (`operator_link_timeout_s: 0.3`)", LAYER + "`OPERATOR_LOST`", _all(0.36), _operator_goes,
      {"sections": {"safety": "{operator_link_timeout_s: 0.3}", "remote": "{grpc_address: '127.0.0.1:1'}"}}),
-    ("the view is gone", "nobody: a page looks on; an operator's link is one of its own", _all(None), _view_goes, {}),
+    ("the view is gone", "nobody: a page only watches; it is not the operator's link", _all(None), _view_goes, {}),
     ("the disk is full", "nobody: entries of the log are dropped and counted", _all(None), _disk_fills, {}),
-    ("the clock jumps", "nobody: all times are those of a clock that nobody sets", _all(None), _clock_jumps, {}),
+    ("the clock jumps", "nobody: times come from a clock that cannot be set", _all(None), _clock_jumps, {}),
 )  # fmt: skip
 
 PROMISES: tuple[Promise, ...] = tuple(
@@ -296,11 +296,11 @@ PROMISES: tuple[Promise, ...] = tuple(
 
 
 def row(promise: Promise, virtual_s: float, real_s: float) -> str:
-    """Return a row of the page in Markdown; where nothing stops the wheels, the times are those they went on for."""
+    """Return a row of the page in Markdown; where nothing stops the wheels, both times read 'continues'."""
 
     def shown(time_s: float) -> str:
-        return "goes on" if promise.promised_s is None else f"{time_s:.2f} s"
+        return "continues" if promise.promised_s is None else f"{time_s:.2f} s"
 
-    promised = "goes on" if promise.promised_s is None else f"{promise.promised_s:g} s"
+    promised = "continues" if promise.promised_s is None else f"{promise.promised_s:g} s"
     cells = (promise.fault, f"`{promise.base}`", promise.by, promised, shown(virtual_s), shown(real_s))
     return f"| {' | '.join(cells)} |"

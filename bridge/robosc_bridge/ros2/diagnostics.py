@@ -70,7 +70,7 @@ def entries(link: Link, snapshot: Snapshot | None, age_s: float) -> tuple[Entry,
     if link.problem:
         return (Entry(BRIDGE, Level.ERROR, link.problem, known), *_stale(snapshot, "The bridge is not heard."))
     if snapshot is None:
-        return (Entry(BRIDGE, Level.WARN, "The bridge's loop has not turned yet.", known),)
+        return (Entry(BRIDGE, Level.WARN, "The bridge's loop has not run yet.", known),)
     if age_s > STALE_S:
         hangs = Entry(BRIDGE, Level.ERROR, f"The bridge's loop hangs, for {age_s:.1f} s.", known)
         return (hangs, *_stale(snapshot, "The bridge's loop hangs."))

@@ -24,7 +24,7 @@ class Reason(StrEnum):
     SCAN_STALE = "The scanner has made no full revolution for too long."
     SCAN_BLIND = "The scanner measures nothing in the direction of motion."
     MOTOR_SILENT = "The motors have not answered for too long."
-    LOOP_OVERRUN = "The supervisor's loop has not turned for too long."
+    LOOP_OVERRUN = "The supervisor's loop has not run for too long."
     OPERATOR_LOST = "The link to the operator is lost."
 
 

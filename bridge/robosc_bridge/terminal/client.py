@@ -123,7 +123,7 @@ class BridgeClient:
             raise RefusedError(response.refusal)
 
     def status(self) -> pb.Snapshot | None:
-        """Return a snapshot of what the bridge is doing; None: its loop has not turned yet."""
+        """Return a snapshot of what the bridge is doing; None: its loop has not run yet."""
         with self._translated():
             response = self._stub.GetStatus(pb.GetStatusRequest(), timeout=STATUS_LIMIT_S)
         return response.snapshot if response.HasField("snapshot") else None

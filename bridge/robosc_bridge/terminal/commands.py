@@ -145,7 +145,7 @@ def _status(client: Any, arguments: argparse.Namespace) -> int:
 
     snapshot = client.status()
     if snapshot is None:
-        return _failed("the bridge is there, and its loop has not turned yet", REFUSED)
+        return _failed("the bridge answers, but its loop has not run yet", REFUSED)
     if arguments.json:
         sys.stdout.write(json.dumps(as_json(snapshot), indent=2) + "\n")
     else:

@@ -248,7 +248,7 @@ def test_a_thread_that_is_halted_between_decision_and_writing_sends_no_old_veloc
 @pytest.mark.parametrize(
     ("row", "safety", "message"),
     [
-        ("the loop hangs", "{}", "The supervisor's loop has not turned for too long."),
+        ("the loop hangs", "{}", "The supervisor's loop has not run for too long."),
         ("no command comes", "{overrun_s: 1.0}", ""),
     ],
 )

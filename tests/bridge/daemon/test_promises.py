@@ -36,14 +36,14 @@ def test_the_page_tells_every_promise_and_nothing_else() -> None:
             promise.fault,
             f"`{promise.base}`",
             promise.by,
-            "goes on" if promise.promised_s is None else f"{promise.promised_s:g} s",
+            "continues" if promise.promised_s is None else f"{promise.promised_s:g} s",
         )
         for promise in PROMISES
     ]
     assert [cells[:4] for cells in found] == promised
     for cells in found:
-        if cells[3] == "goes on":
-            assert cells[4:] == ("goes on", "goes on")
+        if cells[3] == "continues":
+            assert cells[4:] == ("continues", "continues")
             continue
         promised_s, virtual_s, real_s = (float(cell.removesuffix(" s")) for cell in cells[3:])
         assert virtual_s <= promised_s, cells

@@ -35,7 +35,7 @@ def test_states_and_modes_have_their_numbers() -> None:
 
 def test_times_and_limits() -> None:
     for text in (
-        f"has not turned for {stream.STALE_S:g} s",
+        f"has not run for {stream.STALE_S:g} s",
         f"after {stream.GONE_S:g} s the heartbeat ends",
         f"A scan is sent for {stream.SCAN_LIMIT_S:g} s, a reading of the motors for {stream.READING_LIMIT_S:g} s",
         f"between {commands.SHORTEST_INTERVAL_S * 1000:g} ms and an hour",

@@ -24,7 +24,7 @@ def test_times() -> None:
         f"`--rate` ({command.RATE_HZ:g})",
         f"smallest difference of the last {clock_offset.WINDOW_S:g} s",
         f"older than {relay.STALE_S:g} s",
-        f"is silent for {relay.SILENCE_S:g} s, or its loop has not turned for {STALE_S:g} s",
+        f"is silent for {relay.SILENCE_S:g} s, or its loop has not run for {STALE_S:g} s",
     ):
         assert text in PAGE
     assert (command.REPORT_S, command.RETRY_S, relay.BATTERY_S) == (1.0, 1.0, 1.0)

@@ -240,7 +240,7 @@ class TestStatus:
     ) -> None:
         daemon.feed._snapshot = None
         assert main(["status", "--address", address]) == 1
-        assert "has not turned yet" in capsys.readouterr().err
+        assert "has not run yet" in capsys.readouterr().err
 
     def test_a_terminal_obeys_nothing_of_what_is_shown(self) -> None:
         snapshot = pb.Snapshot(problem="\x1b]0;x\x07\n", stops=["a\nb"], enabled=["\x1b[2J"])

@@ -323,7 +323,7 @@ class TokenFile:
             if self._clock() - self._checked_s >= _CHECK_PERIOD_S:
                 self._checked_s = self._clock()
                 try:
-                    if _stamp(self._path.stat()) != self._stamp:
+                    if stamp_of(self._path.stat()) != self._stamp:
                         self._entries, self._stamp = _read(self._path)
                         _log.info("%s: reloaded", self._path)
                         known = {entry.digest for entry in self._entries}
@@ -353,7 +353,8 @@ class TokenFile:
         self._is_scope_missing = words is not None
 
 
-def _stamp(status: os.stat_result) -> tuple[int, int, int]:
+def stamp_of(status: os.stat_result) -> tuple[int, int, int]:
+    """Return what changes with a file: time, size and inode."""
     return status.st_mtime_ns, status.st_size, status.st_ino
 
 
@@ -383,6 +384,6 @@ def _read_text(path: Path) -> tuple[str, tuple[int, int, int]]:
     if len(data) > MAXIMUM_BYTES:
         raise SecurityError(f"{path}: larger than {MAXIMUM_BYTES} bytes")
     try:
-        return data.decode(), _stamp(status)
+        return data.decode(), stamp_of(status)
     except UnicodeDecodeError as error:
         raise SecurityError(f"{path}: not UTF-8") from error

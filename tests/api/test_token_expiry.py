@@ -285,6 +285,14 @@ def test_the_file_stays_what_it_is(run: Run, file: Path, tmp_path: Path) -> None
     assert sorted(path.name for path in real.iterdir()) == ["tokens"]
 
 
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can change the owner of a file")
+def test_the_file_stays_that_of_the_service(run: Run, file: Path) -> None:
+    write(file)
+    os.chown(file, 4711, 4712)
+    run("add", "a")
+    assert (file.stat().st_uid, file.stat().st_gid) == (4711, 4712)
+
+
 def test_files_that_cannot_be_kept(run: Run, file: Path) -> None:
     assert "No such file" in run("list")
     assert "No such file" in run("rotate", "a")

@@ -4,6 +4,8 @@ import argparse
 import json
 import logging
 import os
+import subprocess
+import sys
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -14,6 +16,7 @@ from hypothesis import strategies as st
 
 from robosc_api.security import Quota, Scope, SecurityError, TokenFile, add_tokens_arguments, make_token, run_tokens
 from robosc_api.security.tokens import SOON_S, Entry, parse_tokens, read_time, time_text
+from support.waiting import PATIENCE_S
 
 DAY_S = 86400
 NOW_S = read_time("2026-11-26T12:00:00Z")
@@ -226,20 +229,25 @@ def test_a_token_goes_to_a_file_of_its_own(run: Run, file: Path, tmp_path: Path,
     assert file.read_text() == before
 
 
-def test_a_token_that_cannot_be_shown_is_not_added(file: Path, clock: Clock, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.parametrize("is_full", [True, False])
+@pytest.mark.parametrize("more", [[], ["--json"], ["--json", "-o", "token"]])
+def test_a_token_that_cannot_be_shown_is_not_added(more: list[str], is_full: bool, file: Path) -> None:
+    """A disk is full, or a reader has left, which is no fault of other commands."""
     write(file, make_token("a", (Scope.SYNTHESIZE,))[1])
     before = file.read_text()
-    parser = argparse.ArgumentParser("robosc-server tokens")
-    add_tokens_arguments(parser, (Scope.SYNTHESIZE,))
-    with Path("/dev/full").open("w") as full:
-        monkeypatch.setattr("sys.stdout", full)
-        with pytest.raises(OSError, match="No space left"):
-            run_tokens(parser.parse_args(["rotate", str(file), "a"]), clock)
-        monkeypatch.undo()
-        # What is left in the buffer is lost, too.
-        with pytest.raises(OSError, match="No space left"):
-            full.flush()
-        os.dup2(os.open(os.devnull, os.O_WRONLY), full.fileno())
+    if is_full:
+        place = os.open("/dev/full", os.O_WRONLY)
+    else:
+        reader, place = os.pipe()
+        os.close(reader)
+    command = [str(Path(sys.executable).with_name("robosc-server")), "tokens", "rotate", str(file), "a", *more]
+    found = subprocess.run(
+        command, stdout=place, stderr=subprocess.PIPE, text=True, cwd=file.parent, timeout=PATIENCE_S, check=False
+    )
+    os.close(place)
+    reason = "No space left on device" if is_full else "Broken pipe"
+    message = f"robosc-server: the token cannot be written ({reason}), so {file} is unchanged\n"
+    assert (found.returncode, found.stderr) == (2, message)
     assert file.read_text() == before
     assert [path.name for path in file.parent.iterdir()] == ["tokens"]
 
@@ -275,6 +283,14 @@ def test_the_file_stays_what_it_is(run: Run, file: Path, tmp_path: Path) -> None
     assert (real / "tokens").stat().st_mode & 0o777 == 0o640
     assert (real / "tokens").read_text().startswith("# first\na synthesize sha256:")
     assert sorted(path.name for path in real.iterdir()) == ["tokens"]
+
+
+@pytest.mark.skipif(os.geteuid() != 0, reason="only root can change the owner of a file")
+def test_the_file_stays_that_of_the_service(run: Run, file: Path) -> None:
+    write(file)
+    os.chown(file, 4711, 4712)
+    run("add", "a")
+    assert (file.stat().st_uid, file.stat().st_gid) == (4711, 4712)
 
 
 def test_files_that_cannot_be_kept(run: Run, file: Path) -> None:

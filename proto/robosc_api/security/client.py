@@ -1,5 +1,6 @@
 """Credentials of a client, and channels that use them."""
 
+import logging
 import threading
 from dataclasses import dataclass
 from pathlib import Path
@@ -11,7 +12,9 @@ import grpc.aio
 from robosc_api.security.addresses import is_loopback_host, split_address
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.listening import check_certificates, read, read_secret
-from robosc_api.security.tokens import MAXIMUM_TOKEN
+from robosc_api.security.tokens import MAXIMUM_TOKEN, stamp_of
+
+_log = logging.getLogger(__name__)
 
 _CLOSE_S = 0.5
 """Time for a program that an error ends to close a channel, in seconds."""
@@ -26,7 +29,8 @@ class Credentials:
         ca: Certificate authorities (PEM) to trust instead; None: those of the system.
         certificate: Client certificate chain (PEM); None: none.
         key: Its private key.
-        token_file: File that contains only the caller's token; None: no token is sent.
+        token_file: File that contains only the caller's token, and is read again when it has changed; None: no token is
+            sent.
     """
 
     is_secure: bool = False
@@ -93,9 +97,47 @@ def _is_secure(credentials: Credentials) -> bool:
     return credentials.is_secure or credentials.ca is not None or credentials.certificate is not None
 
 
-def _usable_token(address: str, credentials: Credentials) -> str | None:
+class _TokenSource:
+    """Token of a file, which may be replaced by another one while the channel is open.
+
+    Args:
+        path: Path of the file.
+
+    Raises:
+        SecurityError: The file cannot be used.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+        # In this order: a token that is replaced meanwhile is read with the next call.
+        self._stamp = _stamp(path)
+        self._token = _token(path)
+        self._is_failing = False
+
+    def authorization(self) -> tuple[str, str]:
+        """Return the metadata of a call; the previous token stays if the changed file cannot be used."""
+        try:
+            stamp = _stamp(self._path)
+            if stamp != self._stamp:
+                self._token, self._stamp = _token(self._path), stamp
+            self._is_failing = False
+        except SecurityError as error:
+            if not self._is_failing:
+                _log.warning("the changed token is not used: %s", error)
+            self._is_failing = True
+        return "authorization", f"Bearer {self._token}"
+
+
+def _stamp(path: Path) -> tuple[int, int, int]:
+    try:
+        return stamp_of(path.stat())
+    except OSError as error:
+        raise SecurityError(f"{path}: {error.strerror}") from error
+
+
+def _usable_token(address: str, credentials: Credentials) -> _TokenSource | None:
     """Return the token, if it may be sent to the address."""
-    token = None if credentials.token_file is None else _token(credentials.token_file)
+    token = None if credentials.token_file is None else _TokenSource(credentials.token_file)
     if token is not None and not _is_secure(credentials) and not is_loopback_host(_host(address)):
         raise SecurityError(
             f"a token may be sent to another machine only with TLS, and {address} is on another machine"
@@ -144,8 +186,8 @@ def _token(path: Path) -> str:
 class _Bearer(grpc.UnaryUnaryClientInterceptor, grpc.UnaryStreamClientInterceptor, grpc.StreamStreamClientInterceptor):
     """Interceptor that adds a token to each call."""
 
-    def __init__(self, token: str) -> None:
-        self._entry = ("authorization", f"Bearer {token}")
+    def __init__(self, token: _TokenSource) -> None:
+        self._token = token
 
     def intercept_unary_unary(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
         """Add the token."""
@@ -160,7 +202,7 @@ class _Bearer(grpc.UnaryUnaryClientInterceptor, grpc.UnaryStreamClientIntercepto
         return continuation(self._with_token(client_call_details), request_iterator)
 
     def _with_token(self, meant: Any) -> "_Details":
-        return _Details(meant, (*(meant.metadata or ()), self._entry))
+        return _Details(meant, (*(meant.metadata or ()), self._token.authorization()))
 
 
 class _Details(grpc.ClientCallDetails):
@@ -178,23 +220,23 @@ class _Details(grpc.ClientCallDetails):
 class _AsyncBearer(grpc.aio.UnaryUnaryClientInterceptor):
     """Interceptor that adds a token to each unary call of asyncio."""
 
-    def __init__(self, token: str) -> None:
-        self._entry = ("authorization", f"Bearer {token}")
+    def __init__(self, token: _TokenSource) -> None:
+        self._token = token
 
     async def intercept_unary_unary(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
         """Add the token."""
-        return await continuation(_with_entry(client_call_details, self._entry), request)
+        return await continuation(_with_entry(client_call_details, self._token.authorization()), request)
 
 
 class _AsyncStreamBearer(grpc.aio.UnaryStreamClientInterceptor):
     """Interceptor that adds a token to each call of asyncio with a stream of responses."""
 
-    def __init__(self, token: str) -> None:
-        self._entry = ("authorization", f"Bearer {token}")
+    def __init__(self, token: _TokenSource) -> None:
+        self._token = token
 
     async def intercept_unary_stream(self, continuation: Any, client_call_details: Any, request: Any) -> Any:
         """Add the token."""
-        return await continuation(_with_entry(client_call_details, self._entry), request)
+        return await continuation(_with_entry(client_call_details, self._token.authorization()), request)
 
 
 def _with_entry(meant: Any, entry: tuple[str, str]) -> Any:

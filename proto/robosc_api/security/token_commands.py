@@ -184,20 +184,35 @@ def _revoke(arguments: argparse.Namespace, now_s: float) -> None:
 
 
 def _deliver(arguments: argparse.Namespace, token: str, line: str) -> None:
-    """Give the token to who has asked for it, before it is valid: one that could not be written is of no use."""
+    """Give the token to who has asked for it, before it is valid: one that could not be written is of no use.
+
+    Raises:
+        SecurityError: It cannot be written.
+    """
     entry = parse_line(line, "")
     assert entry is not None  # noqa: S101  # a line that was just made
     if arguments.output is not None:
         write_token(arguments.output, token)
-    if arguments.json:
-        document = {key: value for key, value in _document(entry, (entry,), 0.0).items() if key != "state"}
-        where = {"token": token} if arguments.output is None else {"token_file": str(arguments.output)}
-        _print_json(document | where)
-    elif arguments.output is None:
-        sys.stdout.write(f"{token}\n")
-        sys.stdout.flush()
+    try:
+        if arguments.json:
+            document = {key: value for key, value in _document(entry, (entry,), 0.0).items() if key != "state"}
+            where = {"token": token} if arguments.output is None else {"token_file": str(arguments.output)}
+            _print_json(document | where)
+        elif arguments.output is None:
+            sys.stdout.write(f"{token}\n")
+            sys.stdout.flush()
+    except OSError as error:
+        # The interpreter would try again at its exit.
+        with contextlib.suppress(OSError, ValueError):
+            os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        if arguments.output is not None:
+            arguments.output.unlink()
+        raise SecurityError(
+            f"the token cannot be written ({error.strerror}), so {arguments.file} is unchanged"
+        ) from error
+    if not arguments.json and arguments.output is None:
         sys.stderr.write("Keep the token secret; it is not shown again.\n")
-    else:
+    elif not arguments.json:
         sys.stderr.write(f"{arguments.output}: the token; keep it secret.\n")
 
 

@@ -229,6 +229,19 @@ def lasting_longer(entry: Entry, entries: Iterable[Entry]) -> Entry | None:
     return None
 
 
+def unreplaced(entries: Iterable[Entry]) -> list[Entry]:
+    """Return the tokens that expire and that no other one replaces."""
+    by_owner: dict[str, list[Entry]] = {}
+    for entry in entries:
+        by_owner.setdefault(entry.name, []).append(entry)
+    return [
+        entry
+        for owned in by_owner.values()
+        for entry in owned
+        if entry.expires_s is not None and lasting_longer(entry, owned) is None
+    ]
+
+
 def missing_scope(entries: Iterable[Entry], needed: Scope) -> str | None:
     """Return a message if none of the valid tokens has the scope that every call needs; None: one has it."""
     if any(needed in entry.scopes for entry in entries):
@@ -311,11 +324,9 @@ class TokenFile:
 
     def seconds_to_expiry(self) -> dict[str, float]:
         """Return the seconds until tokens expire, by id, if no other token replaces them; negative: expired."""
-        now_s, entries = self._wall_clock(), self._current()
+        now_s = self._wall_clock()
         return {
-            entry.id: entry.expires_s - now_s
-            for entry in entries
-            if entry.expires_s is not None and lasting_longer(entry, entries) is None
+            entry.id: entry.expires_s - now_s for entry in unreplaced(self._current()) if entry.expires_s is not None
         }
 
     def _current(self) -> tuple[Entry, ...]:
@@ -323,7 +334,7 @@ class TokenFile:
             if self._clock() - self._checked_s >= _CHECK_PERIOD_S:
                 self._checked_s = self._clock()
                 try:
-                    if _stamp(self._path.stat()) != self._stamp:
+                    if stamp_of(self._path.stat()) != self._stamp:
                         self._entries, self._stamp = _read(self._path)
                         _log.info("%s: reloaded", self._path)
                         known = {entry.digest for entry in self._entries}
@@ -337,15 +348,14 @@ class TokenFile:
     def _warn(self) -> None:
         """Log a warning when a token expires soon, and when no token has the needed scope any more."""
         now_s = self._wall_clock()
-        for entry in self._entries:
+        for entry in unreplaced(self._entries):
             if entry.digest in self._told_soon or entry.is_valid(now_s + SOON_S) or entry.expires_s is None:
                 continue
-            if lasting_longer(entry, self._entries) is None:
-                self._told_soon.add(entry.digest)
-                verb = "expires" if entry.is_valid(now_s) else "has expired"
-                _log.warning(
-                    "the token %s of '%s' %s at %s: rotate it", entry.id, entry.name, verb, time_text(entry.expires_s)
-                )
+            self._told_soon.add(entry.digest)
+            verb = "expires" if entry.is_valid(now_s) else "has expired"
+            _log.warning(
+                "the token %s of '%s' %s at %s: rotate it", entry.id, entry.name, verb, time_text(entry.expires_s)
+            )
         valid = [entry for entry in self._entries if entry.is_valid(now_s)]
         words = None if self._needed is None else missing_scope(valid, self._needed)
         if words is not None and not self._is_scope_missing:
@@ -353,7 +363,8 @@ class TokenFile:
         self._is_scope_missing = words is not None
 
 
-def _stamp(status: os.stat_result) -> tuple[int, int, int]:
+def stamp_of(status: os.stat_result) -> tuple[int, int, int]:
+    """Return what changes with a file: time, size and inode."""
     return status.st_mtime_ns, status.st_size, status.st_ino
 
 
@@ -383,6 +394,6 @@ def _read_text(path: Path) -> tuple[str, tuple[int, int, int]]:
     if len(data) > MAXIMUM_BYTES:
         raise SecurityError(f"{path}: larger than {MAXIMUM_BYTES} bytes")
     try:
-        return data.decode(), _stamp(status)
+        return data.decode(), stamp_of(status)
     except UnicodeDecodeError as error:
         raise SecurityError(f"{path}: not UTF-8") from error

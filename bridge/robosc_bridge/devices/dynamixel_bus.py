@@ -109,7 +109,8 @@ class DynamixelBus:
         stranger: Device that has answered to requests for others since the last `begin`; None: none has.
         interruption: Function that is called while the answer to a request is awaited for the first time, and that may
             `interject`; None: none.
-        unheard: Number of interjected writes in a row that were not answered though the request before them was.
+        unheard: Number of interjected writes in a row that were not answered though the read before them was. Behind a
+            write nobody knows which of two answers is missing, and mostly it is that of a write that was lost.
     """
 
     def __init__(
@@ -395,7 +396,7 @@ class DynamixelBus:
         finally:
             self._port.looked = None
         if self._is_interjected:
-            self._hear_interjected(device)
+            self._hear_interjected(device, is_certain=length > 0)
         if status.number == DAMAGED_REQUEST:
             raise DeviceSilentError(f"{self._name_of(device)} received damaged bytes")
         return status
@@ -426,7 +427,7 @@ class DynamixelBus:
         self._silent += 1
         raise self.silence_of(self._name_of(device), "does")
 
-    def _hear_interjected(self, device: int) -> None:
+    def _hear_interjected(self, device: int, *, is_certain: bool) -> None:
         """Await the answer to what was interjected; without one, the next request first settles the device."""
         self._is_interjected = False
         self._unsettled.add(device)
@@ -439,7 +440,7 @@ class DynamixelBus:
             self._is_foreign(status, (device,))
         self.counters.unanswered += 1
         self._silent += 1
-        self.unheard += 1
+        self.unheard += is_certain
 
     def _is_foreign(self, status: StatusPacket, devices: Collection[int]) -> None:
         """Count an answer that is to another request, or comes from another device than these."""

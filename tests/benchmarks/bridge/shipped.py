@@ -7,6 +7,9 @@ system time of the whole process over the time that passed, in a maze. *Scan to 
 velocity have been written to the port), *to decision* and *exchange*: as the bridge itself tells them (`robosc-bridge
 status --json`), with and without a neighbour that keeps each processor busy.
 
+In a maze few scans have another velocity, which is what *scan to wheel byte* counts. So there are rows with a model
+that steers the other way at each scan.
+
 Usage: shipped.py [SECONDS] [--busy]
 """
 
@@ -34,23 +37,27 @@ from figures import text_table  # noqa: E402  # found through the path above
 from support.real_time import preferred  # noqa: E402  # rig adds its folder to the path
 
 SECONDS = 60.0
-MODEL = ROOT / "examples" / "maze_solver" / "maze_solver.rscd"
+MAZE = ROOT / "examples" / "maze_solver" / "maze_solver.rscd"
+STEERING = Path(__file__).with_name("steer_each_scan.rscd")
 CASES = (
-    ("opencr", "lds02", False),
-    ("dynamixel", "lds03", False),
-    ("opencr", "lds02", True),
-    ("dynamixel", "lds03", True),
+    (MAZE, "opencr", "lds02", False),
+    (MAZE, "dynamixel", "lds03", False),
+    (MAZE, "opencr", "lds02", True),
+    (STEERING, "opencr", "lds02", False),
+    (STEERING, "opencr", "lds02", True),
+    (STEERING, "dynamixel", "lds03", True),
 )
-"""Base, LiDAR, and whether there is a busy neighbour."""
+"""Model, base, LiDAR, and whether there is a busy neighbour."""
 
 TIMES = {"scan_to_wheel": "scan to wheel byte", "scan_to_decision": "to decision", "exchange": "exchange"}
-HEADER = ["base, LiDAR, neighbour", "READY s", "moves s", "CPU", *(f"{title} ms" for title in TIMES.values())]
+HEADER = ["model, base, LiDAR, neighbour", "READY s", "moves s", "CPU", *(f"{title} ms" for title in TIMES.values())]
 
 
 @dataclass
 class Measured:
-    """Figures of one bridge."""
+    """Figures of one bridge, and its state at the end."""
 
+    state: str
     ready_s: float
     moves_s: float
     cpu: float
@@ -61,10 +68,10 @@ def _command(*arguments: str) -> list[str]:
     return [sys.executable, "-m", "robosc_bridge.command", *arguments]
 
 
-def _configured(folder: Path, robot: Simulator, base: str, lidar: str, address: str) -> Path:
+def _configured(folder: Path, robot: Simulator, model: Path, base: str, lidar: str, address: str) -> Path:
     """The file of `init`, with the robot's ports and a remote endpoint."""
     file = folder / "maze.yaml"
-    arguments = ["init", "--model", str(MODEL), "--drive", base, "--scanner", lidar, "-o", str(file)]
+    arguments = ["init", "--model", str(model), "--drive", base, "--scanner", lidar, "-o", str(file)]
     arguments += ["--drive-port", robot.base_path, "--scanner-port", robot.scanner_path]
     subprocess.run(_command(*arguments), env=environment(), check=True, stdout=subprocess.DEVNULL)
     text = file.read_text().replace("  grpc_address: null", f"  grpc_address: {address}")
@@ -101,7 +108,7 @@ def _neighbours(count: int) -> Iterator[None]:
             process.wait()
 
 
-def _measure(base: str, lidar: str, is_busy: bool, seconds: float) -> Measured:
+def _measure(model: Path, base: str, lidar: str, is_busy: bool, seconds: float) -> Measured:
     with tempfile.TemporaryDirectory() as name, socket.socket(socket.AF_UNIX, socket.SOCK_DGRAM) as manager:
         folder = Path(name)
         manager.bind(str(folder / "notify"))
@@ -109,11 +116,11 @@ def _measure(base: str, lidar: str, is_busy: bool, seconds: float) -> Measured:
         with socket.create_server(("127.0.0.1", 0)) as server:
             address = f"127.0.0.1:{server.getsockname()[1]}"
         with preferred(), simulated("--base", base, "--lidar", lidar, "--scene", "maze-rooms") as robot:
-            file = _configured(folder, robot, base, lidar, address)
+            file = _configured(folder, robot, model, base, lidar, address)
             begin_s = time.monotonic()
             with preferred():
                 bridge = subprocess.Popen(
-                    _command("run", "--model", str(MODEL), "--config", str(file)),
+                    _command("run", "--model", str(model), "--config", str(file)),
                     env={**environment(), "NOTIFY_SOCKET": str(folder / "notify")},
                     stderr=subprocess.DEVNULL,
                 )
@@ -132,7 +139,8 @@ def _measure(base: str, lidar: str, is_busy: bool, seconds: float) -> Measured:
                 bridge.terminate()
                 bridge.wait()
     latencies = {item["name"]: item for item in snapshot.get("latencies", [])}
-    return Measured(ready_s, moves_s, cpu, latencies)
+    state = snapshot.get("state", "gone").lower().removeprefix("bridge_state_")
+    return Measured(state, ready_s, moves_s, cpu, latencies)
 
 
 def _spread(latency: dict[str, Any] | None) -> str:
@@ -142,18 +150,23 @@ def _spread(latency: dict[str, Any] | None) -> str:
     return f"{times} ({latency['count']})"
 
 
+def _unlike_running(state: str) -> str:
+    """Return the state of a bridge that did not run to the end: its figures are those of a part of the time."""
+    return "" if state == "running" else f" ({state})"
+
+
 def table(seconds: float = SECONDS, *, is_busy_only: bool = False) -> str:
     """A row for each case, or for those with a busy neighbour alone."""
     rows = []
     machine = Machine()
     with machine.watched():
-        for base, lidar, is_busy in CASES:
+        for model, base, lidar, is_busy in CASES:
             if is_busy_only and not is_busy:
                 continue
-            found = _measure(base, lidar, is_busy, seconds)
+            found = _measure(model, base, lidar, is_busy, seconds)
             rows.append(
                 [
-                    f"{base}, {lidar}, {'busy' if is_busy else 'idle'}",
+                    f"{model.stem}, {base}, {lidar}, {'busy' if is_busy else 'idle'}" + _unlike_running(found.state),
                     f"{found.ready_s:.2f}",
                     f"{found.moves_s:.2f}",
                     f"{found.cpu:.1%}",

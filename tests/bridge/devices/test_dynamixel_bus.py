@@ -312,7 +312,7 @@ def test_what_was_interjected_and_is_not_answered_spoils_no_later_answer() -> No
         bus.begin(10.0)
         _Interrupter(bus, _line_of(bus), b"new")
         assert bus.read(1, 132, 4).data == b"good"
-        assert bus.counters.unanswered == 1
+        assert (bus.counters.unanswered, bus.unheard) == (1, 1)
         bus.interruption = None
         # Its late answer would confirm this one.
         bus.write(1, 64, b"\1")
@@ -330,6 +330,7 @@ def test_an_older_write_does_not_follow_one_that_was_interjected() -> None:
         _Interrupter(bus, _line_of(bus), b"new")
         bus.write(1, 150, b"old")
         assert [request[10:-2] for request in peer.requests] == [b"old", b"new"]
+        assert bus.unheard == 0
 
 
 def test_a_write_is_told_when_the_line_has_it() -> None:

@@ -13,6 +13,7 @@ import structlog
 from robosc_api.failures import reason_of
 from robosc_api.layers import Layer, behaviour_of, with_behaviour, writing
 from robosc_api.security import CALLER
+from robosc_api.security.host_sample import HostSample
 from robosc_server.clock import monotonic
 from robosc_server.failures import RefusedError, abort, code_of, fault_message
 from robosc_server.operations.logs import REQUEST_ID, REQUEST_ID_HEADER, log_fault, request_id_of
@@ -45,6 +46,7 @@ class CallInterceptor(Layer):
         self._metrics = metrics
         self._tracing = tracing
         self._is_refusing = False
+        self._refusals = HostSample()
         self._log = structlog.get_logger().bind()
 
     def refuse_new(self) -> None:
@@ -135,12 +137,22 @@ class CallInterceptor(Layer):
             words["reason"] = reason
         if caller := CALLER.get():
             words["caller"] = caller
-        if method.startswith(_HEALTH):
-            self._log.debug("call", **words, peer=context.peer())
+        peer = context.peer()
+        if method.startswith(_HEALTH) or (
+            code is grpc.StatusCode.UNAUTHENTICATED and not self._is_sampled(peer, words)
+        ):
+            self._log.debug("call", **words, peer=peer)
         elif code in _FAULTS:
-            self._log.warning("call", **words, peer=context.peer())
+            self._log.warning("call", **words, peer=peer)
         else:
-            self._log.info("call", **words, peer=context.peer())
+            self._log.info("call", **words, peer=peer)
+
+    def _is_sampled(self, peer: str, words: dict[str, Any]) -> bool:
+        """Return True if a refused call is logged, with the number of those that were not."""
+        skipped = self._refusals.take(peer)
+        if skipped:
+            words["skipped"] = skipped
+        return skipped is not None
 
 
 _CANCELLED, _DEADLINE_EXCEEDED = grpc.StatusCode.CANCELLED, grpc.StatusCode.DEADLINE_EXCEEDED

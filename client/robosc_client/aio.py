@@ -93,6 +93,7 @@ class AsyncClient:
             address = with_port(address, SYNTHESIS_PORT)
         self._address = address
         self._retries = retries
+        self._is_closed = False
         self._sleep = sleep
         options = (*CHANNEL_OPTIONS, *(channel_options or {}).items())
         try:
@@ -112,6 +113,7 @@ class AsyncClient:
 
     async def close(self) -> None:
         """Close the connection; open calls are cancelled."""
+        self._is_closed = True
         await self._channel.close()
 
     check = _unary_method(operations.check)
@@ -150,7 +152,7 @@ class AsyncClient:
                         call.take(message)
                 return call.result()
             except grpc.RpcError as error:
-                delay_s = call.failed(error)
+                delay_s = call.failed(error, is_closed=self._is_closed)
             await self._sleep(delay_s)
 
     async def _follow(self, job_watch: JobWatch) -> AsyncGenerator[Job]:
@@ -167,7 +169,7 @@ class AsyncClient:
                             return
             except grpc.RpcError as error:
                 failure = failure_of(error)
-            await self._sleep(attempts.delay_after(failure, has_answered=False))
+            await self._sleep(attempts.delay_after(failure, has_answered=False, is_closed=self._is_closed))
 
     async def _list(self, pages: JobPages) -> AsyncGenerator[Job]:
         """Yield jobs, page by page."""

@@ -119,13 +119,17 @@ class RetriedCall[Result]:
         """
         return self._reader.result()
 
-    def failed(self, error: grpc.RpcError) -> float:
+    def failed(self, error: grpc.RpcError, *, is_closed: bool) -> float:
         """Return the delay before the next attempt after a failed one, in seconds.
+
+        Args:
+            error: Error of the attempt.
+            is_closed: True if the client was closed.
 
         Raises:
             ClientError: There is no next attempt.
         """
-        return self._attempts.delay_after(failure_of(error), has_answered=self._has_answered)
+        return self._attempts.delay_after(failure_of(error), has_answered=self._has_answered, is_closed=is_closed)
 
 
 def job_reader(job_id: str) -> Callable[[Any], Job]:

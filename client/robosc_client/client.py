@@ -84,6 +84,7 @@ class Client:
             address = with_port(address, SYNTHESIS_PORT)
         self._address = address
         self._retries = retries
+        self._is_closed = False
         self._sleep = sleep
         options = (*CHANNEL_OPTIONS, *(channel_options or {}).items())
         try:
@@ -99,10 +100,12 @@ class Client:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
+        self._is_closed = True
         close_channel(self._channel, error)
 
     def close(self) -> None:
         """Close the connection; open calls are cancelled."""
+        self._is_closed = True
         close_channel(self._channel)
 
     check = _unary_method(operations.check)
@@ -141,7 +144,7 @@ class Client:
                         call.take(message)
                 return call.result()
             except grpc.RpcError as error:
-                delay_s = call.failed(error)
+                delay_s = call.failed(error, is_closed=self._is_closed)
             self._sleep(delay_s)
 
     def _follow(self, job_watch: JobWatch) -> Iterator[Job]:
@@ -158,7 +161,7 @@ class Client:
                             return
             except grpc.RpcError as error:
                 failure = failure_of(error)
-            self._sleep(attempts.delay_after(failure, has_answered=False))
+            self._sleep(attempts.delay_after(failure, has_answered=False, is_closed=self._is_closed))
 
     def _list(self, pages: JobPages) -> Iterator[Job]:
         """Yield jobs, page by page."""

@@ -26,6 +26,10 @@ from robosc_client.errors import (
 # gRPC measures a deadline with a clock of its own.
 _CLOCK_TOLERANCE_S = 0.05
 
+_LOST = frozenset({grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED})
+"""Codes of calls that nobody has answered. A client never retries a call that its own program has cancelled, so any
+CANCELLED here comes from the other end: gRPC cancels calls of an overloaded server before the server sees them."""
+
 _BUSY = frozenset({"SERVER_BUSY", "QUOTA_EXCEEDED"})
 
 _REFUSALS = frozenset(
@@ -110,18 +114,20 @@ class Attempts:
         """Reset the number of failures, since a message was received."""
         self._failed = 0
 
-    def delay_after(self, failure: Failure, *, has_answered: bool) -> float:
+    def delay_after(self, failure: Failure, *, has_answered: bool, is_closed: bool = False) -> float:
         """Return the seconds until the next attempt.
 
         Args:
             failure: Failure of the last one.
             has_answered: True if it had received anything.
+            is_closed: True if the client was closed, which cancels its open calls.
 
         Raises:
             ClientError: There is no next attempt.
         """
         self._failed += 1
-        if not self._is_retryable(failure, has_answered=has_answered) or self._failed >= self._most:
+        is_retryable = not is_closed and self._is_retryable(failure, has_answered=has_answered)
+        if not is_retryable or self._failed >= self._most:
             raise self._error(failure)
         delay_s = self._delay_s(failure.retry_after_s)
         left_s = self._remaining_s()
@@ -130,7 +136,7 @@ class Attempts:
         return delay_s
 
     def _is_retryable(self, failure: Failure, *, has_answered: bool) -> bool:
-        if failure.code is grpc.StatusCode.UNAVAILABLE:
+        if failure.code in _LOST:
             return self._is_watch or not has_answered
         is_busy = failure.code is grpc.StatusCode.RESOURCE_EXHAUSTED and failure.reason in _BUSY
         return is_busy and failure.retry_after_s is not None
@@ -161,6 +167,9 @@ class Attempts:
                 return ServerUnavailableError(f"the server at {self._address} is unavailable: {message}", reason)
             why = f": {message}" if message else ""
             return ServerUnavailableError(f"no server answers at {self._address}{why}")
+        if code is grpc.StatusCode.CANCELLED:
+            why = f": {message}" if message else ""
+            return ServerUnavailableError(f"the server at {self._address} cancelled the call{why}", reason)
         if code is grpc.StatusCode.DEADLINE_EXCEEDED:
             left_s = self._remaining_s()
             if left_s is not None and left_s <= _CLOCK_TOLERANCE_S:

@@ -8,7 +8,7 @@ from pathlib import Path
 import grpc
 from google.protobuf.wrappers_pb2 import StringValue, UInt32Value
 
-from robosc_api.security.addresses import joined, split_address
+from robosc_api.security.addresses import UNIX, joined, split_address
 from robosc_api.security.client import Credentials, open_channel
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.listening import read
@@ -46,9 +46,13 @@ class Condition:
 def local_address(address: str) -> str:
     """Return the address on this machine of what listens on `HOST:PORT`, also where HOST is every interface.
 
+    The address of a Unix socket stays as it is.
+
     Raises:
         ValueError: It is no address.
     """
+    if address.startswith(UNIX):
+        return address
     host, port = split_address(address)
     return joined(_ANYWHERE.get(host, host), port)
 

@@ -97,6 +97,14 @@ def build_communication(item: CommunicationTree, types: Types, findings: Finding
             "Write the name of the topic, service or action.",
         )
         return None
+    if not identifier.isprintable():
+        findings.error(
+            "unprintable-identifier",
+            f"the identifier has characters that cannot be seen: {identifier!a}",
+            item.identifier_location,
+            "Write the name without them: terminals and editors obey such characters instead of showing them.",
+        )
+        return None
     options = build_options(tree, kind, findings)
     _check_identifier(identifier, item.identifier_location, findings)
     return Communication(

@@ -116,8 +116,11 @@ def _of_one(
 
 
 def _cell(text: str) -> str:
-    """A text as a cell of a table."""
-    return " ".join(text.split()).replace("|", "\\|")
+    """A text as a cell of a table; what a terminal or a viewer would obey instead of showing it is escaped."""
+    shown = "".join(
+        char if char.isprintable() else char.encode("unicode_escape").decode("ascii") for char in " ".join(text.split())
+    )
+    return shown.replace("|", "\\|")
 
 
 def targets_left_out(files: GeneratedFiles, target: str) -> tuple[str, ...]:

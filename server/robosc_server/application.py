@@ -12,10 +12,12 @@ from grpc_health.v1 import health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
 from robosc import __version__
+from robosc_api.connection_watch import Arrivals, ConnectionLimits, ConnectionWatch
 from robosc_api.layers import Layers
 from robosc_api.malformed import MalformedRequests
 from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts
 from robosc_api.security import Guard, Rule, Scope, SecurityError, TokenFile, add_port, caller_of, token_or_host_of
+from robosc_api.security.addresses import split_address
 from robosc_server.clock import wall_clock_s
 from robosc_server.jobs import (
     JOB_METHODS,
@@ -28,6 +30,7 @@ from robosc_server.jobs import (
     Scheduler,
     add_job_service,
 )
+from robosc_server.operations.descriptors import usable_connections
 from robosc_server.operations.drain import drain, stop
 from robosc_server.operations.health import Health
 from robosc_server.operations.instrumented_workers import InstrumentedWorkers
@@ -44,8 +47,9 @@ from robosc_server.synthesis_service import METHODS, SERVICE_NAME, SynthesisServ
 from robosc_server.task_dispatcher import TaskDispatcher
 from robosc_server.tasks.describe import server_limits, targets_response, version_response
 from robosc_server.tasks.requests import QUICK_BYTES, RequestLimits, accept_request
-from robosc_server.tasks.task import Result, TaskKind
+from robosc_server.tasks.task import Result, TaskKind, own_key
 from robosc_server.workers import Workers, WorkersError
+from robosc_server.workers.cluster_check import check_cluster
 from robosc_server.workers.factory import open_workers
 
 _RULE = Rule(frozenset({Scope.SYNTHESIZE}))
@@ -70,11 +74,14 @@ _UNREAD_RESULTS = 8
 _REFUSED_CALLS = 1000
 """Calls that can be refused with a reason at the same time; beyond them gRPC refuses without a reason or log line."""
 
-_IDLE_S = 300.0
+_IDLE_S = 120.0
 """Time after which a connection without calls is closed; clients reconnect by themselves."""
 
 _REFLECTION_IDLE_S = 60.0
 """Maximum time between two requests of a reflection stream."""
+
+_PENDING_CALLS = 20_000
+"""Calls that may wait to be taken by the server's loop: a second of calls that are begun as fast as possible."""
 
 _HANDSHAKE_LIMIT_S = 10.0
 """Maximum time of the TLS and HTTP/2 handshakes."""
@@ -89,7 +96,7 @@ class StartError(Exception):
 
 @asynccontextmanager
 async def running_server(settings: Settings, workers: Workers | None = None) -> AsyncIterator[str]:
-    """Run a server that answers inside the context; yield `HOST:PORT`.
+    """Run a server that answers inside the context; yield its address.
 
     Args:
         settings: Settings of the server.
@@ -110,6 +117,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     # Wrong settings are reported before anything is started.
     if settings.metrics_address:
         check_metrics_address(settings.metrics_address, beyond_loopback=settings.metrics_beyond_loopback)
+    check_cluster(settings.workers, is_insecure_allowed=settings.insecure_workers_beyond_loopback)
     finish = _finish(settings)
     tokens = (
         None
@@ -128,21 +136,27 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         {f"/{service}/{name}": _RULE for service, names in services.items() for name in names},
         tokens,
         has_client_certificates=settings.client_ca is not None,
+        is_forwarded=settings.forwarded_identity,
     )
+    arrivals = Arrivals()
+    # Looking for a client certificate that cannot exist takes longer than the rest of the layer.
+    identify = caller_of if settings.client_ca is not None else token_or_host_of
+    keys = _every_callers_key if settings.share_results else own_key
     # Outside of the request timeouts: a call without a request counts as open, too.
     open_calls = OpenCalls(
         CallLimits(settings.open_calls, settings.open_calls_per_caller),
-        # Looking for a client certificate that cannot exist takes longer than the rest of the layer.
-        caller_of if settings.client_ca is not None else token_or_host_of,
+        identify,
+        arrivals=arrivals,
     )
     prompt = RequestTimeouts(settings.request_seconds, dict.fromkeys(REFLECTION_METHODS, _REFLECTION_IDLE_S))
     # Services with larger requests check them themselves.
     malformed = MalformedRequests(
         JOB_SERVICE_NAME, health_names.SERVICE_NAME, reflection.SERVICE_NAME, limit=QUICK_BYTES
     )
+    connections = usable_connections(settings.connections, settings.worker_processes)
     server = grpc.aio.server(
-        interceptors=[Layers(calls, guard, open_calls, prompt, malformed)],
-        options=_options(settings, request_limits.submission_bytes),
+        interceptors=[Layers(calls, guard, open_calls, prompt, arrivals, malformed)],
+        options=_options(settings, request_limits.submission_bytes, connections),
         maximum_concurrent_rpcs=settings.open_calls + 2 * HEALTH_CALLS + _REFUSED_CALLS,
     )
     address = add_port(server, settings.address, settings.security)
@@ -185,6 +199,8 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         request_limits,
         targets,
         version,
+        keys,
+        identify,
     )
     jobs = JobService(
         manager,
@@ -192,6 +208,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         admit=quotas.admit,
         send=sender.send_stream,
         limits=request_limits,
+        keys=keys,
     )
 
     server.add_generic_rpc_handlers((synthesis.handler(),))
@@ -228,11 +245,14 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         )
 
     await server.start()
+    if settings.socket is None:
+        limits = ConnectionLimits(connections=connections, request_bytes=request_limits.submission_bytes)
+        stack.enter_context(ConnectionWatch(split_address(address)[1], limits, arrivals))
     stack.push_async_callback(end)
     return address
 
 
-def _options(settings: Settings, request_bytes: int) -> list[tuple[str, int]]:
+def _options(settings: Settings, request_bytes: int, connections: int) -> list[tuple[str, int]]:
     """Channel arguments of the gRPC server."""
     return [
         *KEEPALIVE,
@@ -241,6 +261,12 @@ def _options(settings: Settings, request_bytes: int) -> list[tuple[str, int]]:
         ("grpc.http2.min_ping_interval_without_data_ms", 10_000),
         ("grpc.server_handshake_timeout_ms", int(_HANDSHAKE_LIMIT_S * 1000)),
         ("grpc.max_connection_idle_ms", int(_IDLE_S * 1000)),
+        # The watch over connections keeps their number below this one.
+        ("grpc.max_allowed_incoming_connections", connections),
+        # Calls that are begun faster than they are taken wait. Beyond these numbers gRPC cancels some at random, also
+        # those of other callers.
+        ("grpc.server.max_pending_requests", _PENDING_CALLS),
+        ("grpc.server.max_pending_requests_hard_limit", 2 * _PENDING_CALLS),
         # Beyond this number a client queues calls silently; calls that are refused with a reason must fit.
         ("grpc.max_concurrent_streams", settings.open_calls_per_caller + _REFUSED_CALLS),
         ("grpc.max_metadata_size", _METADATA_BYTES),
@@ -248,6 +274,11 @@ def _options(settings: Settings, request_bytes: int) -> list[tuple[str, int]]:
         # The server refuses large messages with a reason; beyond this size gRPC refuses without one.
         ("grpc.max_receive_message_length", 2 * request_bytes),
     ]
+
+
+def _every_callers_key(key: str, caller: str) -> str:
+    """Return the key of a task whose result callers share."""
+    return key
 
 
 async def _is_true(condition: Any) -> bool:

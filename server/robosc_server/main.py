@@ -11,6 +11,7 @@ from collections.abc import Sequence
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 from robosc_server.operations.commands import run_command
+from robosc_server.operations.descriptors import raise_descriptor_limit
 from robosc_server.operations.logs import configure_logging
 from robosc_server.operations.settings import Settings, load_settings
 from robosc_server.operations.shutdown import ShutdownSignals
@@ -29,6 +30,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     settings = load_settings(words)
     configure_logging(settings.log_format, settings.log_level)
     keep_memory_private()
+    raise_descriptor_limit()
     return _serve(settings)
 
 

@@ -6,6 +6,7 @@ response is sent as it is. Parsing and serializing with the generated bindings w
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from typing import Any, Protocol, Self
 
 import grpc
@@ -17,7 +18,7 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.failures import RefusedError
 from robosc_server.result_sender import ResultSender
 from robosc_server.tasks.requests import NOT_A_MESSAGE, QUICK_BYTES, RequestCache, RequestLimits, require_short
-from robosc_server.tasks.task import Reason, Report, Result, Task, TaskKind
+from robosc_server.tasks.task import Reason, Report, Result, Task, TaskKind, own_key
 
 _SERVICE = pb.DESCRIPTOR.services_by_name["SynthesisService"]
 SERVICE_NAME = _SERVICE.full_name
@@ -42,8 +43,12 @@ _STREAMS = {
 class ResultProvider(Protocol):
     """Provider of the results of accepted tasks."""
 
-    def cached(self, key: str) -> Result | None:
-        """The result of an equal task, if it is in memory."""
+    def cached(self, key: str, caller: str) -> Result | None:
+        """The result of an equal task, if it is in memory.
+
+        Raises:
+            RefusedError: The caller has asked for too much.
+        """
 
     async def result(self, task: Task, caller: str, on_report: OnReport) -> Result:
         """The result: one that is kept, or what a worker makes; cancelling this ends the work.
@@ -62,12 +67,21 @@ class SynthesisService:
         limits: Limits of a request.
         targets: The answer of ListTargets, serialized.
         version: The answer of GetVersion, serialized.
+        keys: Function that returns the key of a caller's task, from the key of the task and the caller.
+        identify: Function that returns the caller behind the call of a context.
     """
 
     def __init__(
-        self, provider: ResultProvider, sender: ResultSender, limits: RequestLimits, targets: bytes, version: bytes
+        self,
+        provider: ResultProvider,
+        sender: ResultSender,
+        limits: RequestLimits,
+        targets: bytes,
+        version: bytes,
+        keys: Callable[[str, str], str] = own_key,
+        identify: Callable[[Any], str] = caller_of,
     ) -> None:
-        self._provider = provider
+        self._provider, self._keys, self._identify = provider, keys, identify
         self._sender = sender
         self._requests = RequestCache(limits)
         self._fixed = {"ListTargets": (pb.ListTargetsRequest, targets), "GetVersion": (pb.GetVersionRequest, version)}
@@ -87,10 +101,12 @@ class SynthesisService:
 
     def _unary(self, kind: TaskKind) -> Any:
         async def answer(request: bytes, context: Context) -> bytes:
-            task = self._requests.accept(kind, request)
-            result = self._provider.cached(task.key)
+            task, caller = self._requests.accept(kind, request), self._identify(context)
+            key = self._keys(task.key, caller)
+            result = self._provider.cached(key, caller)
             if result is None:
-                result = await self._provider.result(task, caller_of(context), _drop)
+                task = replace(task, key=key)
+                result = await self._provider.result(task, caller, _drop)
             self._sender.reserve(context, result.messages)
             return result.messages[0]
 
@@ -98,11 +114,13 @@ class SynthesisService:
 
     def _stream(self, kind: TaskKind) -> Any:
         async def answer(request: bytes, context: Context) -> bytes:
-            task = self._requests.accept(kind, request)
-            result = self._provider.cached(task.key)
+            task, caller = self._requests.accept(kind, request), self._identify(context)
+            key = self._keys(task.key, caller)
+            result = self._provider.cached(key, caller)
             if result is None:
+                task = replace(task, key=key)
                 async with _ProgressWriter(context) as progress:
-                    result = await self._provider.result(task, caller_of(context), progress.report)
+                    result = await self._provider.result(task, caller, progress.report)
                     # Reserved now, since a caller that does not read its progress delays the result.
                     self._sender.reserve(context, result.messages)
             else:

@@ -28,10 +28,15 @@ class TaskDispatcher:
         self._limits = limits
         self._metrics = metrics
 
-    def cached(self, key: str) -> Result | None:
-        """The result of an equal task, if it is in memory."""
+    def cached(self, key: str, caller: str) -> Result | None:
+        """The result of an equal task, if it is in memory.
+
+        Raises:
+            RefusedError: The caller has asked for too much.
+        """
         result = self._results.in_memory(key)
         if result is not None:
+            self._quotas.admit(caller)
             self._metrics.cache_hit("memory")
         return result
 
@@ -43,6 +48,7 @@ class TaskDispatcher:
         """
         found = await self._results.find(task.key)
         if found is not None:
+            self._quotas.admit(caller)
             self._metrics.cache_hit("store")
             return found
         self._metrics.cache_miss()

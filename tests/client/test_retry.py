@@ -59,6 +59,9 @@ def test_one_attempt(failure: Failure) -> None:
     [
         (AWAY, False, True),
         (AWAY, True, False),
+        # A server cancels calls that have not reached it when there are too many.
+        (Failure(grpc.StatusCode.CANCELLED), False, True),
+        (Failure(grpc.StatusCode.CANCELLED), True, False),
         (busy(), False, True),
         (busy(reason="QUOTA_EXCEEDED"), False, True),
         (busy(None), False, False),

@@ -75,3 +75,19 @@ def test_what_is_refused_since_there_is_too_much_to_do_is_not_counted(tmp_path: 
             assert refused.value.reason is Reason.QUOTA_EXCEEDED
 
     limited(test())
+
+
+def test_an_answer_from_the_cache_counts_for_the_quota(tmp_path: Path) -> None:
+    async def test() -> None:
+        async with parts(tmp_path) as made:
+            dispatcher, task = dispatcher_of(made), task_of("the same")
+            await dispatcher.result(task, "me", drop)
+            assert dispatcher.cached(task.key, "me") is not None
+            await dispatcher.result(task, "me", drop)
+            with pytest.raises(RefusedError) as refused:
+                dispatcher.cached(task.key, "me")
+            assert refused.value.reason is Reason.QUOTA_EXCEEDED
+            with pytest.raises(RefusedError):
+                await dispatcher.result(task, "me", drop)
+
+    limited(test())

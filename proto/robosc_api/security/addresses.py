@@ -9,6 +9,9 @@ _ADDRESS = re.compile(r"(?:\[([0-9A-Fa-f:.%]+)\]|([A-Za-z0-9._-]+)):([0-9]{1,5})
 
 _HOST = re.compile(r"(?:\[[0-9A-Fa-f:.%]+\]|(?![0-9]+\Z)[A-Za-z0-9._-]+)\Z")
 
+UNIX = "unix:"
+"""Beginning of the address of a Unix socket, in gRPC's words; its path follows."""
+
 SYNTHESIS_PORT, BRIDGE_PORT = 50051, 50061
 """Ports of a synthesis server and of a bridge, where an address names none."""
 

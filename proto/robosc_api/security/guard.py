@@ -11,6 +11,8 @@ from robosc_api.failures import failure_metadata
 from robosc_api.layers import Layer, behaviour_of, with_behaviour, writing
 from robosc_api.security.addresses import is_loopback_peer
 from robosc_api.security.callers import CALLER, ENTRY
+from robosc_api.security.forwarded import forwarded_entry
+from robosc_api.security.host_sample import HostSample
 from robosc_api.security.tokens import Entry, Scope, TokenFile, time_text
 
 _log = logging.getLogger(__name__)
@@ -53,15 +55,24 @@ class Guard(Layer):
         rules: Rules by full name of a method (`/package.Service/Method`); other methods need any token.
         tokens: Token file; None: no tokens are required.
         has_client_certificates: True if the service requires client certificates.
+        is_forwarded: True if a trusted proxy tells the name and scopes of callers.
     """
 
     def __init__(
-        self, rules: Mapping[str, Rule], tokens: TokenFile | None, *, has_client_certificates: bool = False
+        self,
+        rules: Mapping[str, Rule],
+        tokens: TokenFile | None,
+        *,
+        has_client_certificates: bool = False,
+        is_forwarded: bool = False,
     ) -> None:
         super().__init__()
         self._rules = rules
-        self._tokens = tokens
         self._has_client_certificates = has_client_certificates
+        self._tokens = tokens
+        self._is_forwarded = is_forwarded
+        self._needs_caller = is_forwarded or tokens is not None
+        self._sample = HostSample()
 
     def handler(self, inner: Any, details: Any) -> Any:
         """Return the handler of a call, after authorization."""
@@ -69,7 +80,7 @@ class Guard(Layer):
         if inner is None or method.startswith(_HEALTH):
             return inner
         rule = self._rules.get(method, Rule())
-        if self._tokens is not None and self._entry(self._tokens, rule, details.invocation_metadata) is None:
+        if self._needs_caller and self._entry(rule, details.invocation_metadata) is None:
             # Refuse at once: a handler of unary requests would wait for a request that may never arrive, and count as
             # an open call.
             return grpc.stream_stream_rpc_method_handler(self._refuse(method))
@@ -86,7 +97,7 @@ class Guard(Layer):
     def wrap(self, inner: Any, method: str) -> Any:
         """Wrap a handler in the authorization of its caller."""
         rule = self._rules.get(method, Rule())
-        if self._tokens is None and (rule.is_open or self._has_client_certificates):
+        if not self._needs_caller and (rule.is_open or self._has_client_certificates):
             return inner
 
         async def admit(context: Any) -> None:
@@ -99,40 +110,49 @@ class Guard(Layer):
 
     def _refusal(self, rule: Rule, method: str, metadata: Any, peer: str) -> _Refusal | None:
         """Return the reason why a call is not admitted; None: it is."""
-        if self._tokens is None:
+        if not self._needs_caller:
             if rule.is_open or self._has_client_certificates or is_loopback_peer(peer):
                 return None
             return _Refusal(
                 grpc.StatusCode.PERMISSION_DENIED,
                 "without tokens, only callers on the same machine may call this method",
             )
-        entry = self._entry(self._tokens, rule, metadata)
+        entry = self._entry(rule, metadata)
         if entry is None:
-            expired = self._expired(self._tokens, metadata)
+            expired = self._expired(metadata)
             if expired is not None and expired.expires_s is not None:
                 message = f"the token has expired at {time_text(expired.expires_s)}: a new one is needed"
                 return _Refusal(grpc.StatusCode.UNAUTHENTICATED, message, "TOKEN_EXPIRED")
-            _log.warning("%s: no valid token for %s", peer, method)
+            self._log_refusal(peer, f"no valid token for {method}")
             return _NO_TOKEN
         if rule.scopes and not rule.scopes & entry.scopes:
-            _log.warning("%s: the token '%s' is not for %s", peer, entry.name, method)
+            self._log_refusal(peer, f"the token '{entry.name}' is not for {method}")
             wanted = " or ".join(f"'{scope}'" for scope in sorted(rule.scopes))
             return _Refusal(grpc.StatusCode.PERMISSION_DENIED, f"the token's scope does not include {wanted}")
         CALLER.set(entry.name)
         ENTRY.set(entry)
         return None
 
-    def _entry(self, tokens: TokenFile, rule: Rule, metadata: Any) -> Entry | None:
+    def _entry(self, rule: Rule, metadata: Any) -> Entry | None:
+        """Return the entry of a call's caller; None: there is none whom the rule may admit."""
+        if self._is_forwarded:
+            return forwarded_entry(metadata)
         given = _token_of(metadata)
-        if given is None:
+        if self._tokens is None or given is None:
             return None
-        found = tokens.find(given)
-        return tokens.find_expired(given) if found is None and rule.admits_expired else found
+        found = self._tokens.find(given)
+        return self._tokens.find_expired(given) if found is None and rule.admits_expired else found
 
-    @staticmethod
-    def _expired(tokens: TokenFile, metadata: Any) -> Entry | None:
-        given = _token_of(metadata)
-        return None if given is None else tokens.find_expired(given)
+    def _expired(self, metadata: Any) -> Entry | None:
+        given = None if self._is_forwarded else _token_of(metadata)
+        return None if self._tokens is None or given is None else self._tokens.find_expired(given)
+
+    def _log_refusal(self, peer: str, message: str) -> None:
+        """Log a refusal, unless one of the same host was logged just now."""
+        skipped = self._sample.take(peer)
+        if skipped is not None:
+            more = f" (and {skipped} more refusals of this host before)" if skipped else ""
+            _log.warning("%s: %s%s", peer, message, more)
 
 
 def _token_of(metadata: Any) -> str | None:

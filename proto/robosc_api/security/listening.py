@@ -10,7 +10,7 @@ from typing import Any
 
 import grpc
 
-from robosc_api.security.addresses import is_loopback_host, joined, split_address
+from robosc_api.security.addresses import UNIX, is_loopback_host, joined, split_address
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.tokens import TokenFile
 
@@ -29,6 +29,7 @@ class ServerSecurity:
         client_ca: Authorities (PEM) of client certificates; None: no client certificates are required.
         tokens: Token file; None: no tokens are required.
         insecure_beyond_loopback: True to allow connections from other machines without TLS.
+        forwarded_identity: True if a proxy in front of the service tells who calls.
     """
 
     certificate: Path | None = None
@@ -36,22 +37,25 @@ class ServerSecurity:
     client_ca: Path | None = None
     tokens: Path | None = None
     insecure_beyond_loopback: bool = False
+    forwarded_identity: bool = False
 
 
 def add_port(server: Any, address: str, security: ServerSecurity) -> str:
-    """Let a gRPC server listen; returns `HOST:PORT` with the port that it got.
+    """Let a gRPC server listen; returns `HOST:PORT` with the port that it got, or the address of the Unix socket.
 
     A replaced certificate is used for the next connections: the files are checked for each of them.
 
     Args:
         server: A `grpc.Server` or `grpc.aio.Server`.
-        address: `HOST:PORT`; port 0 picks a free one.
+        address: `HOST:PORT`; port 0 picks a free one. Or `unix:` and the path of a socket.
         security: Security of the server.
 
     Raises:
         SecurityError: The address needs TLS, a file is invalid, or the address is in use or belongs to another machine.
     """
     check_listening(address, security)
+    if address.startswith(UNIX):
+        return _add_socket(server, address)
     host, port = split_address(address)
     # gRPC's parser of addresses wants IPv6 in brackets, and takes a name that is a number for something else.
     name = joined(host, port)
@@ -65,6 +69,23 @@ def add_port(server: Any, address: str, security: ServerSecurity) -> str:
     return joined(host, got)
 
 
+def _add_socket(server: Any, address: str) -> str:
+    """Let a gRPC server listen on a Unix socket, to which this user and its group may connect."""
+    path = Path(address.removeprefix(UNIX))
+    # The socket exists before its mode can be set: until then nobody else may connect.
+    before = os.umask(0o177)
+    try:
+        got = server.add_insecure_port(address)
+    except RuntimeError:
+        got = 0
+    finally:
+        os.umask(before)
+    if got == 0:
+        raise SecurityError(f"cannot listen on {path}: it is in use, or its folder cannot be written")
+    path.chmod(0o660)
+    return address
+
+
 def check_listening(address: str, security: ServerSecurity) -> None:
     """Check the configuration without reading the files.
 
@@ -72,8 +93,19 @@ def check_listening(address: str, security: ServerSecurity) -> None:
         SecurityError: The configuration is not allowed for this address.
         ValueError: The address is none.
     """
-    host, _ = split_address(address)
     is_secure = security.certificate is not None
+    if security.forwarded_identity and security.tokens is not None:
+        raise SecurityError("callers are known by tokens or by a proxy's word, and not by both: set only one of them")
+    if address.startswith(UNIX):
+        if is_secure:
+            raise SecurityError("a Unix socket has no TLS: leave out certificate, key and client certificates")
+        return
+    if security.forwarded_identity and security.client_ca is None:
+        raise SecurityError(
+            "a forwarded identity is trusted only over a Unix socket, or from a proxy with a client certificate: "
+            "otherwise every caller could name anybody"
+        )
+    host, _ = split_address(address)
     if is_secure != (security.key is not None):
         raise SecurityError("a certificate and its key must be given together: one of them is missing")
     if security.client_ca is not None and not is_secure:

@@ -25,7 +25,7 @@ from robosc_server.jobs.watchers import Watchers
 from robosc_server.operations.tracing import NO_TRACING, Tracing
 from robosc_server.store import JobFilter, JobRecord, JobState, Store, StoreUnavailableError
 from robosc_server.store.records import messages_of
-from robosc_server.tasks.task import Reason, Task, TaskKind, TaskLimits
+from robosc_server.tasks.task import Reason, Task, TaskKind, TaskLimits, shared_key
 
 _log = logging.getLogger(__name__)
 
@@ -333,7 +333,7 @@ def _same_task(record: JobRecord, task: Task) -> JobRecord:
     Raises:
         RefusedError: Its task is another one.
     """
-    if record.key != task.key:
+    if shared_key(record.key) != shared_key(task.key):
         raise RefusedError(Reason.IDEMPOTENCY_KEY_REUSED, "the idempotency key belongs to another task: use a new key")
     return record
 

@@ -2,6 +2,7 @@
 
 import asyncio
 from collections.abc import AsyncIterable, Awaitable, Callable
+from dataclasses import replace
 from typing import Any
 
 import grpc
@@ -14,7 +15,7 @@ from robosc_server.jobs import convert
 from robosc_server.jobs.manager import Caller, JobManager
 from robosc_server.store import JobRecord
 from robosc_server.tasks.requests import RequestLimits
-from robosc_server.tasks.task import Reason, Task, TaskKind
+from robosc_server.tasks.task import Reason, Task, TaskKind, own_key
 
 _ID_CHARACTERS = 64
 _JOBS_AT_ONCE = 20
@@ -49,6 +50,7 @@ class JobService(convert.JobServiceServicer):
         admit: Function that counts a requested job for a caller's name, or raises RefusedError.
         send: Function that sends the messages of a result, serialized.
         limits: Limits of a request.
+        keys: Function that returns the key of a caller's task, from the key of the task and the caller.
     """
 
     def __init__(
@@ -59,7 +61,9 @@ class JobService(convert.JobServiceServicer):
         admit: Callable[[str], None] = _unlimited,
         send: Callable[[Context, AsyncIterable[bytes]], Awaitable[None]] = _write,
         limits: RequestLimits = _LIMITS,
+        keys: Callable[[str, str], str] = own_key,
     ) -> None:
+        self._keys = keys
         self._manager, self._accept, self._limits = manager, accept, limits
         self._identify, self._admit, self._send = identify, admit, send
 
@@ -75,6 +79,7 @@ class JobService(convert.JobServiceServicer):
             # First, since it takes less time than checking the request.
             self._count(caller)
         task = self._accept(*convert.kind_and_request(request.task))
+        task = replace(task, key=self._keys(task.key, caller.name))
         if idempotency_key:
             # A repeated submission is nothing new, and does not count for the quota.
             if there := await self._manager.submitted(task, caller, idempotency_key):

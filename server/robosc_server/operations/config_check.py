@@ -36,6 +36,7 @@ from robosc_api.security.addresses import split_address
 from robosc_api.security.listening import read
 from robosc_api.security.tokens import SOON_S, lasting_longer, time_text
 from robosc_server.clock import wall_clock_s
+from robosc_server.operations.descriptors import highest_descriptor_limit, usable_connections
 from robosc_server.operations.metrics import check_metrics_address
 from robosc_server.operations.settings import Confinement, Settings, format_value
 from robosc_server.signing import SigningError, read_signing_key
@@ -43,10 +44,13 @@ from robosc_server.store.errors import StoreError
 from robosc_server.store.factory import DATABASE_FILE, is_in_use
 from robosc_server.store.inspection import inspect_postgresql, inspect_sqlite
 from robosc_server.store.migrate import latest_version
+from robosc_server.workers import WorkersError
+from robosc_server.workers.cluster_check import check_cluster
 
 _CONNECT_S = 5.0
 _TRY_S = 20.0
 _SOON_DAYS = 14
+_SOCKET_PATH_BYTES = 107
 
 
 class Grade(StrEnum):
@@ -94,10 +98,34 @@ def _listening(settings: Settings) -> Iterator[tuple[Grade, str]]:
     except (SecurityError, ValueError) as error:
         yield Grade.ERROR, str(error)
         return
+    if settings.socket is not None:
+        yield _listenable(settings.socket.absolute())
+        return
     yield _bindable(settings.host, settings.port)
+    usable = usable_connections(settings.connections, settings.worker_processes, highest_descriptor_limit())
+    if usable < settings.connections:
+        yield (
+            Grade.WARNING,
+            f"the limit on open files permits {usable} connections and not {settings.connections}: raise it"
+            " (LimitNOFILE, ulimit -n), or lower connections",
+        )
     security = settings.security
     if security.tokens is None and security.client_ca is None and not is_loopback_host(settings.host):
         yield Grade.WARNING, "every host that reaches the address may use the server: set tokens or client_ca"
+
+
+def _listenable(path: Path) -> tuple[Grade, str]:
+    """Check whether a server could listen on a Unix socket now."""
+    if len(os.fsencode(path)) > _SOCKET_PATH_BYTES:
+        return Grade.ERROR, f"{path}: the path of a Unix socket has at most {_SOCKET_PATH_BYTES} bytes"
+    if not path.parent.is_dir():
+        return Grade.ERROR, f"{path.parent} is not a folder"
+    problem = _unwritable(path.parent)
+    if problem is not None:
+        return Grade.ERROR, f"{path.parent} cannot be written: {problem}"
+    if path.exists() and not path.is_socket():
+        return Grade.ERROR, f"{path} is there, and no socket"
+    return Grade.OK, f"{path}"
 
 
 def _bindable(host: str, port: int) -> tuple[Grade, str]:
@@ -155,6 +183,9 @@ def _valid(file: Path) -> tuple[Grade, str]:
 
 
 def _tokens(settings: Settings) -> Iterator[tuple[Grade, str]]:
+    if settings.forwarded_identity:
+        yield Grade.OK, "a proxy names callers and their scopes"
+        return
     if settings.tokens is None:
         yield Grade.OK, "callers need no token"
         return
@@ -202,6 +233,25 @@ def _database(settings: Settings) -> Iterator[tuple[Grade, str]]:
         yield _sqlite(Path(url.removeprefix("sqlite:///")).absolute())
     else:
         yield _postgresql(url)
+        yield from _unverified(url)
+
+
+def _unverified(text: str) -> Iterator[tuple[Grade, str]]:
+    """Warn of a database on another machine whose certificate and name are not checked."""
+    with contextlib.suppress(ArgumentError, ValueError):
+        url = make_url(text)
+        hosts = [host for host in (url.host, *_words(url.query.get("host"))) if host and not host.startswith("/")]
+        is_far = any(not is_loopback_host(host.rpartition(":")[0] or host) for host in hosts)
+        if is_far and _words(url.query.get("sslmode")) != ["verify-full"]:
+            yield (
+                Grade.WARNING,
+                "whoever is on the way to the database can read and change jobs: add ?sslmode=verify-full to"
+                " database_url (and sslrootcert)",
+            )
+
+
+def _words(value: str | tuple[str, ...] | None) -> list[str]:
+    return [] if value is None else [value] if isinstance(value, str) else list(value)
 
 
 def _postgresql(text: str) -> tuple[Grade, str]:
@@ -266,6 +316,11 @@ def _unwritable(folder: Path) -> str | None:
 
 def _workers(settings: Settings) -> Iterator[tuple[Grade, str]]:
     if settings.workers != "local":
+        try:
+            check_cluster(settings.workers, is_insecure_allowed=settings.insecure_workers_beyond_loopback)
+        except WorkersError as error:
+            yield Grade.ERROR, str(error)
+            return
         yield _cluster(settings.workers)
         return
     wanted = settings.worker_processes * settings.task_memory_bytes
@@ -352,6 +407,9 @@ def _tracing(settings: Settings) -> Iterator[tuple[Grade, str]]:
     if not is_there:
         yield Grade.ERROR, "traces need the extra `tracing`: pip install 'robosc[tracing]'"
         return
-    error = _unreachable(endpoint.partition("://")[2].rstrip("/"))
+    scheme, _, address = endpoint.partition("://")
+    if scheme == "http" and not is_loopback_host(split_address(address.rstrip("/"))[0]):
+        yield Grade.WARNING, f"{endpoint}: traces, with the names of callers, can be read on the way: use https"
+    error = _unreachable(address.rstrip("/"))
     # A server works without who takes its traces.
     yield (Grade.OK, endpoint) if error is None else (Grade.WARNING, error)

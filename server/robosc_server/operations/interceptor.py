@@ -14,6 +14,7 @@ import structlog
 from robosc_api.failures import reason_of
 from robosc_api.layers import Layer, behaviour_of, with_behaviour, writing
 from robosc_api.security import CALLER
+from robosc_api.security.host_sample import HostSample
 from robosc_server.clock import monotonic
 from robosc_server.failures import RefusedError, abort, code_of, fault_message
 from robosc_server.operations.logs import REQUEST_ID, REQUEST_ID_HEADER, log_fault, request_id_of
@@ -46,6 +47,7 @@ class CallInterceptor(Layer):
         self._metrics = metrics
         self._tracing = tracing
         self._is_refusing = False
+        self._refusals = HostSample()
         self._log = structlog.get_logger().bind()
 
     def refuse_new(self) -> None:
@@ -135,9 +137,14 @@ class CallInterceptor(Layer):
                 reason = reason_of(context.trailing_metadata())
             if code in _FAULTS:
                 level = logging.WARNING
+        metrics.ended(code, reason, seconds)
+        peer, skipped = context.peer(), None
+        if code is grpc.StatusCode.UNAUTHENTICATED:
+            skipped = self._refusals.take(peer)
+            if skipped is None:
+                level = logging.DEBUG
         if method.startswith(_HEALTH):
             level = logging.DEBUG
-        metrics.ended(code, reason, seconds)
         # The words of a line that is not logged would take longer than the rest.
         if not self._log.is_enabled_for(level):
             return
@@ -146,7 +153,9 @@ class CallInterceptor(Layer):
             words["reason"] = reason
         if caller := CALLER.get():
             words["caller"] = caller
-        self._log.log(level, "call", **words, peer=context.peer())
+        if skipped:
+            words["skipped"] = skipped
+        self._log.log(level, "call", **words, peer=peer)
 
 
 _OK, _CANCELLED, _DEADLINE_EXCEEDED = (

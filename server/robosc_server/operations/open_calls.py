@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from robosc_api.connection_watch import Arrivals
 from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.security import ENTRY, caller_of, is_loopback_peer, network_of
 from robosc_server.failures import RefusedError
@@ -43,6 +44,7 @@ class OpenCalls(Layer):
         limits: Limits, health checks aside.
         identify: Function that returns the caller behind the call of a context.
         health: Limits of health checks.
+        arrivals: Layer that is told of which connection each open call is; None: none.
     """
 
     def __init__(
@@ -50,12 +52,14 @@ class OpenCalls(Layer):
         limits: CallLimits,
         identify: Callable[[Any], str] = caller_of,
         health: CallLimits = CallLimits(HEALTH_CALLS, HEALTH_CALLS_PER_CALLER),
+        arrivals: Arrivals | None = None,
     ) -> None:
         super().__init__()
         self._identify = identify
-        self._slots, self._health_slots = _CallSlots(limits), _CallSlots(health)
+        by_connection = arrivals or Arrivals()
+        self._slots, self._health_slots = _CallSlots(limits, by_connection), _CallSlots(health, by_connection)
         # For monitoring on this machine, which other hosts cannot crowd out.
-        self._own_health_slots = _CallSlots(health)
+        self._own_health_slots = _CallSlots(health, by_connection)
 
     @property
     def count(self) -> int:
@@ -88,8 +92,8 @@ class _CallSlots:
         taken: Number of slots that are taken.
     """
 
-    def __init__(self, limits: CallLimits) -> None:
-        self._limits = limits
+    def __init__(self, limits: CallLimits, arrivals: Arrivals) -> None:
+        self._limits, self._arrivals = limits, arrivals
         self._by_caller: dict[str, int] = {}
         self.taken = 0
 
@@ -116,9 +120,12 @@ class _CallSlots:
         self._by_caller[caller] = count + 1
         self.taken += 1
         # When the call has ended for gRPC as well: an unread response keeps it open after the handler has returned.
-        context.add_done_callback(partial(self._release, caller))
+        peer = context.peer()
+        self._arrivals.begun(peer)
+        context.add_done_callback(partial(self._release, caller, peer))
 
-    def _release(self, caller: str, context: Any) -> None:
+    def _release(self, caller: str, peer: str, context: Any) -> None:
+        self._arrivals.ended(peer)
         self.taken -= 1
         left = self._by_caller[caller] - 1
         if left:

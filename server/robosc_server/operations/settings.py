@@ -20,7 +20,7 @@ from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, Settings
 from robosc import __version__
 from robosc.cli.running import Parser
 from robosc_api.security import ServerSecurity, joined
-from robosc_api.security.addresses import split_address
+from robosc_api.security.addresses import UNIX, split_address
 from robosc_server.tasks.task import TaskLimits
 
 ENVIRONMENT_PREFIX = "ROBOSC_SERVER_"
@@ -158,6 +158,13 @@ class Settings(BaseModel):
     port: Annotated[int, BeforeValidator(_require_integer)] = _setting(
         50051, "TCP port to listen on; 0 selects a free port", _LISTENING, ge=0, le=65535
     )
+    socket: Path | None = _setting(
+        None,
+        "Unix socket to listen on instead of host and port, such as for a proxy; this user and its group may connect",
+        _LISTENING,
+        metavar="FILE",
+        default_words="host and port",
+    )
     drain_seconds: Annotated[float, Field(ge=0, le=86400, allow_inf_nan=False)] = _setting(
         30.0, "maximum time in seconds for open calls to finish when the server shuts down", _LISTENING
     )
@@ -182,6 +189,12 @@ class Settings(BaseModel):
     )
     insecure_beyond_loopback: bool = _setting(
         False, "allow connections from other machines without TLS, on a trusted network", _SECURITY
+    )
+    forwarded_identity: bool = _setting(
+        False,
+        "take the name and scopes of callers from a proxy's headers x-robosc-caller and x-robosc-scopes; only with"
+        " socket, or with a client_ca that has signed the proxy's certificate and no others",
+        _SECURITY,
     )
     signing_key: Path | None = _setting(
         None,
@@ -214,6 +227,12 @@ class Settings(BaseModel):
         "maximum number of open calls of one caller, unless its token has a quota; without tokens, of one host",
         _QUEUE,
     )
+    connections: _Count = _setting(
+        4096,
+        "maximum number of connections, as far as the limit on open files (RLIMIT_NOFILE) permits; above three quarters"
+        " of it, connections without an open call are closed",
+        _QUEUE,
+    )
     request_seconds: _Seconds = _setting(
         30.0, "maximum time in seconds between the start of a call and the arrival of its request", _QUEUE
     )
@@ -223,6 +242,11 @@ class Settings(BaseModel):
         "location of the workers: `local` processes, or the Dask cluster at `dask://HOST:PORT` or `dask+tls://HOST:PORT`",
         _WORKERS,
         metavar="WHERE",
+    )
+    insecure_workers_beyond_loopback: bool = _setting(
+        False,
+        "allow a Dask cluster without TLS on other machines: whoever can reach it can run programs there and here",
+        _WORKERS,
     )
     worker_processes: Annotated[_Count, Field(le=1024)] = _setting(
         _processors,
@@ -268,6 +292,12 @@ class Settings(BaseModel):
         " most data are deleted first",
         _STORAGE,
     )
+    share_results: bool = _setting(
+        False,
+        "answer a request with the cached result of another caller's equal request; whoever has the exact text of a"
+        " model then finds out whether somebody else has sent it",
+        _STORAGE,
+    )
     memory_cache_bytes: Annotated[
         int, BeforeValidator(_bytes), BeforeValidator(_require_integer), Field(ge=0, le=2**50)
     ] = _setting(64 * 2**20, "maximum size of the results cached in memory; 0 disables the cache", _STORAGE)
@@ -298,7 +328,9 @@ class Settings(BaseModel):
 
     @property
     def address(self) -> str:
-        """`HOST:PORT` to listen on."""
+        """`HOST:PORT` to listen on, or `unix:` and the path of a socket."""
+        if self.socket is not None:
+            return f"{UNIX}{self.socket.absolute()}"
         return joined(self.host, self.port)
 
     @property
@@ -310,6 +342,7 @@ class Settings(BaseModel):
             client_ca=self.client_ca,
             tokens=self.tokens,
             insecure_beyond_loopback=self.insecure_beyond_loopback,
+            forwarded_identity=self.forwarded_identity,
         )
 
     @property

@@ -21,6 +21,7 @@ _WIDTH = 100
 _EXAMPLES = {
     "tls_certificate": "/etc/robosc/server.crt",
     "tls_key": "/etc/robosc/server.key",
+    "socket": "/run/robosc/server.socket",
     "client_ca": "/etc/robosc/callers.pem",
     "tokens": "/etc/robosc/tokens",
     "signing_key": "/etc/robosc/signing.key",

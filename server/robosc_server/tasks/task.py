@@ -1,9 +1,14 @@
 """Tasks, results and failures as values, which server, database and workers exchange."""
 
+import hashlib
 from dataclasses import dataclass
 from enum import StrEnum
+from functools import lru_cache
 
 from robosc_api.jobs import TaskKind
+
+_OWNER_MARK = "@"
+_OWNER_DIGITS = 32
 
 
 @dataclass(frozen=True, slots=True)
@@ -14,7 +19,7 @@ class Task:
         kind: Kind of the task.
         request: The request's message, serialized.
         key: SHA-256 (64 hexadecimal digits) of all that decides the result: the kind, every file by name and content,
-            the options and the version of RoboSC.
+            the options and the version of RoboSC; with `own_key`, and the caller.
         main_file: Name of the main file, for lists.
     """
 
@@ -49,6 +54,21 @@ class Report:
 
     stage: str
     message: str
+
+
+def own_key(key: str, caller: str) -> str:
+    """Return the key of a task for one caller, so that nobody can find out what others have asked for."""
+    return f"{key}{_OWNER_MARK}{_digest_of(caller)}"
+
+
+def shared_key(key: str) -> str:
+    """Return the key of a task for all callers, from one of either kind."""
+    return key.partition(_OWNER_MARK)[0]
+
+
+@lru_cache(maxsize=4096)
+def _digest_of(caller: str) -> str:
+    return hashlib.sha256(caller.encode("utf-8", "replace")).hexdigest()[:_OWNER_DIGITS]
 
 
 class Reason(StrEnum):
@@ -103,4 +123,15 @@ class Failure:
 
 type Outcome = Result | Failure
 
-__all__ = ["Failure", "Outcome", "Reason", "Report", "Result", "Task", "TaskKind", "TaskLimits"]
+__all__ = [
+    "Failure",
+    "Outcome",
+    "Reason",
+    "Report",
+    "Result",
+    "Task",
+    "TaskKind",
+    "TaskLimits",
+    "own_key",
+    "shared_key",
+]

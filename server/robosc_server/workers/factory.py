@@ -5,7 +5,8 @@ import re
 from robosc_server.workers.dask_cluster import DaskWorkers
 from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
 
-_CLUSTER = re.compile(r"dask(\+tls)?://(?P<address>(\[[0-9a-fA-F:.]+\]|[^\s/\[\]:@]+):\d{1,5})/?")
+CLUSTER = re.compile(r"dask(\+tls)?://(?P<address>(\[[0-9a-fA-F:.]+\]|[^\s/\[\]:@]+):\d{1,5})/?")
+"""Form of the setting for a cluster."""
 
 
 def open_workers(
@@ -25,7 +26,7 @@ def open_workers(
     """
     if spec == "local":
         return LocalWorkers(processes, task_function, must_be_confined=must_be_confined)
-    if found := _CLUSTER.fullmatch(spec):
+    if found := CLUSTER.fullmatch(spec):
         address = f"{'tls' if found[1] else 'tcp'}://{found['address']}"
         return DaskWorkers(address, task_function, must_be_confined=must_be_confined)
     raise ValueError(f"workers are 'local', 'dask://HOST:PORT' or 'dask+tls://HOST:PORT', and not {spec!r}")

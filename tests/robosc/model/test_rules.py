@@ -513,6 +513,18 @@ EXTENSION_RULES: list[tuple[str, str, str, str]] = [
         robot("component C { incoming message m with type: double, when: value > 1 }"),
     ),
     (
+        "unprintable-identifier",
+        "error",
+        robot("component C { incoming message m with identifier: §'a\x1b[2Jb', type: none }"),
+        robot("component C { incoming message m with identifier: '/a/b', type: none }"),
+    ),
+    (
+        "unprintable-identifier",
+        "error",
+        robot("component C { incoming message m with identifier: §'a\u202eb', type: none }"),
+        robot("component C { incoming message m with identifier: '/a/b', type: none }"),
+    ),
+    (
         "invalid-identifier",
         "warning",
         robot("component C { incoming message m with identifier: §'a b', type: none }"),

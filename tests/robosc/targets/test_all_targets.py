@@ -24,6 +24,7 @@ from robosc.targets import (
     require_generatable,
     targets_left_out,
 )
+from robosc.targets.all_targets import _cell
 from robosc.targets.registry import Target
 from support.generated import example_supervisor
 from support.models import bundle_of
@@ -127,6 +128,12 @@ def test_what_refuses_is_left_out_and_told() -> None:
     assert targets_left_out(files, ALL) == ("cobol",)
     assert "| cobol | picky | not generated: no \\| model will do |" in files["README.md"].splitlines()
     assert targets_left_out(files, "cif") == ()
+
+
+def test_what_a_terminal_would_obey_is_escaped_in_the_page() -> None:
+    shown = _cell("no \x1b]0;mine\x07 and \u202ebackwards |")
+    assert shown == "no \\x1b]0;mine\\x07 and \\u202ebackwards \\|"
+    assert shown.isprintable()
 
 
 def test_an_error_of_one_target_leaves_out_that_one() -> None:

@@ -127,6 +127,34 @@ def test_tokens(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert Checked(capsys, "--tokens", str(file)).status == 1
 
 
+def test_what_others_could_read_on_the_way(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    cluster = Checked(capsys, "--workers", "dask://192.0.2.1:1")
+    assert cluster.grade("workers") == "error"
+    assert "insecure_workers_beyond_loopback" in cluster.of("workers")[0][1]
+    far = Checked(
+        capsys,
+        "--database-url",
+        "postgresql://u:p@nowhere.invalid:1/n",
+        "--tracing-endpoint",
+        "http://nowhere.invalid:1",
+    )
+    assert any("add ?sslmode" in message for _, message in far.of("database"))
+    assert any("use https" in message for _, message in far.of("tracing"))
+    sure = Checked(capsys, "--database-url", "postgresql://u:p@nowhere.invalid:1/n?sslmode=verify-full")
+    assert not any("add ?sslmode" in message for _, message in sure.of("database"))
+    near = Checked(capsys, "--database-url", "postgresql://u:p@127.0.0.1:1/n")
+    assert not any("add ?sslmode" in message for _, message in near.of("database"))
+
+
+def test_a_socket_and_the_number_of_connections(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    assert Checked(capsys, "--socket", str(tmp_path / "s")).of("listening") == [("ok", str(tmp_path / "s"))]
+    assert Checked(capsys, "--socket", str(tmp_path / "none" / "s")).grade("listening") == "error"
+    assert Checked(capsys, "--socket", str(tmp_path / ("s" * 200))).grade("listening") == "error"
+    assert Checked(capsys, "--forwarded-identity").grade("listening") == "error"
+    many = Checked(capsys, "--connections", "1000000000")
+    assert "LimitNOFILE" in many.of("listening")[1][1]
+
+
 def test_addresses(capsys: pytest.CaptureFixture[str]) -> None:
     assert "without TLS" in Checked(capsys, "--host", "0.0.0.0").of("listening")[0][1]
     open_to_all = Checked(capsys, "--host", "0.0.0.0", "--insecure-beyond-loopback")

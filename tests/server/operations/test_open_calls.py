@@ -39,8 +39,8 @@ def looked_into(**settings: Any) -> Iterator[tuple[str, Callable[[], bool]]]:
     """
     made: list[OpenCalls] = []
 
-    def noted(*arguments: Any) -> OpenCalls:
-        made.append(OpenCalls(*arguments))
+    def noted(*arguments: Any, **more: Any) -> OpenCalls:
+        made.append(OpenCalls(*arguments, **more))
         return made[0]
 
     with pytest.MonkeyPatch.context() as patch:

@@ -27,6 +27,9 @@ PATIENCE_S = 0.5
 FASTEST, SLOWEST = 25.0, 0.5
 """Fastest and slowest speed of the world, as a multiple of the clock's."""
 
+SLOWEST_RAD_S = 0.055
+"""Slowest rotation, in rad/s: a Burger's wheels stand still below 0.05 rad/s on the worst day of the profiles."""
+
 _BRIDGE_LIMIT_S = 60.0
 _SYNTHESIS_LIMIT_S = 120.0
 
@@ -125,7 +128,8 @@ def configuration(setting: Setting, base: str, scanner: str, camera: str | None)
     # One exchange, and one to be felt; gain times delay stays below 1/e (`robosc_bridge.skills.rotate`).
     delay_s = min(2 * 0.02 * speed, 2 * PATIENCE_S) + 0.04
     skills = {
-        "rotate": f"speed_rad_s: 0.6, slowest_rad_s: 0.02, tolerance_rad: 0.02, patience_s: 30, "
+        "rotate": f"speed_rad_s: 0.6, slowest_rad_s: {SLOWEST_RAD_S:g}, "
+        f"tolerance_rad: {max(0.02, 0.6 * SLOWEST_RAD_S * delay_s):.4f}, patience_s: 30, "
         f"gain_per_s: {min(2.0, 0.36 / delay_s):.3f}, settle_s: {max(0.4 / speed, 0.06):.3f}",
         **setting.skills,
     }

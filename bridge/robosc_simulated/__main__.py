@@ -91,10 +91,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
             # Nor without end: a signal that comes just before a wait begins does not end it.
             while not received and not errors.has_crashed:
                 time.sleep(_POLL_S)
+                if (silence_s := robot.time.new_silence_s()) is not None:
+                    print(_lag(silence_s, options.speed), file=sys.stderr, flush=True)
     except (OSError, ValueError) as error:
         print(f"the robot cannot be simulated: {error}", file=sys.stderr)
         return 1
     return errors.status
+
+
+def _lag(silence_s: float, speed: float) -> str:
+    """Return a warning: the robot has driven on while its host had no time."""
+    return (
+        f"the bridge was not heard for {silence_s:.1f} s of the world, in which the robot drove on: this computer has "
+        f"too little time for --speed {speed:g}; choose a lower speed, or --wait 0.5, with which the world waits for it"
+    )
 
 
 def _robot(options: argparse.Namespace, recorder: Recorder | None) -> SimulatedTurtleBot3:

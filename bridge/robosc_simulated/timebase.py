@@ -19,6 +19,9 @@ FASTEST = 100.0
 """Largest factor of a world's speed to the clock's; a fast computer lives some hundred seconds of it in one."""
 
 _STEP_S = 0.005
+# A host that is silent for longer, by the clock, has ended, or has not begun.
+_AWAY_S = 1.0
+_SILENCE_S = 1.0
 # Who lives for so long at once is too slow for the world's factor.
 _SLOW_S = 0.25
 
@@ -49,6 +52,9 @@ class Timebase:
         # By the world's time: when it waits next, and how long it has waited.
         self._limit_s = math.inf if patience_s is None else patience_s
         self._waited_s = 0.0
+        self._heard_s: float | None = None
+        self._silence_s = 0.0
+        self._told_s = _SILENCE_S / 2
         self._unread: set[object] = set()
         self._members: list[Callable[[], None]] = []
 
@@ -72,10 +78,25 @@ class Timebase:
 
     def host_sent(self) -> None:
         """The host has sent something: the world need not wait for it."""
-        if self._patience_s is not None:
-            with self.lock:
-                if not self._unread:
-                    self._limit_s = self.world_s() + self._patience_s
+        with self.lock:
+            now_s = self.now_s()
+            if self._patience_s is None and self._heard_s is not None and now_s - self._heard_s <= _AWAY_S:
+                self._silence_s = max(self._silence_s, (now_s - self._heard_s) * self.factor)
+            self._heard_s = now_s
+            if self._patience_s is not None and not self._unread:
+                self._limit_s = self.world_s() + self._patience_s
+
+    def new_silence_s(self) -> float | None:
+        """Return for how long a fast world has not heard its host, in its seconds, if that is to be told a person.
+
+        A world that passes no faster than the clock, or that waits, has none; a longer silence is told when it is twice
+        as long as the last one.
+        """
+        with self.lock:
+            if self.factor <= 1.0 or self._silence_s < 2 * self._told_s:
+                return None
+            self._told_s = self._silence_s
+            return self._silence_s
 
     def record_work(self, seconds: float, since_s: float) -> None:
         """Somebody has lived a part of the world's time, and that has taken them time.

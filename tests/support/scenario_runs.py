@@ -193,6 +193,7 @@ def scenario_run(
     base: str = "opencr",
     lidar: str = "lds01",
     seed: int = 0,
+    factor: float = 1.0,
 ) -> Iterator[ScenarioRun]:
     """Let a supervised robot live in a scene until the block is left.
 
@@ -204,13 +205,16 @@ def scenario_run(
         base: Driver of its drive base.
         lidar: Driver of its LiDAR.
         seed: Seed of all that comes by chance.
+        factor: Speed of its world, as a multiple of the clock's.
     """
     supervisor = supervisor_of((EXAMPLES / f"{model}.rscd").read_text(encoding="utf-8"))
     # The simulated camera lives in real time.
     seen = replace(scene, line=None)
     with (
         VirtualHost() as host,
-        SimulatedTurtleBot3("burger", base, lidar, scene=seen, clock=host, profile=profile, seed=seed) as robot,
+        SimulatedTurtleBot3(
+            "burger", base, lidar, scene=seen, clock=host, factor=factor, profile=profile, seed=seed
+        ) as robot,
         patch("robosc_bridge.devices.camera.make_camera", lambda name: _Pictures(host, robot, scene, seed)),
     ):
         text = (

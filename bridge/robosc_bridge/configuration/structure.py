@@ -65,6 +65,17 @@ class Scanner(_Section, frozen=True):
         dict[_OptionName, _Option | tuple[_Option, ...]],
         Meta(description="Options of the driver: see docs/bridge-drivers.md."),
     ] = {}
+    x_m: Annotated[
+        Annotated[float, Meta(ge=-5, le=5)] | None,
+        Meta(
+            description="Place of the LiDAR, in metres forward of the middle between the wheels; null: as the "
+            "TurtleBot3 has it."
+        ),
+    ] = None
+    y_m: Annotated[
+        Annotated[float, Meta(ge=-5, le=5)] | None,
+        Meta(description="The same to the left; both keys or none."),
+    ] = None
 
 
 class Execution(_Section, frozen=True):

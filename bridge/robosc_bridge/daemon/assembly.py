@@ -200,9 +200,18 @@ def check_settings(configuration: Configuration, mapping: ChannelMapping, deploy
     return settings
 
 
+def _scanner_place(scanner: Scanner | None) -> tuple[float, float] | None:
+    """Return the place of the LiDAR, if the configuration has it."""
+    if scanner is None or scanner.x_m is None or scanner.y_m is None:
+        return None
+    return scanner.x_m, scanner.y_m
+
+
 def _scan_problems(configuration: Configuration) -> list[str]:
-    """A time within which no revolution can be complete would stop the robot for ever."""
+    """A time within which no revolution can be complete would stop the robot for ever; half a place is none."""
     scanner = configuration.scanner
+    if scanner is not None and (scanner.x_m is None) != (scanner.y_m is None):
+        return ["scanner: x_m and y_m belong together: give both, or none"]
     features = None if scanner is None else features_of(scanner.driver, Kind.RANGE_SCANNER)
     if scanner is None or features is None or features.revolution_s is None:
         return []
@@ -429,6 +438,7 @@ def assemble(
         lambda: safety.operator_seen(host.monotonic()),
         is_layer=is_layer,
         turtlebot=configuration.robot if isinstance(configuration.robot, str) else "",
+        scanner_place=_scanner_place(configuration.scanner),
     )
     manager = ServiceManager(lambda now_s: drive.is_alive and worker.is_cycling(now_s))
     daemon.beat = lambda now_s: manager.beat(now_s, daemon.state)

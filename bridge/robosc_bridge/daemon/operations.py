@@ -38,6 +38,7 @@ class Operations:
         post: Function that puts an item into the inbox of the loop.
         operator_seen: Function that reports a sign of life of an operator to the safety layer.
         turtlebot: TurtleBot3 that is driven, as a configuration names it; empty: another robot.
+        scanner_place: Place of the LiDAR by the configuration, forward and to the left, in metres; None: not there.
 
     Attributes:
         supervisor: Supervisor that is executed.
@@ -46,6 +47,7 @@ class Operations:
         is_layer: True if the supervisor is a supervision layer.
         feed: Feed that the daemon shows.
         turtlebot: TurtleBot3 that is driven, as a configuration names it; empty: another robot.
+        scanner_place: Place of the LiDAR by the configuration, forward and to the left, in metres; None: not there.
     """
 
     def __init__(
@@ -58,6 +60,7 @@ class Operations:
         *,
         is_layer: bool,
         turtlebot: str = "",
+        scanner_place: tuple[float, float] | None = None,
     ) -> None:
         self.supervisor = supervisor
         self.model = supervisor.model
@@ -65,6 +68,7 @@ class Operations:
         self.is_layer = is_layer
         self.feed = feed
         self.turtlebot = turtlebot
+        self.scanner_place = scanner_place
         self._post = post
         self._operator_seen = operator_seen
 

@@ -12,7 +12,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from robosc_bridge.devices.interface import BINS, STANDSTILL, DriveBase, RangeScanner
-from robosc_bridge.errors import BridgeError
+from robosc_bridge.errors import BridgeError, DeviceSilentError
 from robosc_bridge.host import Host
 
 LEAST_WAY_M = 0.3
@@ -27,6 +27,7 @@ _LEAST_POINTS = 20
 _ROUGH_M = 0.02
 _SCANS = 10
 _LIMIT_S = 5.0
+_SILENT_S = 1.0
 
 
 class CalibrationError(BridgeError):
@@ -46,6 +47,27 @@ class Way:
     rotation_rad: float = 0.0
 
 
+def read_wheels(base: DriveBase, host: Host) -> tuple[float, float]:
+    """Return the ways of the wheels; a base that misses a request, as on a bad line, is asked again for a while.
+
+    Raises:
+        BridgeError: The drive base is lost, does not report the ways of its wheels, or its torque is on.
+    """
+    end_s = host.monotonic() + _SILENT_S
+    while True:
+        try:
+            reading = base.exchange(STANDSTILL)
+        except DeviceSilentError:
+            if host.monotonic() >= end_s:
+                raise
+            continue
+        if reading.is_torque_on:
+            raise CalibrationError("the motors hold: torque must be off")
+        if reading.wheels_m is None:
+            raise CalibrationError("the drive base does not report the distances of its wheels")
+        return reading.wheels_m
+
+
 def follow(base: DriveBase, host: Host, is_over: Callable[[], bool], separation_m: float) -> Way:
     """Return the way on which a robot is moved by hand until something is over; its torque is off.
 
@@ -60,14 +82,10 @@ def follow(base: DriveBase, host: Host, is_over: Callable[[], bool], separation_
     """
     begin: tuple[float, float] | None = None
     while True:
-        reading = base.exchange(STANDSTILL)
-        if reading.is_torque_on:
-            raise CalibrationError("the motors hold: torque must be off")
-        if reading.wheels_m is None:
-            raise CalibrationError("the drive base does not report the distances of its wheels")
-        begin = begin or reading.wheels_m
+        wheels_m = read_wheels(base, host)
+        begin = begin or wheels_m
         if is_over():
-            left_m, right_m = (now_m - before_m for now_m, before_m in zip(reading.wheels_m, begin, strict=True))
+            left_m, right_m = (now_m - before_m for now_m, before_m in zip(wheels_m, begin, strict=True))
             return Way((left_m + right_m) / 2, (right_m - left_m) / separation_m)
         host.sleep(_PERIOD_S)
 

@@ -2,10 +2,12 @@
 
 import argparse
 import json
+import math
 import os
 import sys
 import threading
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -223,19 +225,25 @@ def _by_hand(configuration: Configuration, host: Host, ask: Ask, begin: str, end
     base.open()
     try:
         ask(begin)
-        is_over = threading.Event()
-
-        def wait() -> None:
-            ask(end)
-            is_over.set()
-
-        waiting = host.thread(wait, "person")
-        waiting.start()
-        way = calibration.follow(base, host, is_over.is_set, separation_m)
-        waiting.join()
-        return way
+        with _answer_to(end, host, ask) as is_over:
+            return calibration.follow(base, host, is_over, separation_m)
     finally:
         base.close()
+
+
+@contextmanager
+def _answer_to(question: str, host: Host, ask: Ask) -> Iterator[Callable[[], bool]]:
+    """Ask a question in a thread of its own; gives a function that returns whether it was answered."""
+    is_answered = threading.Event()
+
+    def wait() -> None:
+        ask(question)
+        is_answered.set()
+
+    waiting = host.thread(wait, "person")
+    waiting.start()
+    yield is_answered.is_set
+    waiting.join()
 
 
 def _number(ask: Ask, question: str) -> float:
@@ -307,10 +315,42 @@ def _front(configuration: Configuration, host: Host, ask: Ask, factor: float) ->
     return {"front_rad": round(found, 4), "change_deg": round((found - float(given)) * 57.29578, 2)}
 
 
+def _place(configuration: Configuration, host: Host, ask: Ask, factor: float) -> dict[str, float]:
+    from robosc_bridge.first_drive.lidar_place import lidar_place
+
+    if configuration.scanner is None:
+        raise CalibrationError("the configuration has no scanner")
+    _, separation_m = _wheels(configuration)
+    base, scanner = drive_base(configuration, host), range_scanner(configuration.scanner, host)
+    base.open()
+    try:
+        scanner.open()
+        ask(
+            "Torque is off. Put the robot before a plain wall that is 1 m wide or more, half a metre to a metre away, "
+            "looking at it; press Enter. "
+        )
+        with _answer_to(
+            "Turn it on the spot by a whole revolution or more, slowly: 20 seconds for each; press Enter. ", host, ask
+        ) as is_over:
+            found = lidar_place(base, scanner, host, is_over, separation_m)
+    finally:
+        scanner.close()
+        base.close()
+    return {
+        "x_m": round(found.x_m, 4),
+        "y_m": round(found.y_m, 4),
+        "deviation_m": round(found.deviation_m, 5),
+        "stray_m": round(found.stray_m, 4),
+        "rotation_deg": round(math.degrees(found.rotation_rad), 1),
+        "scans": found.sightings,
+    }
+
+
 _CALIBRATIONS: dict[str, Callable[[Configuration, Host, Ask, float], dict[str, float]]] = {
     "wheel-radius": _radius,
     "wheel-separation": _separation,
     "lidar-front": _front,
+    "lidar-place": _place,
 }
 
 

@@ -103,6 +103,8 @@ def definition(operations: Operations) -> pb.GetDefinitionResponse:
         ],
         supervisor=_supervisor(operations.supervisor),
         turtlebot=operations.turtlebot,
+        scanner_x_m=None if operations.scanner_place is None else operations.scanner_place[0],
+        scanner_y_m=None if operations.scanner_place is None else operations.scanner_place[1],
     )
 
 

@@ -87,17 +87,21 @@ class Mounting:
     place: Place
 
 
-def places_of(turtlebot: str, scan: Place | None) -> Places | None:
+def places_of(turtlebot: str, scan: Place | None, configured: tuple[float, float] | None = None) -> Places | None:
     """Return the places on a robot.
 
     Args:
         turtlebot: TurtleBot3 as its bridge names it; empty: another robot.
-        scan: Place of its LiDAR, if that is told; None: as the TurtleBot3 has it.
+        scan: Place of its LiDAR, if that is told; None: as its configuration or the TurtleBot3 has it.
+        configured: Place of its LiDAR as its configuration has it, forward and to the left, at the height that the
+            TurtleBot3 has, or that of `base_link`; None: not there.
 
     Returns:
         None: it is not known where the LiDAR is.
     """
     known = TURTLEBOTS.get(turtlebot)
+    if scan is None and configured is not None:
+        scan = Place(*configured, 0.0 if known is None else known.scan.z_m)
     if known is None:
         return None if scan is None else Places(Place(), scan)
     return known if scan is None else Places(known.base, scan, known.imu)

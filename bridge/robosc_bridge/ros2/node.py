@@ -107,19 +107,24 @@ class BridgeNode:
         self._node.destroy_node()
         self._rclpy.try_shutdown(context=self._context)
 
-    def know(self, turtlebot: str) -> None:
+    def know(self, turtlebot: str, scanner: tuple[float, float] | None) -> None:
         """Tell where the parts of the robot are.
+
+        Args:
+            turtlebot: TurtleBot3 as its bridge names it; empty: another robot.
+            scanner: Place of its LiDAR as the bridge's configuration has it, forward and to the left; None: not there.
 
         Raises:
             NodeError: Nobody knows it.
         """
         if self._to_static_tf is None:
             return
-        places = places_of(turtlebot, self._scan)
+        places = places_of(turtlebot, self._scan, scanner)
         if places is None:
             raise NodeError(
                 f"the bridge drives {repr(turtlebot) if turtlebot else 'no TurtleBot3'}, and it is not known where the "
-                "LiDAR is on it: give --scan-at X Y Z, or use --no-static-tf"
+                "LiDAR is on it: set scanner.x_m and scanner.y_m of its configuration, give --scan-at X Y Z, or use "
+                "--no-static-tf"
             )
         now_ns = self._node.get_clock().now().nanoseconds
         transforms = [self._messages.mounted(item, now_ns) for item in mountings(self._frames, places)]

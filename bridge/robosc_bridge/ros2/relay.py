@@ -29,7 +29,7 @@ class EarlierBridgeError(Exception):
 class Outlet(Protocol):
     """Receiver of the messages; stamps are in nanoseconds since 1970-01-01 UTC."""
 
-    def know(self, turtlebot: str) -> None:
+    def know(self, turtlebot: str, scanner: tuple[float, float] | None) -> None:
         """A bridge tells which TurtleBot3 it drives; empty: another robot."""
 
     def put_drive(self, drive: DriveState, stamp_ns: int, pose_covariance: tuple[float, ...]) -> None:
@@ -69,7 +69,9 @@ class Relay:
     def connect(self, definition: Definition) -> None:
         """A bridge answers: perhaps another one than before, or the same one after a restart."""
         with self._lock:
-            self._outlet.know(definition.turtlebot)
+            has_place = definition.HasField("scanner_x_m") and definition.HasField("scanner_y_m")
+            scanner = (definition.scanner_x_m, definition.scanner_y_m) if has_place else None
+            self._outlet.know(definition.turtlebot, scanner)
             self._link = replace(self._link, robot=definition.robot, version=definition.version, problem="")
             self._offset = ClockOffset()
             self._heard_s = self._clocks.monotonic()

@@ -72,7 +72,7 @@ class GetDefinitionRequest(_message.Message):
     def __init__(self) -> None: ...
 
 class GetDefinitionResponse(_message.Message):
-    __slots__ = ("robot", "version", "is_layer", "communications", "definition", "transitions", "supervisor", "turtlebot")
+    __slots__ = ("robot", "version", "is_layer", "communications", "definition", "transitions", "supervisor", "turtlebot", "scanner_x_m", "scanner_y_m")
     ROBOT_FIELD_NUMBER: _ClassVar[int]
     VERSION_FIELD_NUMBER: _ClassVar[int]
     IS_LAYER_FIELD_NUMBER: _ClassVar[int]
@@ -81,6 +81,8 @@ class GetDefinitionResponse(_message.Message):
     TRANSITIONS_FIELD_NUMBER: _ClassVar[int]
     SUPERVISOR_FIELD_NUMBER: _ClassVar[int]
     TURTLEBOT_FIELD_NUMBER: _ClassVar[int]
+    SCANNER_X_M_FIELD_NUMBER: _ClassVar[int]
+    SCANNER_Y_M_FIELD_NUMBER: _ClassVar[int]
     robot: str
     version: str
     is_layer: bool
@@ -89,7 +91,9 @@ class GetDefinitionResponse(_message.Message):
     transitions: _containers.RepeatedCompositeFieldContainer[EventTransition]
     supervisor: bytes
     turtlebot: str
-    def __init__(self, robot: _Optional[str] = ..., version: _Optional[str] = ..., is_layer: _Optional[bool] = ..., communications: _Optional[_Iterable[_Union[Communication, _Mapping]]] = ..., definition: _Optional[str] = ..., transitions: _Optional[_Iterable[_Union[EventTransition, _Mapping]]] = ..., supervisor: _Optional[bytes] = ..., turtlebot: _Optional[str] = ...) -> None: ...
+    scanner_x_m: float
+    scanner_y_m: float
+    def __init__(self, robot: _Optional[str] = ..., version: _Optional[str] = ..., is_layer: _Optional[bool] = ..., communications: _Optional[_Iterable[_Union[Communication, _Mapping]]] = ..., definition: _Optional[str] = ..., transitions: _Optional[_Iterable[_Union[EventTransition, _Mapping]]] = ..., supervisor: _Optional[bytes] = ..., turtlebot: _Optional[str] = ..., scanner_x_m: _Optional[float] = ..., scanner_y_m: _Optional[float] = ...) -> None: ...
 
 class Communication(_message.Message):
     __slots__ = ("name", "component", "kind", "identifier", "channel", "fields")

@@ -113,6 +113,7 @@ def test_a_face_that_may_not_listen_so_is_refused_before_anything_is_made(
             "driver 'lds03': option 'front_rad': Expected `float`",
         ),
         ("lds03, port: /dev/scanner, options: {front: 1}", "driver 'lds03': there is no option 'front'; there is baud"),
+        ("lds03, port: /dev/scanner, y_m: 0.1", "scanner: x_m and y_m belong together: give both, or none"),
     ],
 )
 def test_a_scanner_that_cannot_be_so_is_refused(scanner: str, why: str, supervisor: Supervisor) -> None:
@@ -121,6 +122,16 @@ def test_a_scanner_that_cannot_be_so_is_refused(scanner: str, why: str, supervis
     with pytest.raises(AssemblyError) as raised:
         check_settings(configuration, map_channels(supervisor.model, configuration), supervisor.deployment)
     assert why in str(raised.value)
+
+
+@pytest.mark.parametrize(("place", "told"), [("", None), (", x_m: 0, y_m: -0.06", (0.0, -0.06))])
+def test_the_place_of_the_scanner_is_that_of_the_configuration(
+    place: str, told: tuple[float, float] | None, supervisor: Supervisor
+) -> None:
+    text = re.sub(
+        r"^scanner: .*$", f"scanner: {{driver: lds03, port: /dev/scanner{place}}}", CONFIGURATION, flags=re.MULTILINE
+    )
+    assert machine(supervisor, text).operations.scanner_place == told
 
 
 SET_MESSAGE_INTERVAL = 511

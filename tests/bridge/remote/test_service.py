@@ -106,6 +106,15 @@ class TestDefinition:
         with served(daemon) as endpoint, connected(endpoint.address) as stub:
             assert stub.GetDefinition(pb.GetDefinitionRequest(), timeout=PATIENCE_S).turtlebot == name
 
+    @pytest.mark.parametrize("place", [None, (0.0, -0.06)])
+    def test_the_place_of_the_lidar_is_told(self, place: tuple[float, float] | None, daemon: FakeDaemon) -> None:
+        daemon.operations.scanner_place = place
+        with served(daemon) as endpoint, connected(endpoint.address) as stub:
+            told = stub.GetDefinition(pb.GetDefinitionRequest(), timeout=PATIENCE_S)
+        assert {told.HasField("scanner_x_m"), told.HasField("scanner_y_m")} == {place is not None}
+        if place is not None:
+            assert (told.scanner_x_m, told.scanner_y_m) == place
+
 
 class TestStatus:
     def test_everything_is_told(self, daemon: FakeDaemon, stub: Any) -> None:

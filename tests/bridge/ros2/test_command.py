@@ -39,7 +39,7 @@ class Outlet:
     def __exit__(self, *_: object) -> None:
         pass
 
-    def know(self, turtlebot: str) -> None:
+    def know(self, turtlebot: str, scanner: tuple[float, float] | None) -> None:
         if not turtlebot:
             raise node.NodeError("where is the LiDAR?")
 

@@ -38,3 +38,13 @@ def test_another_robot_needs_to_tell_where_its_laser_is() -> None:
     assert places_of("", place) == Places(Place(), place)
     assert places_of("burger", None) == TURTLEBOTS["burger"]
     assert places_of("burger", place) == Places(TURTLEBOTS["burger"].base, place, TURTLEBOTS["burger"].imu)
+
+
+def test_a_place_of_the_configuration_takes_the_turtlebots_place_and_keeps_its_height() -> None:
+    burger = TURTLEBOTS["burger"]
+    assert places_of("burger", None, (0.05, -0.02)) == Places(
+        burger.base, Place(0.05, -0.02, burger.scan.z_m), burger.imu
+    )
+    assert places_of("", None, (0.05, -0.02)) == Places(Place(), Place(0.05, -0.02, 0.0))
+    told = Place(0.1, 0.0, 0.2)
+    assert places_of("burger", told, (0.05, -0.02)) == Places(burger.base, told, burger.imu)

@@ -21,7 +21,7 @@ class Bench:
     def __init__(self) -> None:
         self.now_s = 100.0
         self.wall_ns = WALL_NS
-        self.known: list[str] = []
+        self.known: list[tuple[str, tuple[float, float] | None]] = []
         self.drives: list[tuple[Any, int, tuple[float, ...]]] = []
         self.batteries: list[int] = []
         self.scans: list[int] = []
@@ -31,8 +31,8 @@ class Bench:
     def connect(self, turtlebot: str = "burger") -> None:
         self.relay.connect(pb.GetDefinitionResponse(robot="Porter", version="1.2", turtlebot=turtlebot))
 
-    def know(self, turtlebot: str) -> None:
-        self.known.append(turtlebot)
+    def know(self, turtlebot: str, scanner: tuple[float, float] | None) -> None:
+        self.known.append((turtlebot, scanner))
 
     def put_drive(self, drive: Any, stamp_ns: int, pose_covariance: tuple[float, ...]) -> None:
         self.drives.append((drive, stamp_ns, pose_covariance))
@@ -92,7 +92,13 @@ def test_the_stamp_is_the_time_of_the_reading(bench: Bench) -> None:
     bench.take(read_s=100.1, turned_s=100.05, delay_s=0.04)
     assert bench.stamps_s() == [99.95, 100.1]
     assert [round((stamp_ns - WALL_NS) / 1e9, 6) for stamp_ns in bench.scans] == [0.05]
-    assert bench.known == ["burger"]
+    assert bench.known == [("burger", None)]
+
+
+def test_the_place_of_the_lidar_is_passed_on(bench: Bench) -> None:
+    definition = pb.GetDefinitionResponse(robot="Porter", version="1.2", scanner_x_m=0.0, scanner_y_m=-0.06)
+    bench.relay.connect(definition)
+    assert bench.known[-1] == ("", (0.0, -0.06))
 
 
 def test_a_slow_beginning_is_corrected_without_going_back(bench: Bench) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from robosc_bridge.devices.interface import STANDSTILL, Velocity
+from robosc_bridge.devices.interface import STANDSTILL, BatteryLevel, Velocity
 from robosc_bridge.safety import Caution, Reason
 from robosc_bridge.safety.motion import within
 from support.safety import LIMITS, STEP_S, Bench, near, reading
@@ -124,7 +124,8 @@ def test_a_command_of_long_ago_does_not_count() -> None:
     assert bench.layer.output(bench.now_s).reasons == (Reason.COMMAND_SILENT,)
 
 
-def test_an_output_holds_for_a_while_and_motion_begins_anew_after_it() -> None:
+@pytest.mark.parametrize("after_s", [0.0624, 0.0625])
+def test_an_output_holds_for_a_while_and_motion_begins_anew_after_it(after_s: float) -> None:
     bench = Bench(scan_timeout_s=None, loop_timeout_s=2.0, motor_timeout_s=0.0625)
     bench.drive(0.1)
 
@@ -136,9 +137,16 @@ def test_an_output_holds_for_a_while_and_motion_begins_anew_after_it() -> None:
 
     assert bench.last.velocity.until_s == bench.now_s + 0.0625
     # As long as it holds, the next one goes on from it.
-    assert next_output(0.0624) == near(0.1624)
+    assert next_output(after_s) == near(0.1 + after_s)
     assert next_output(0.0626) == STANDSTILL
     assert next_output(0.03) == near(0.03)
+
+
+def test_what_the_drive_base_says_of_its_battery_counts() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.layer.on_drive_reading(reading(bench.now_s, battery_level=BatteryLevel.EMPTY))
+    assert Reason.BATTERY_LOW in bench.layer.output(bench.now_s).reasons
 
 
 def again(bench: Bench) -> None:

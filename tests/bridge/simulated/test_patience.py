@@ -42,6 +42,30 @@ def test_without_patience_time_passes_whoever_is_heard() -> None:
     assert time.world_s() == pytest.approx(30.0)
 
 
+def test_a_fast_world_that_does_not_hear_its_host_says_so() -> None:
+    clock = ManualClock()
+    time = Timebase(clock, factor=10.0)
+    # One that has not begun is not silent.
+    clock.advance(5.0)
+    time.host_sent()
+    for pause_s, told_s in [(0.09, None), (0.15, 1.5), (0.2, None), (0.31, 3.1), (0.31, None), (2.0, None)]:
+        clock.advance(pause_s)
+        assert time.new_silence_s() is None
+        time.host_sent()
+        assert time.new_silence_s() == (None if told_s is None else pytest.approx(told_s))
+
+
+@pytest.mark.parametrize(("factor", "patience_s"), [(1.0, None), (10.0, 0.5)])
+def test_a_world_that_waits_or_does_not_hurry_says_nothing(factor: float, patience_s: float | None) -> None:
+    clock = ManualClock()
+    time = Timebase(clock, factor, patience_s)
+    for _ in range(3):
+        time.host_sent()
+        clock.advance(0.9)
+    time.host_sent()
+    assert time.new_silence_s() is None
+
+
 @pytest.mark.parametrize("patience_s", [0.0, -1.0, float("nan"), float("inf")])
 def test_a_patience_that_cannot_be_is_refused(patience_s: float) -> None:
     with pytest.raises(ValueError, match="the patience with the host"):

@@ -1,9 +1,11 @@
 """The example robots that the bridge carries, on ideal, typical and bad days: whole bridges on virtual time."""
 
 import math
+from pathlib import Path
 
 import pytest
 
+from robosc.model.structure import Deployment
 from robosc_bridge.daemon.programs.items import (
     CallMade,
     CancelMade,
@@ -14,6 +16,8 @@ from robosc_bridge.daemon.programs.items import (
     Replied,
 )
 from robosc_examples.persons import Person
+from robosc_experiments.maze import CHANNELS, MODEL
+from robosc_experiments.serial import Setting, configuration
 from robosc_simulated import Obstacle, Scene, load_scene, maze_scene, room
 from support.scenario_runs import Companion, ScenarioRun, maze_run, scenario_run
 
@@ -51,6 +55,19 @@ def test_a_maze_is_solved(model: str, profile: str, seed: int) -> None:
     base, lidar = ("opencr", "lds01") if seed % 2 else ("dynamixel", "lds02")
     with maze_run(maze_scene(2, 1), profile=profile, base=base, lidar=lidar, seed=seed, model=model) as run:
         run.until_reached(100.0)
+
+
+@pytest.mark.parametrize(("profile", "speed"), [("bad-day", 10.0), ("typical", 20.0)])
+def test_a_maze_is_solved_in_a_fast_world(profile: str, speed: float, tmp_path: Path) -> None:
+    """With the settings that scenarios have at such a speed: what fails in real time is short of computing time."""
+    scene = maze_scene(2, 2, seed=1)
+    setting = Setting(tmp_path, MODEL, Deployment.CONTROLLER, scene, "", 1, speed, "lds02", CHANNELS, {})
+    text = configuration(setting, "DRIVE", "SCANNER", None).partition("\nexecution:")[2]
+    settings = f"execution:{text}"
+    with scenario_run(
+        "maze_solver/narrow_maze", scene, settings, profile=profile, lidar="lds02", seed=1, factor=speed
+    ) as run:
+        run.until_reached(60.0)
 
 
 @pytest.mark.parametrize(("profile", "seed"), DAYS)

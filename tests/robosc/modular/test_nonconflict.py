@@ -121,3 +121,17 @@ def test_clusters_are_where_flow_stays() -> None:
     assert clusters(9, {**weights, (3, 4): 0.5}) == [[0, 1, 2, 3], [4, 5, 6, 7], [8]]
     # Very many equal flows are no reason to lose all of them.
     assert len(_inflated(dict.fromkeys(range(2000), 1.0 / 2000))) == 2_000
+
+
+def test_a_composition_of_automata_that_have_changed_is_not_used() -> None:
+    """One that was tried and left for later is made anew once an event has turned out never to happen.
+
+    After `p`, the first automaton needs `d` before the next one. It is tried together with the last automaton; then the
+    two in the middle, which wait for each other from the start, turn out never to allow `d`.
+    """
+    waits = graph(["d", "p"], [(0, "d", 1), (0, "p", 1), (1, "d", 0)], frozenset({1}))
+    first = graph(["a", "b", "d"], [(0, "a", 1), (1, "b", 2), (2, "d", 3), (3, "a", 4), (4, "b", 0)])
+    second = graph(["a", "b"], [(0, "b", 1), (1, "a", 2), (2, "b", 3), (3, "a", 4), (4, "b", 5), (5, "a", 0)])
+    steps = graph(["p"], [(0, "p", 0), (0, "p", 2), (2, "p", 1)], frozenset({1, 2}))
+    assert not is_nonblocking([waits, first, second, steps])
+    assert not is_nonconflicting([waits, first, second, steps], limit=50)

@@ -66,6 +66,7 @@ class JobService(convert.JobServiceServicer):
         self._keys = keys
         self._manager, self._accept, self._limits = manager, accept, limits
         self._identify, self._admit, self._send = identify, admit, send
+        self._last_watched: tuple[JobRecord, int, bytes] | None = None
 
     async def SubmitJob(  # noqa: N802  # named by the .proto file
         self, content: bytes, context: Context
@@ -108,7 +109,7 @@ class JobService(convert.JobServiceServicer):
         """Send the state of a job until it has ended."""
         caller = self._identify(context)
         async for record in self._manager.watch(_checked_id(request.id), caller, request.after_revision):
-            await context.write(pb.WatchJobResponse(job=self._job(record)))
+            await context.write(self._watch_response(record))
 
     async def CancelJob(  # noqa: N802
         self, request: pb.CancelJobRequest, context: Context
@@ -142,6 +143,16 @@ class JobService(convert.JobServiceServicer):
         """Send the result of a job."""
         record, messages = await self._manager.result(_checked_id(request.id), self._identify(context))
         await self._send(context, (convert.result_response(record.kind, message) async for message in messages))
+
+    def _watch_response(self, record: JobRecord) -> bytes:
+        """Return a serialized WatchJobResponse, which is made once for all watchers that get the same record."""
+        waiting_before = self._manager.waiting_before(record)
+        last = self._last_watched
+        if last is not None and last[0] is record and last[1] == waiting_before:
+            return last[2]
+        content: bytes = pb.WatchJobResponse(job=convert.job_of(record, waiting_before)).SerializeToString()
+        self._last_watched = record, waiting_before, content
+        return content
 
     def _job(self, record: JobRecord) -> pb.Job:
         return convert.job_of(record, self._manager.waiting_before(record))

@@ -1,10 +1,21 @@
-"""Watchers of jobs; an idle watcher takes no time."""
+"""Watchers of jobs; an idle watcher takes no time.
+
+A new state is passed on at once. Progress is passed on at a limited rate, since a worker reports it ten times a second:
+a thousand watchers of one job would take half of a processor for lines that nobody can read so fast.
+"""
 
 import asyncio
 from collections.abc import Iterator
 from contextlib import contextmanager
 
-from robosc_server.store import JobRecord
+from robosc_server.clock import monotonic
+from robosc_server.store import JobRecord, JobState
+
+PROGRESS_PER_SECOND = 250
+"""Number of messages of progress a second to all watchers of one job, if it has more than a few."""
+
+_FEW = 25
+"""Number of watchers that get every report."""
 
 
 class Watch:
@@ -41,42 +52,101 @@ class Watch:
         return record
 
 
+class _Audience:
+    """Watchers of one job, with at most one timer for all of them.
+
+    Attributes:
+        watches: The watchers.
+    """
+
+    __slots__ = ("_held", "_next_s", "_state", "_timer", "watches")
+
+    def __init__(self) -> None:
+        self.watches: set[Watch] = set()
+        self._state: JobState | None = None
+        self._next_s = 0.0
+        self._held: JobRecord | None = None
+        self._timer: asyncio.TimerHandle | None = None
+
+    def notify(self, record: JobRecord) -> None:
+        """Pass a record on, or hold it until the next one may be passed on; a newer one replaces it."""
+        if self._held is not None and record.revision < self._held.revision:
+            return
+        wait_s = self._next_s - monotonic()
+        if record.state is self._state and wait_s > 0:
+            self._held = record
+            if self._timer is None:
+                self._timer = asyncio.get_running_loop().call_later(wait_s, self._pass_held)
+            return
+        self._pass(record)
+
+    def close(self) -> None:
+        """Stop the timer."""
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+
+    def _pass_held(self) -> None:
+        self._timer = None
+        if self._held is not None:
+            self._pass(self._held)
+
+    def _pass(self, record: JobRecord) -> None:
+        self.close()
+        self._held = None
+        self._state = record.state
+        count = len(self.watches)
+        self._next_s = monotonic() + (count / PROGRESS_PER_SECOND if count > _FEW else 0.0)
+        for watch in self.watches:
+            watch.notify(record)
+
+
 class Watchers:
     """All watchers."""
 
     def __init__(self) -> None:
-        self._by_job: dict[str, set[Watch]] = {}
+        self._by_job: dict[str, _Audience] = {}
 
     @contextmanager
     def watch(self, job_id: str) -> Iterator[Watch]:
         """Watch a job; what changes from now on is not missed."""
         watch = Watch()
-        self._by_job.setdefault(job_id, set()).add(watch)
+        audience = self._by_job.get(job_id)
+        if audience is None:
+            audience = self._by_job[job_id] = _Audience()
+        audience.watches.add(watch)
         try:
             yield watch
         finally:
-            watches = self._by_job[job_id]
-            watches.discard(watch)
-            if not watches:
+            audience.watches.discard(watch)
+            if not audience.watches:
+                audience.close()
                 del self._by_job[job_id]
 
     def notify(self, record: JobRecord) -> None:
-        """Pass the current record of a job to its watchers."""
-        for watch in self._by_job.get(record.id, ()):
-            watch.notify(record)
+        """Pass the current record of a job to its watchers: a new state at once, progress at a limited rate."""
+        audience = self._by_job.get(record.id)
+        if audience is not None:
+            audience.notify(record)
 
     def notify_gone(self, job_id: str) -> None:
         """Tell the watchers of a job that it was deleted."""
-        for watch in self._by_job.get(job_id, ()):
-            watch.is_gone = True
-            watch.wake()
+        audience = self._by_job.get(job_id)
+        if audience is not None:
+            for watch in audience.watches:
+                watch.is_gone = True
+                watch.wake()
 
     def wake(self) -> None:
         """Wake all watchers."""
-        for watches in self._by_job.values():
-            for watch in watches:
+        for audience in self._by_job.values():
+            for watch in audience.watches:
                 watch.wake()
 
     def revisions(self) -> dict[str, int]:
         """Return the lowest revision that a watcher knows, for each watched job."""
-        return {job_id: min(watch.revision for watch in watches) for job_id, watches in self._by_job.items() if watches}
+        return {
+            job_id: min(watch.revision for watch in audience.watches)
+            for job_id, audience in self._by_job.items()
+            if audience.watches
+        }

@@ -27,6 +27,11 @@ type TaskFunction = Callable[[TaskKind, bytes, TaskLimits, Callable[[Report], No
 _COLLECT_EVERY = 20_000
 """Number of new Python objects between two runs of the cyclic garbage collector."""
 
+_SMALL_BYTES = 64 * 1024
+"""Size up to which a result is sent in one piece."""
+
+_RESULT_END = frame(Tag.RESULT, b"")
+
 OUT_OF_MEMORY = "the task exceeded its memory limit"
 
 
@@ -83,12 +88,17 @@ def _answer(
 def _send(connection: socket.socket, outcome: Outcome, limits: TaskLimits) -> None:
     if not isinstance(outcome, Failure):
         messages = outcome.messages
-        if sum(map(len, messages)) <= limits.result_bytes and len(messages) <= MESSAGES_LIMIT:
+        size = sum(map(len, messages))
+        if size <= limits.result_bytes and len(messages) <= MESSAGES_LIMIT:
+            if size <= _SMALL_BYTES:
+                # In one piece, since the server wakes up for each.
+                connection.sendall(b"".join([*(frame(Tag.MESSAGE, message) for message in messages), _RESULT_END]))
+                return
             for message in messages:
                 # Two writes, since joining them would copy a large message.
                 connection.sendall(HEADER.pack(Tag.MESSAGE.value, len(message)))
                 connection.sendall(message)
-            connection.sendall(frame(Tag.RESULT, b""))
+            connection.sendall(_RESULT_END)
             return
         outcome = too_large(limits)
     connection.sendall(failure_frame(outcome))

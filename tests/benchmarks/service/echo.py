@@ -37,12 +37,12 @@ async def serve() -> None:
 
 
 @contextmanager
-def echo_server() -> Iterator[str]:
-    """Such a server; yields its address."""
+def echo_server() -> Iterator[tuple[subprocess.Popen[str], str]]:
+    """Such a server; yields its process and address."""
     process = subprocess.Popen([sys.executable, __file__], stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
     assert process.stdin is not None and process.stdout is not None
     try:
-        yield f"127.0.0.1:{int(process.stdout.readline())}"
+        yield process, f"127.0.0.1:{int(process.stdout.readline())}"
     finally:
         process.stdin.close()
         process.wait(_LIMIT_S)

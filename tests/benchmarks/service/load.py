@@ -1,12 +1,20 @@
 """The synthesis service under load: calls a second beside those of an empty server, memory, and many who watch.
 
-Client and server are on the same machine and share its processors, in every row alike.
+Client and server are on the same machine and share its processors, in every row alike. A call's time of a processor
+says on a machine with other work, too, how much less the empty server does.
 """
 
 import asyncio
+import contextlib
+import itertools
+import os
+import subprocess
+import sys
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -36,50 +44,82 @@ _CONNECTIONS = 20
 _WARM_UP = 20
 _DISTINCT = 2_000
 _SERVICE = "/robosc_api.v1.SynthesisService/"
-_IDLE_S = 5.0
+_WATCHED_S = 10.0
+# No model comes twice in one run: its result would be kept.
+_NUMBERS = itertools.count()
 
 
 def table(seconds: float = _SECONDS) -> str:
     """All tables, of one run."""
     with (
-        echo_server() as echo,
+        echo_server() as (echo_process, echo_address),
         server_process("--worker-processes", "2", "--log-level", "warning") as (process, address),
     ):
-        parts = [_calls(echo, address, seconds), _memory(address, process.pid), _watchers(address, process.pid)]
+        echo, service = _Server(echo_process.pid, echo_address), _Server(process.pid, address)
+        parts = [_calls("The synthesis service under load", echo, service, seconds)]
+        with _busy_core():
+            parts.append(_calls("The same with a busy loop on one core", echo, service, seconds))
+        parts += [_memory(address, process.pid), _watchers(address, process.pid)]
     return "\n\n".join(parts)
 
 
-def _calls(echo: str, address: str, seconds: float) -> str:
+@dataclass(frozen=True, slots=True)
+class _Server:
+    """A server that is measured."""
+
+    pid: int
+    address: str
+
+
+@contextmanager
+def _busy_core() -> Iterator[None]:
+    """Another program that takes all that it gets of one core."""
+    core = min(os.sched_getaffinity(0))
+    code = f"import os\nos.sched_setaffinity(0, {{{core}}})\nwhile True: pass"
+    process = subprocess.Popen([sys.executable, "-c", code])
+    try:
+        yield
+    finally:
+        process.kill()
+        process.wait()
+
+
+def _calls(title: str, echo: _Server, service: _Server, seconds: float) -> str:
     kinds = _kinds()
     rows = []
     for load in kinds.values():
-        _measured(address, load(1), count=_WARM_UP)
+        _measured(service.address, load(1), count=_WARM_UP)
     for clients in CLIENTS:
         asked = {"empty echo": (echo, _echo(clients))} | {
-            name: (address, load(clients)) for name, load in kinds.items()
+            name: (service, load(clients)) for name, load in kinds.items()
         }
         found: dict[str, list[Measured]] = {name: [] for name in asked}
+        used_s = dict.fromkeys(asked, 0.0)
         # By turns, since other guests of the same machine make it faster and slower all the time.
         for _ in range(_TURNS):
-            for name, (where, chosen) in asked.items():
-                found[name].append(_measured(where, chosen, duration_s=seconds / _TURNS))
-        empty = together(found["empty echo"])
-        rows += [_row(name, clients, together(parts), empty) for name, parts in found.items()]
-    header = ["line follower", "clients", "calls/s", "p50 ms", "p99 ms", "of the echo", "errors"]
-    return text_table("The synthesis service under load", header, rows)
+            for name, (server, chosen) in asked.items():
+                before_s = _processor_s(server.pid)
+                found[name].append(_measured(server.address, chosen, duration_s=seconds / _TURNS))
+                used_s[name] += _processor_s(server.pid) - before_s
+        measured = {name: together(parts) for name, parts in found.items()}
+        rows += [_row(name, clients, measured, used_s) for name in asked]
+    header = [
+        *("line follower", "clients", "calls/s", "p50 ms", "p99 ms", "of the echo"),
+        *("server's CPU us", "of the echo", "errors"),
+    ]
+    return text_table(title, header, rows)
 
 
 def _kinds() -> dict[str, Callable[[int], Load]]:
     bundle = load_bundle(MODEL)
     options = SynthesisOptions()
     check, synthesize = (request_of(task).SerializeToString() for task in (Check(bundle), Synthesize(bundle, options)))
-    numbers = iter(range(10**9))
 
     def other_check(number: int) -> bytes:
-        return request_of(Check(varied(bundle, next(numbers)))).SerializeToString()
+        return request_of(Check(varied(bundle, next(_NUMBERS)))).SerializeToString()
 
     def other_synthesis(number: int) -> bytes:
-        return request_of(Synthesize(varied(bundle, next(numbers)), options)).SerializeToString()
+        return request_of(Synthesize(varied(bundle, next(_NUMBERS)), options)).SerializeToString()
 
     def of(method: str, request: Callable[[int], bytes]) -> Callable[[int], Load]:
         is_stream = method == "Synthesize"
@@ -115,11 +155,22 @@ def _measured(address: str, load: Load, **amount: Any) -> Measured:
     return asyncio.run(measure(address, Credentials(), chosen))
 
 
-def _row(name: str, clients: int, found: Measured, empty: Measured) -> list[str]:
-    share = f"{found.calls_per_second / empty.calls_per_second:.0%}" if empty.calls_per_second else ""
+def _row(name: str, clients: int, measured: dict[str, Measured], used_s: dict[str, float]) -> list[str]:
+    found, empty = measured[name], measured["empty echo"]
     times = [found.percentile_s(percent) for percent in (50, 99)]
     told = ["" if time_s is None else f"{time_s * 1e3:.2f}" for time_s in times]
-    return [name, str(clients), f"{found.calls_per_second:,.0f}", *told, share, str(sum(found.errors.values()))]
+    own_s, echo_s = (used_s[each] / max(1, len(measured[each].times_s)) for each in (name, "empty echo"))
+    return [
+        *(name, str(clients), f"{found.calls_per_second:,.0f}", *told),
+        _share(found.calls_per_second, empty.calls_per_second),
+        f"{own_s * 1e6:.0f}",
+        _share(echo_s, own_s),
+        str(sum(found.errors.values())),
+    ]
+
+
+def _share(part: float, whole: float) -> str:
+    return f"{part / whole:.0%}" if whole else ""
 
 
 def _memory(address: str, pid: int) -> str:
@@ -151,13 +202,16 @@ def _watchers(address: str, pid: int) -> str:
 async def _watched(address: str, pid: int, job_id: str) -> list[list[str]]:
     ended: list[float] = []
     told: list[int] = [0] * WATCHERS
+    messages = 0
     channels = [grpc.aio.insecure_channel(address, (("robosc.bench", number),)) for number in range(_CONNECTIONS)]
     request = jobs_pb2.WatchJobRequest(id=job_id)
 
     async def watch(place: int) -> None:
+        nonlocal messages
         stub = jobs_pb2_grpc.JobServiceStub(channels[place % _CONNECTIONS])  # type: ignore[no-untyped-call]
         async for response in stub.WatchJob(request):
             told[place] = response.job.revision
+            messages += 1
         ended.append(time.perf_counter())
 
     begun_s = time.perf_counter()
@@ -166,9 +220,9 @@ async def _watched(address: str, pid: int, job_id: str) -> list[list[str]]:
         await asyncio.sleep(0.01)
     opened_s = time.perf_counter() - begun_s
     resident = _resident_bytes(pid)
-    used_s = _processor_s(pid)
-    await asyncio.sleep(_IDLE_S)
-    used_s = _processor_s(pid) - used_s
+    used_s, before = _processor_s(pid), messages
+    await asyncio.sleep(_WATCHED_S)
+    used_s, reports = _processor_s(pid) - used_s, messages - before
     async with grpc.aio.insecure_channel(address) as channel:
         stub = jobs_pb2_grpc.JobServiceStub(channel)  # type: ignore[no-untyped-call]
         cancelled_s = time.perf_counter()
@@ -178,7 +232,8 @@ async def _watched(address: str, pid: int, job_id: str) -> list[list[str]]:
         await channel.close()
     return [
         ["seconds until all were told the state", f"{opened_s:.2f}"],
-        ["server's processor while nothing is told", f"{used_s / _IDLE_S:.1%}"],
+        ["messages of progress a second to all", f"{reports / _WATCHED_S:,.0f}"],
+        ["server's processor meanwhile", f"{used_s / _WATCHED_S:.1%}"],
         ["seconds until all were told the end", f"{max(ended) - cancelled_s:.2f}"],
         ["", str(resident)],
     ]
@@ -191,8 +246,12 @@ def _resident_bytes(pid: int) -> int:
 
 def _processor_s(pid: int) -> float:
     """Time of a processor that a process has used, without its children's."""
-    fields = Path(f"/proc/{pid}/stat").read_text().rpartition(") ")[2].split()
-    return (int(fields[11]) + int(fields[12])) / 100
+    # A thread that ends meanwhile is an idle one of gRPC.
+    used_ns = 0
+    for thread in Path(f"/proc/{pid}/task").iterdir():
+        with contextlib.suppress(FileNotFoundError, ProcessLookupError):
+            used_ns += int((thread / "schedstat").read_text().split()[0])
+    return used_ns / 1e9
 
 
 def _megabytes(size: int) -> str:

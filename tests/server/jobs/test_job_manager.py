@@ -597,7 +597,7 @@ def test_a_thousand_watchers_wait_without_a_question_to_the_database(
 
 
 async def _idle(made: Parts, number: int) -> bool:
-    watches = [watch for some in made.manager._watchers._by_job.values() for watch in some]
+    watches = [watch for some in made.manager._watchers._by_job.values() for watch in some.watches]
     return len(watches) == number and all(watch.revision for watch in watches)
 
 

@@ -53,6 +53,7 @@ from support.answers import (
     exploration,
     generation,
     job,
+    load,
     progress,
     supervisor,
     synthesis,
@@ -80,11 +81,11 @@ def connect(request: Any) -> Any:
 
 def test_public_names() -> None:
     assert sorted(robosc_client.__all__) == [
-        "AsyncClient", "Check", "Client", "ClientError", "CredentialsError", "DeadlineError", "Explain",
+        "AsyncClient", "CallerLoad", "Check", "Client", "ClientError", "CredentialsError", "DeadlineError", "Explain",
         "Explained", "Exploration", "Explore", "Format", "Formatted", "Generate", "Generation", "Job", "JobError",
         "JobFailure", "JobState", "NO_RETRIES", "NotThereError", "Progress", "RequestRefusedError", "RetryPolicy",
         "ServerBusyError", "ServerInfo", "ServerLimits", "ServerUnavailableError",
-        "ServiceError", "StateGraph", "StateValues", "Statistics", "Submission", "Summary",
+        "ServiceError", "ServiceLoad", "StateGraph", "StateValues", "Statistics", "Submission", "Summary",
         "Synthesis", "SynthesisOptions", "SynthesisStatus", "Synthesize", "Task", "TaskKind", "TaskResult",
         "Verification", "VerificationStatus", "Verify",
     ]  # fmt: skip
@@ -153,6 +154,7 @@ TASKS: dict[str, Any] = {
     "GetJob": (lambda client: client.get_job("job-1"), [jobs_pb2.GetJobResponse(job=job())]),
     "CancelJob": (lambda client: client.cancel_job("job-1"), [jobs_pb2.CancelJobResponse(job=job())]),
     "ListJobs": (lambda client: list(client.list_jobs()), [jobs_pb2.ListJobsResponse()]),
+    "GetLoad": (lambda client: client.get_load(), [load()]),
     "GetJobResult": (lambda client: client.job_result("job-1"), enveloped("synthesize", [synthesis()])),
     "WatchJob": (lambda client: list(client.watch("job-1")), watched(job(1, jobs_pb2.JOB_STATE_SUCCEEDED))),
 }

@@ -21,7 +21,7 @@ if TYPE_CHECKING:
         ServerUnavailableError,
         ServiceError,
     )
-    from robosc_client.jobs import Job, JobFailure, JobState, Submission, TaskKind
+    from robosc_client.jobs import CallerLoad, Job, JobFailure, JobState, ServiceLoad, Submission, TaskKind
     from robosc_client.results import (
         Explained,
         Exploration,
@@ -55,6 +55,7 @@ if TYPE_CHECKING:
 
 _HOMES = {
     "AsyncClient": "aio",
+    "CallerLoad": "jobs",
     "Check": "tasks",
     "Client": "client",
     "ClientError": "errors",
@@ -82,6 +83,7 @@ _HOMES = {
     "ServerLimits": "results",
     "ServerUnavailableError": "errors",
     "ServiceError": "errors",
+    "ServiceLoad": "jobs",
     "StateGraph": "results",
     "StateValues": "results",
     "Statistics": "results",
@@ -102,6 +104,7 @@ _HOMES = {
 __all__ = [
     "NO_RETRIES",
     "AsyncClient",
+    "CallerLoad",
     "Check",
     "Client",
     "ClientError",
@@ -128,6 +131,7 @@ __all__ = [
     "ServerLimits",
     "ServerUnavailableError",
     "ServiceError",
+    "ServiceLoad",
     "StateGraph",
     "StateValues",
     "Statistics",

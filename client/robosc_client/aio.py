@@ -139,6 +139,7 @@ class AsyncClient:
     wait = _wait_method(operations.wait)
     cancel_job = _unary_method(operations.cancel_job)
     list_jobs = _list_method(operations.list_jobs)
+    get_load = _unary_method(operations.get_load)
     job_result = _unary_method(operations.job_result)
 
     async def _answer[Result](self, operation: Operation[Result]) -> Result:

@@ -80,4 +80,58 @@ class Submission:
     existed: bool
 
 
-__all__ = ["MAXIMUM_IDEMPOTENCY_KEY", "MAXIMUM_LABEL", "Job", "JobFailure", "JobState", "Submission", "TaskKind"]
+@dataclass(frozen=True, slots=True)
+class CallerLoad:
+    """Load of one caller of the service.
+
+    Attributes:
+        caller: Name of the caller, as the owner of a job.
+        waiting_tasks: Number of its tasks, calls and jobs, that wait at the server that has answered.
+        running_tasks: Number of its tasks, calls and jobs, that workers are busy with for that server.
+        queued_jobs: Number of its queued jobs, of all servers.
+        running_jobs: Number of its running jobs, of all servers.
+        ended_jobs: Number of its jobs that have ended within the last minute, of all servers.
+        first_queued: Time at which the first of its queued jobs was accepted; None: none is queued.
+    """
+
+    caller: str
+    waiting_tasks: int
+    running_tasks: int
+    queued_jobs: int
+    running_jobs: int
+    ended_jobs: int
+    first_queued: datetime | None
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceLoad:
+    """Load of the service.
+
+    Attributes:
+        time: Time of the answer, by the clock of the server.
+        callers: Load of each caller, of those with the most to do first.
+        workers: Number of tasks that workers can be busy with at once; 0: there is no worker.
+        running_tasks: Number of tasks of all callers that workers are busy with for the server that has answered.
+        waiting_tasks: Number of tasks of all callers that wait at that server.
+        servers: Number of servers that share the jobs.
+    """
+
+    time: datetime
+    callers: tuple[CallerLoad, ...]
+    workers: int
+    running_tasks: int
+    waiting_tasks: int
+    servers: int
+
+
+__all__ = [
+    "MAXIMUM_IDEMPOTENCY_KEY",
+    "MAXIMUM_LABEL",
+    "CallerLoad",
+    "Job",
+    "JobFailure",
+    "JobState",
+    "ServiceLoad",
+    "Submission",
+    "TaskKind",
+]

@@ -34,7 +34,7 @@ from robosc_client.convert.response_readers import (
     check_reader,
     format_reader,
 )
-from robosc_client.jobs import Job, JobState, Submission, TaskKind
+from robosc_client.jobs import Job, JobState, ServiceLoad, Submission, TaskKind
 from robosc_client.results import (
     Explained,
     Exploration,
@@ -309,6 +309,16 @@ def list_jobs(
         deadline_s: See the class; for each page.
     """
     return JobPages(states, kind, all_owners=all_owners, page_size=page_size, deadline_s=deadline_s)
+
+
+def get_load(*, all_callers: bool = False, deadline_s: float | None = None) -> Operation[ServiceLoad]:
+    """Return what the service does now, caller by caller.
+
+    Args:
+        all_callers: True if the load of other callers is wanted, too; for a token with the scope `admin`.
+        deadline_s: See the class.
+    """
+    return _job_call("GetLoad", jobs_pb2.GetLoadRequest(all_callers=all_callers), jobs.load_of, deadline_s)
 
 
 def job_result(job_id: str, *, kind: TaskKind | None = None, deadline_s: float | None = None) -> Operation[TaskResult]:

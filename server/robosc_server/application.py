@@ -132,6 +132,9 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     stack.push_async_callback(asyncio.to_thread, tracing.close)
     calls = CallInterceptor(metrics, tracing)
     services = {SERVICE_NAME: METHODS, JOB_SERVICE_NAME: JOB_METHODS}
+    for service, names in services.items():
+        for name in names:
+            metrics.method(f"/{service}/{name}")
     guard = Guard(
         {f"/{service}/{name}": _RULE for service, names in services.items() for name in names},
         tokens,

@@ -14,7 +14,7 @@ CAMEL = re.compile(r"([A-Z][a-z0-9]*)+")
 SNAKE = re.compile(r"[a-z][a-z0-9]*(_[a-z0-9]+)*")
 METHODS = {
     "BridgeService": ["GetDefinition", "GetStatus", "Stop", "Command", "Watch", "Attach"],
-    "JobService": ["SubmitJob", "GetJob", "WatchJob", "CancelJob", "ListJobs", "GetJobResult"],
+    "JobService": ["SubmitJob", "GetJob", "WatchJob", "CancelJob", "ListJobs", "GetLoad", "GetJobResult"],
     "SynthesisService": [
         "Check", "Synthesize", "Generate", "Explore", "Verify", "Explain", "Format", "ListTargets",
         "GetVersion",

@@ -53,6 +53,7 @@ from support.answers import (
     exploration,
     generation,
     job,
+    load,
     progress,
     supervisor,
     synthesis,
@@ -80,11 +81,11 @@ def connect(request: Any) -> Any:
 
 def test_public_names() -> None:
     assert sorted(robosc_client.__all__) == [
-        "AsyncClient", "Check", "Client", "ClientError", "CredentialsError", "DeadlineError", "Explain",
+        "AsyncClient", "CallerLoad", "Check", "Client", "ClientError", "CredentialsError", "DeadlineError", "Explain",
         "Explained", "Exploration", "Explore", "Format", "Formatted", "Generate", "Generation", "Job", "JobError",
         "JobFailure", "JobState", "NO_RETRIES", "NotThereError", "Progress", "RequestRefusedError", "RetryPolicy",
         "ServerBusyError", "ServerInfo", "ServerLimits", "ServerUnavailableError",
-        "ServiceError", "StateGraph", "StateValues", "Statistics", "Submission", "Summary",
+        "ServiceError", "ServiceLoad", "StateGraph", "StateValues", "Statistics", "Submission", "Summary",
         "Synthesis", "SynthesisOptions", "SynthesisStatus", "Synthesize", "Task", "TaskKind", "TaskResult",
         "Verification", "VerificationStatus", "Verify",
     ]  # fmt: skip
@@ -153,6 +154,7 @@ TASKS: dict[str, Any] = {
     "GetJob": (lambda client: client.get_job("job-1"), [jobs_pb2.GetJobResponse(job=job())]),
     "CancelJob": (lambda client: client.cancel_job("job-1"), [jobs_pb2.CancelJobResponse(job=job())]),
     "ListJobs": (lambda client: list(client.list_jobs()), [jobs_pb2.ListJobsResponse()]),
+    "GetLoad": (lambda client: client.get_load(), [load()]),
     "GetJobResult": (lambda client: client.job_result("job-1"), enveloped("synthesize", [synthesis()])),
     "WatchJob": (lambda client: list(client.watch("job-1")), watched(job(1, jobs_pb2.JOB_STATE_SUCCEEDED))),
 }
@@ -451,6 +453,10 @@ class TestCredentials:
             server.stop(None).wait()
 
 
+def got() -> Any:
+    return [jobs_pb2.GetJobResponse(job=job())]
+
+
 class TestWatch:
     def states(self, *numbers: int) -> Any:
         """A job's revisions; the last one has ended."""
@@ -466,6 +472,24 @@ class TestWatch:
         ):
             assert [item.revision for item in client.watch("job-1")] == [1, 4, 5, 7, 9]
             assert [item.after_revision for item in script.of("WatchJob")] == [0, 0, 4, 5, 5, 5]
+
+    @pytest.mark.parametrize(
+        ("code", "message"),
+        [
+            ("UNKNOWN", "Stream removed (Data frame with END_STREAM flag received)"),
+            ("INTERNAL", "Received RST_STREAM with error code 2"),
+            ("CANCELLED", "RST_STREAM (8)"),
+        ],
+    )
+    def test_resumed_when_a_proxy_has_lost_the_server(self, connect: Any, code: str, message: str) -> None:
+        lost = Refusal(grpc.StatusCode[code], message)
+        with (
+            scripted(WatchJob=[[*watched(job(1)), lost], self.states(2)], GetJob=[[lost], got()]) as (address, script),
+            connect(address, sleep=lambda seconds: None) as client,
+        ):
+            assert [item.revision for item in client.watch("job-1")] == [1, 2]
+            assert [item.after_revision for item in script.of("WatchJob")] == [0, 1]
+            assert client.get_job("job-1").revision == 1
 
     def test_resumed_with_a_server_that_was_started_anew(self, connect: Any) -> None:
         with kept_port() as port, ExitStack() as first:

@@ -2,6 +2,7 @@
 
 import json
 import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -11,9 +12,16 @@ import yaml
 from robosc_server.operations.metrics import Metrics
 from support.checkers import checked
 from support.containers import TOP
+from support.node import PACKAGES, tsc
 
 MONITORING = TOP / "deploy" / "monitoring"
 ALERTS = MONITORING / "alerts.yaml"
+
+_TYPES = """\
+import type { Dashboard } from "@grafana/schema";
+type Json<T> = T extends string ? `${T}` : T extends object ? { [Key in keyof T]: Json<T[Key]> } : T;
+"""
+"""Types of a dashboard in JSON, where the name of a choice is a text."""
 
 _FUNCTIONS = "sum rate increase min max by le histogram_quantile label_values".split()
 
@@ -111,3 +119,22 @@ def test_the_dashboard_is_whole(dashboard: dict[str, Any]) -> None:
             assert source == {"type": "prometheus", "uid": "${source}"}
         letters = [target["refId"] for target in panel["targets"]]
         assert letters == sorted(set(letters))
+
+
+def test_the_dashboard_is_as_grafana_s_own_types_say(tmp_path: Path) -> None:
+    """Check it with the compiler of TypeScript, without a Grafana."""
+    schema = PACKAGES / "@grafana" / "schema"
+    if not schema.exists():
+        pytest.skip("the npm packages of tests/node are not installed: npm ci --prefix tests/node")
+    (tmp_path / "node_modules").symlink_to(PACKAGES)
+    options = ["--noEmit", "--strict", "--skipLibCheck", "--module", "nodenext", "--target", "es2022"]
+
+    def compiled(text: str) -> str:
+        (tmp_path / "dashboard.ts").write_text(f"{_TYPES}export const dashboard: Json<Dashboard> = {text};\n")
+        words = [str(tsc()), *options, "dashboard.ts"]
+        return subprocess.run(words, cwd=tmp_path, capture_output=True, text=True, timeout=120, check=False).stdout
+
+    text = (MONITORING / "dashboard.json").read_text()
+    assert compiled(text) == ""
+    for right, wrong in (('"hide": 0', '"hide": "no"'), ('"mode": "absolute"', '"mode": "absolut"')):
+        assert "error TS" in compiled(text.replace(right, wrong, 1))

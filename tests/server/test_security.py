@@ -358,6 +358,8 @@ class TestJobsOfOthers:
             assert [code(jobs.CancelJob, cancel, who) for who in (theirs, admin)] == ["NOT_FOUND", "OK"]
             every = jobs_pb2.ListJobsRequest(all_owners=True)
             assert [code(jobs.ListJobs, every, who) for who in (theirs, admin)] == ["PERMISSION_DENIED", "OK"]
+            loads = jobs_pb2.GetLoadRequest(all_callers=True)
+            assert [code(jobs.GetLoad, loads, who) for who in (theirs, admin)] == ["PERMISSION_DENIED", "OK"]
 
 
 class TestWhereItListens:

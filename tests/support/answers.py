@@ -109,6 +109,14 @@ def job(revision: int = 1, state: Any = jobs_pb2.JOB_STATE_RUNNING, **fields: An
     return found
 
 
+def load(*callers: Any, **fields: Any) -> Any:
+    """A load of the service."""
+    given = {"workers": 4, "running_tasks": 1, "waiting_tasks": 2, "servers": 3, **fields}
+    found = jobs_pb2.GetLoadResponse(callers=callers, **given)
+    found.time.seconds = 1_700_000_100
+    return found
+
+
 def watched(*jobs: Any) -> list[Any]:
     """Return the responses that a watcher gets."""
     return [jobs_pb2.WatchJobResponse(job=item) for item in jobs]

@@ -4,10 +4,8 @@ import contextlib
 import itertools
 import os
 import pwd
-import random
 import shutil
 import signal
-import socket
 import subprocess
 import tempfile
 import time
@@ -18,7 +16,9 @@ from pathlib import Path
 
 import pytest
 
-from support.background import children_of
+from support.background import children_of, has_ended
+from support.ports import lasting_port, port_of
+from support.waiting import wait_until
 
 PATIENCE_S = 60.0
 _USER = "postgres"
@@ -29,6 +29,11 @@ def _programs() -> Path | None:
     """Return the folder of the newest server's programs."""
     found = sorted(Path("/usr/lib/postgresql").glob("*/bin/postgres"), key=lambda path: int(path.parts[-3]))
     return found[-1].parent if found else None
+
+
+def has_postgresql() -> bool:
+    """Return True if PostgreSQL is installed."""
+    return _programs() is not None
 
 
 def skip_without_postgresql() -> None:
@@ -42,38 +47,21 @@ def skip_without_postgresql() -> None:
             pytest.skip(f"there is no user {_USER}, and PostgreSQL does not run as root")
 
 
-def _lasting_port() -> socket.socket:
-    """A socket that keeps a free port, so that it is still free when the server begins, and when it comes back.
-
-    The system gives the port to nobody who asks for any, and a server of another suite finds that it is taken.
-    """
-    ports = range(20_000, 30_000)
-    for port in random.SystemRandom().sample(ports, len(ports)):
-        keeper = socket.socket()
-        try:
-            keeper.bind(("127.0.0.1", port))
-        except OSError:
-            keeper.close()
-            continue
-        # The server may listen there, since this one does not.
-        keeper.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
-        return keeper
-    raise AssertionError("no port is free")
-
-
 class Postgresql:
     """One server, on a port of the loopback interface.
 
     Args:
         folder: Empty; for its data.
+        connections: Most connections that it takes.
     """
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, connections: int = 40) -> None:
         self._folder = folder
+        self._connections = connections
         self._process: subprocess.Popen[bytes] | None = None
         self._numbers = itertools.count()
-        self._keeper = _lasting_port()
-        self._port = self._keeper.getsockname()[1]
+        self._keeper = lasting_port()
+        self._port = port_of(self._keeper)
         self._as: list[str] = []
         if os.getuid() == 0:
             user = pwd.getpwnam(_USER)
@@ -105,7 +93,7 @@ class Postgresql:
             "port": str(self._port),
             "unix_socket_directories": "",
             "shared_buffers": "16MB",
-            "max_connections": "40",
+            "max_connections": str(self._connections),
             # What is committed survives a kill of its processes without it, and the machine's disk is busy.
             "fsync": "off",
         }
@@ -127,6 +115,25 @@ class Postgresql:
     def stop(self) -> None:
         """Stop it at once, as an operator would; its clients lose their connections."""
         self._end(signal.SIGINT)
+
+    def kill(self) -> None:
+        """End all its processes at once, as a machine that loses its power; what was committed is on its disk."""
+        assert self._process is not None
+        # Read first: those of a parent that is gone belong to another one.
+        children = children_of(self._process.pid)
+        self._process.kill()
+        self._process.wait(PATIENCE_S)
+        self._process = None
+        for pid in children:
+            with contextlib.suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        # A new server refuses to begin beside the processes of the old one.
+        wait_until(lambda: all(map(has_ended, children)), "the end of the processes of PostgreSQL")
+
+    @property
+    def pid(self) -> int | None:
+        """The first of its processes; None: it does not run."""
+        return None if self._process is None else self._process.pid
 
     def freeze(self) -> None:
         """Stop all its processes where they are: it takes connections, and does not answer."""
@@ -177,12 +184,12 @@ class Postgresql:
 
 
 @contextmanager
-def postgresql() -> Iterator[Postgresql]:
-    """A server that runs; ended at the end."""
+def postgresql(connections: int = 40) -> Iterator[Postgresql]:
+    """A server that runs and takes so many connections; ended at the end."""
     skip_without_postgresql()
     # Not where only root comes: the server runs as somebody else.
     folder = Path(tempfile.mkdtemp(prefix="postgresql-", dir="/tmp"))
-    server = Postgresql(folder)
+    server = Postgresql(folder, connections)
     try:
         server.make()
         server.start()

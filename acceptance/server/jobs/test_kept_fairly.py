@@ -9,8 +9,9 @@ from sqlalchemy import func, select
 
 from robosc_server.store import open_store, result_rows
 from robosc_server.store import store as store_module
+from robosc_server.tasks.task import Result
 from support.job_parts import Times
-from support.sweep_twin import Kept, check_against_twin, fill
+from support.sweep_twin import KIND, Kept, check_against_twin, fill
 
 
 def test_it_is_the_same_in_postgresql(database_url: str) -> None:
@@ -22,6 +23,21 @@ def test_it_is_the_same_in_postgresql(database_url: str) -> None:
         asyncio.run(check_against_twin(store, times, results, jobs, 20))
     finally:
         store.close()
+
+
+def test_a_result_that_two_servers_have_made_is_kept_once(database_url: str) -> None:
+    first, second = (open_store(Path("/nowhere"), database_url) for _ in range(2))
+
+    async def test() -> None:
+        for store, text in ((first, b"first"), (second, b"second")):
+            await store.keep_results([("k", KIND, Result((text,)), "me")])
+            assert await store.find_result("k") == (KIND, Result((b"first",)))
+
+    try:
+        asyncio.run(test())
+    finally:
+        first.close()
+        second.close()
 
 
 def test_two_servers_that_sweep_at_once_give_back_no_more_than_one(

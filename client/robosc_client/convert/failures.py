@@ -8,6 +8,15 @@ import grpc
 
 from robosc.source import visible
 
+_LOST = ("Stream removed", "Received RST_STREAM", "RST_STREAM")
+"""Beginnings of gRPC's own messages about a stream that ended without a status.
+
+A proxy ends the streams of a server that it has lost so: by the last frame of its data, or by a reset. Without a proxy,
+gRPC sees the lost connection itself, and says UNAVAILABLE.
+"""
+
+_LOST_CODES = frozenset({grpc.StatusCode.UNKNOWN, grpc.StatusCode.INTERNAL, grpc.StatusCode.CANCELLED})
+
 _DETAILS = "grpc-status-details-bin"
 _DOMAIN = "robosc"
 _MAXIMUM_MESSAGE = 2000
@@ -47,7 +56,9 @@ def failure_of(error: grpc.RpcError) -> Failure:
             reason, retry_after_s = _details(value)
             return Failure(call.code(), message, reason, retry_after_s)
     # Without details of a server, the message is from gRPC itself.
-    return Failure(call.code(), first_line(details) if call.code() is grpc.StatusCode.UNAVAILABLE else message)
+    is_lost = call.code() in _LOST_CODES and details.startswith(_LOST)
+    code = grpc.StatusCode.UNAVAILABLE if is_lost else call.code()
+    return Failure(code, first_line(details) if code is grpc.StatusCode.UNAVAILABLE else message)
 
 
 def _details(content: bytes) -> tuple[str, float | None]:

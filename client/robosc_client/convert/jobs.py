@@ -9,9 +9,11 @@ from robosc.source import visible
 from robosc_api.v1 import jobs_pb2 as pb
 from robosc_client.convert.response_fields import MAXIMUM_SHOWN, progress_of, require_at_most
 from robosc_client.errors import malformed
-from robosc_client.jobs import Job, JobFailure, JobState, Submission, TaskKind
+from robosc_client.jobs import CallerLoad, Job, JobFailure, JobState, ServiceLoad, Submission, TaskKind
 
 _ID = re.compile(r"[A-Za-z0-9-]{1,100}\Z")
+
+_MAXIMUM_CALLERS = 1000
 
 _KINDS = {
     pb.TASK_KIND_CHECK: TaskKind.CHECK,
@@ -80,6 +82,37 @@ def page_of(message: pb.ListJobsResponse, most: int) -> tuple[tuple[Job, ...], s
     """Jobs, at most so many, and what asks for those that follow; raises as `job_of`."""
     require_at_most(most, len(message.jobs), "jobs")
     return tuple(map(job_of, message.jobs)), message.next_page_token
+
+
+def load_of(message: pb.GetLoadResponse) -> ServiceLoad:
+    """Return the load of the service; its texts are harmless on a terminal.
+
+    Raises:
+        ServiceError: The message is of no load.
+    """
+    if not message.HasField("time") or not message.servers:
+        raise malformed("the load of the service has no time or no server")
+    require_at_most(_MAXIMUM_CALLERS, len(message.callers), "callers")
+    return ServiceLoad(
+        time=_time(message.time),
+        callers=tuple(map(_caller_load, message.callers)),
+        workers=message.workers,
+        running_tasks=message.running_tasks,
+        waiting_tasks=message.waiting_tasks,
+        servers=message.servers,
+    )
+
+
+def _caller_load(message: pb.CallerLoad) -> CallerLoad:
+    return CallerLoad(
+        caller=_printable(message.caller),
+        waiting_tasks=message.waiting_tasks,
+        running_tasks=message.running_tasks,
+        queued_jobs=message.queued_jobs,
+        running_jobs=message.running_jobs,
+        ended_jobs=message.ended_jobs,
+        first_queued=_time(message.first_queued_time) if message.HasField("first_queued_time") else None,
+    )
 
 
 def _printable(text: str) -> str:

@@ -190,6 +190,46 @@ class ListJobsResponse(_message.Message):
     next_page_token: str
     def __init__(self, jobs: _Optional[_Iterable[_Union[Job, _Mapping]]] = ..., next_page_token: _Optional[str] = ...) -> None: ...
 
+class GetLoadRequest(_message.Message):
+    __slots__ = ("all_callers",)
+    ALL_CALLERS_FIELD_NUMBER: _ClassVar[int]
+    all_callers: bool
+    def __init__(self, all_callers: _Optional[bool] = ...) -> None: ...
+
+class CallerLoad(_message.Message):
+    __slots__ = ("caller", "waiting_tasks", "running_tasks", "queued_jobs", "running_jobs", "ended_jobs", "first_queued_time")
+    CALLER_FIELD_NUMBER: _ClassVar[int]
+    WAITING_TASKS_FIELD_NUMBER: _ClassVar[int]
+    RUNNING_TASKS_FIELD_NUMBER: _ClassVar[int]
+    QUEUED_JOBS_FIELD_NUMBER: _ClassVar[int]
+    RUNNING_JOBS_FIELD_NUMBER: _ClassVar[int]
+    ENDED_JOBS_FIELD_NUMBER: _ClassVar[int]
+    FIRST_QUEUED_TIME_FIELD_NUMBER: _ClassVar[int]
+    caller: str
+    waiting_tasks: int
+    running_tasks: int
+    queued_jobs: int
+    running_jobs: int
+    ended_jobs: int
+    first_queued_time: _timestamp_pb2.Timestamp
+    def __init__(self, caller: _Optional[str] = ..., waiting_tasks: _Optional[int] = ..., running_tasks: _Optional[int] = ..., queued_jobs: _Optional[int] = ..., running_jobs: _Optional[int] = ..., ended_jobs: _Optional[int] = ..., first_queued_time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ...) -> None: ...
+
+class GetLoadResponse(_message.Message):
+    __slots__ = ("time", "callers", "workers", "running_tasks", "waiting_tasks", "servers")
+    TIME_FIELD_NUMBER: _ClassVar[int]
+    CALLERS_FIELD_NUMBER: _ClassVar[int]
+    WORKERS_FIELD_NUMBER: _ClassVar[int]
+    RUNNING_TASKS_FIELD_NUMBER: _ClassVar[int]
+    WAITING_TASKS_FIELD_NUMBER: _ClassVar[int]
+    SERVERS_FIELD_NUMBER: _ClassVar[int]
+    time: _timestamp_pb2.Timestamp
+    callers: _containers.RepeatedCompositeFieldContainer[CallerLoad]
+    workers: int
+    running_tasks: int
+    waiting_tasks: int
+    servers: int
+    def __init__(self, time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., callers: _Optional[_Iterable[_Union[CallerLoad, _Mapping]]] = ..., workers: _Optional[int] = ..., running_tasks: _Optional[int] = ..., waiting_tasks: _Optional[int] = ..., servers: _Optional[int] = ...) -> None: ...
+
 class GetJobResultRequest(_message.Message):
     __slots__ = ("id",)
     ID_FIELD_NUMBER: _ClassVar[int]

@@ -60,6 +60,11 @@ class JobServiceStub:
                 request_serializer=robosc__api_dot_v1_dot_jobs__pb2.ListJobsRequest.SerializeToString,
                 response_deserializer=robosc__api_dot_v1_dot_jobs__pb2.ListJobsResponse.FromString,
                 _registered_method=True)
+        self.GetLoad = channel.unary_unary(
+                '/robosc_api.v1.JobService/GetLoad',
+                request_serializer=robosc__api_dot_v1_dot_jobs__pb2.GetLoadRequest.SerializeToString,
+                response_deserializer=robosc__api_dot_v1_dot_jobs__pb2.GetLoadResponse.FromString,
+                _registered_method=True)
         self.GetJobResult = channel.unary_stream(
                 '/robosc_api.v1.JobService/GetJobResult',
                 request_serializer=robosc__api_dot_v1_dot_jobs__pb2.GetJobResultRequest.SerializeToString,
@@ -107,6 +112,13 @@ class JobServiceServicer:
         context.set_details('Method not implemented!')
         raise NotImplementedError('Method not implemented!')
 
+    def GetLoad(self, request, context):
+        """Reports what the service does now, caller by caller: who waits, and what for.
+        """
+        context.set_code(grpc.StatusCode.UNIMPLEMENTED)
+        context.set_details('Method not implemented!')
+        raise NotImplementedError('Method not implemented!')
+
     def GetJobResult(self, request, context):
         """Sends the result of a job that has succeeded: the messages that the synthesis service would have sent, without
         progress.
@@ -142,6 +154,11 @@ def add_JobServiceServicer_to_server(servicer, server):
                     servicer.ListJobs,
                     request_deserializer=robosc__api_dot_v1_dot_jobs__pb2.ListJobsRequest.FromString,
                     response_serializer=robosc__api_dot_v1_dot_jobs__pb2.ListJobsResponse.SerializeToString,
+            ),
+            'GetLoad': grpc.unary_unary_rpc_method_handler(
+                    servicer.GetLoad,
+                    request_deserializer=robosc__api_dot_v1_dot_jobs__pb2.GetLoadRequest.FromString,
+                    response_serializer=robosc__api_dot_v1_dot_jobs__pb2.GetLoadResponse.SerializeToString,
             ),
             'GetJobResult': grpc.unary_stream_rpc_method_handler(
                     servicer.GetJobResult,
@@ -285,6 +302,33 @@ class JobService:
             '/robosc_api.v1.JobService/ListJobs',
             robosc__api_dot_v1_dot_jobs__pb2.ListJobsRequest.SerializeToString,
             robosc__api_dot_v1_dot_jobs__pb2.ListJobsResponse.FromString,
+            options,
+            channel_credentials,
+            insecure,
+            call_credentials,
+            compression,
+            wait_for_ready,
+            timeout,
+            metadata,
+            _registered_method=True)
+
+    @staticmethod
+    def GetLoad(request,
+            target,
+            options=(),
+            channel_credentials=None,
+            call_credentials=None,
+            insecure=False,
+            compression=None,
+            wait_for_ready=None,
+            timeout=None,
+            metadata=None):
+        return grpc.experimental.unary_unary(
+            request,
+            target,
+            '/robosc_api.v1.JobService/GetLoad',
+            robosc__api_dot_v1_dot_jobs__pb2.GetLoadRequest.SerializeToString,
+            robosc__api_dot_v1_dot_jobs__pb2.GetLoadResponse.FromString,
             options,
             channel_credentials,
             insecure,

@@ -11,6 +11,7 @@ from google.protobuf.message import DecodeError
 from robosc_api.v1 import jobs_pb2 as pb
 from robosc_api.v1 import jobs_pb2_grpc, synthesis_pb2
 from robosc_server.failures import RefusedError, code_of
+from robosc_server.jobs.manager import ServiceLoad
 from robosc_server.store import JobFilter, JobRecord, JobState
 from robosc_server.tasks.fields import nested_of
 from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestLimits, require_parsable, require_short
@@ -181,6 +182,28 @@ def job_of(record: JobRecord, waiting_before: int) -> pb.Job:
         code: int = code_of(record.failure.reason).value[0]
         job.failure.CopyFrom(pb.Failure(code=code, reason=record.failure.reason, message=record.failure.message))
     return job
+
+
+def load_response(load: ServiceLoad) -> pb.GetLoadResponse:
+    """The load of the service as a message."""
+    answer = pb.GetLoadResponse(
+        time=_timestamp(load.now_us),
+        workers=load.workers,
+        running_tasks=load.running,
+        waiting_tasks=load.waiting,
+        servers=load.servers,
+    )
+    for caller in load.callers:
+        answer.callers.add(
+            caller=caller.jobs.owner,
+            waiting_tasks=caller.waiting,
+            running_tasks=caller.running,
+            queued_jobs=caller.jobs.queued,
+            running_jobs=caller.jobs.running,
+            ended_jobs=caller.jobs.ended,
+            first_queued_time=_timestamp(caller.jobs.first_queued_us),
+        )
+    return answer
 
 
 def _timestamp(time_us: int | None) -> timestamp_pb2.Timestamp | None:

@@ -14,6 +14,7 @@ from dataclasses import dataclass
 from types import TracebackType
 from typing import Self
 
+from robosc_api.security.callers import network_of
 from robosc_server.clock import monotonic
 from robosc_server.failures import RefusedError
 from robosc_server.jobs.lease_monitor import LeaseMonitor
@@ -24,10 +25,16 @@ from robosc_server.jobs.scheduler import Scheduler
 from robosc_server.jobs.watchers import Watchers
 from robosc_server.operations.tracing import NO_TRACING, Tracing
 from robosc_server.store import JobFilter, JobRecord, JobState, Store, StoreUnavailableError
-from robosc_server.store.records import messages_of
+from robosc_server.store.records import OwnerLoad, messages_of
 from robosc_server.tasks.task import Reason, Task, TaskKind, TaskLimits, shared_key
 
 _log = logging.getLogger(__name__)
+
+_LATELY_S = 60.0
+"""Time within which jobs have ended lately."""
+
+_MAXIMUM_CALLERS = 1000
+"""Maximum number of callers whose load is reported."""
 
 _LEFT = "the server is shutting down; call another server, or try again later"
 
@@ -43,6 +50,46 @@ class Caller:
 
     name: str
     is_admin: bool = False
+
+
+@dataclass(frozen=True, slots=True)
+class CallerLoad:
+    """Load of one caller.
+
+    Attributes:
+        jobs: Load of its jobs, at all servers; names the caller.
+        waiting: Number of its tasks that wait at this server.
+        running: Number of its tasks that run for this server.
+    """
+
+    jobs: OwnerLoad
+    waiting: int = 0
+    running: int = 0
+
+    def weight(self) -> tuple[int, int]:
+        """Return how much it has to do, then how much was done for it."""
+        return max(self.waiting + self.running, self.jobs.queued + self.jobs.running), self.jobs.ended
+
+
+@dataclass(frozen=True, slots=True)
+class ServiceLoad:
+    """Load of the service.
+
+    Attributes:
+        callers: Load of each caller, the largest first.
+        workers: Number of tasks that workers can be busy with at once.
+        running: Number of tasks that run for this server.
+        waiting: Number of tasks that wait at this server.
+        servers: Number of servers that share the jobs.
+        now_us: Time, in microseconds since 1970.
+    """
+
+    callers: tuple[CallerLoad, ...]
+    workers: int
+    running: int
+    waiting: int
+    servers: int
+    now_us: int
 
 
 class JobManager:
@@ -242,6 +289,34 @@ class JobManager:
             RefusedError: The database is unavailable.
         """
         return [self._runner.current(record) for record in await self._store.list_jobs(chosen, after, limit)]
+
+    async def load(self, caller: Caller, *, all_callers: bool) -> ServiceLoad:
+        """The load of the service.
+
+        Args:
+            caller: Caller whose load it is.
+            all_callers: True for the load of all callers.
+
+        Raises:
+            RefusedError: The database is unavailable.
+        """
+        lines = self._scheduler.tasks_by_line()
+        if not all_callers:
+            line = network_of(caller.name)
+            lines = {caller.name: lines[line]} if line in lines else {}
+        loads = {load.owner: load for load in await self._store.loads(None if all_callers else caller.name, _LATELY_S)}
+        callers = [
+            CallerLoad(loads.get(name, OwnerLoad(name)), *lines.get(name, (0, 0)))
+            for name in sorted(loads.keys() | lines.keys())
+        ]
+        return ServiceLoad(
+            tuple(sorted(callers, key=CallerLoad.weight, reverse=True)[:_MAXIMUM_CALLERS]),
+            workers=self._scheduler.capacity,
+            running=self._scheduler.running,
+            waiting=self._scheduler.waiting,
+            servers=1 + len(self._lease_monitor.seen),
+            now_us=self._store.now_us(),
+        )
 
     async def result(self, job_id: str, caller: Caller) -> tuple[JobRecord, AsyncIterator[bytes]]:
         """A job that has succeeded, and the messages of its result, read as they are taken.

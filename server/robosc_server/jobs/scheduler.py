@@ -127,6 +127,16 @@ class Scheduler:
         """Number of workers that are taken."""
         return self._running
 
+    @property
+    def capacity(self) -> int:
+        """Number of tasks that workers can be busy with at once."""
+        return self._workers.capacity
+
+    def tasks_by_line(self) -> dict[str, tuple[int, int]]:
+        """Return the numbers of waiting and of running tasks by the name of their line; see `Place.line`."""
+        waiting = self._waiting_outside + Counter({name: len(line) for name, line in self._ring.items()})
+        return {name: (waiting[name], self._running_of[name]) for name in waiting.keys() | self._running_of.keys()}
+
     def close(self) -> None:
         """Refuse new tasks from now on; waiting tasks stay in the queue."""
         self._is_closed = True

@@ -137,6 +137,15 @@ class JobService(convert.JobServiceServicer):
             await asyncio.sleep(0)
         return answer
 
+    async def GetLoad(  # noqa: N802
+        self, request: pb.GetLoadRequest, context: Context
+    ) -> pb.GetLoadResponse:
+        """Return the load of the service."""
+        caller = self._identify(context)
+        if request.all_callers and not caller.is_admin:
+            raise RefusedError(Reason.PERMISSION_DENIED, "all_callers requires a token with the scope 'admin'")
+        return convert.load_response(await self._manager.load(caller, all_callers=request.all_callers))
+
     async def GetJobResult(  # noqa: N802
         self, request: pb.GetJobResultRequest, context: Context
     ) -> None:

@@ -27,10 +27,13 @@ from prometheus_client.utils import floatToGoString
 from robosc_api.metrics_server import MetricsServer
 from robosc_api.security import SecurityError, is_loopback_host, joined
 from robosc_api.security.addresses import split_address
-from robosc_server.tasks.task import Failure, Outcome, TaskKind
+from robosc_server.tasks.task import Failure, Outcome, Reason, TaskKind
 
 _CALL_SECONDS = (0.0005, 0.001, 0.0025, 0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 300, 600)
 _TASK_SECONDS = (0.005, 0.01, 0.025, 0.05, 0.1, 0.25, 0.5, 1, 2.5, 5, 10, 30, 60, 120, 300, 600)
+
+_RESULT, _CANCELLED = "RESULT", "CANCELLED"
+"""Outcomes of tasks, beside the reasons of failures."""
 
 _COLLECT_S = 4.0
 """Time for the event loop to tell the metrics, in seconds: less than a connection has."""
@@ -108,6 +111,14 @@ class Metrics:
         self._methods: dict[str, MethodMetrics] = {}
         self._unknown = 0
         self._lookups = {"memory": 0, "store": 0, "none": 0}
+        # Each begins at 0: the first event of a series that comes into being with it is no increase for Prometheus, and
+        # would raise no alert.
+        for reason in Reason:
+            self._refusals.labels(reason.value)
+        for kind in TaskKind:
+            self._task_seconds.labels(kind.value)
+            for word in (_RESULT, _CANCELLED, *Reason):
+                self._outcomes.labels(kind.value, str(word))
         Gauge("robosc_server_calls_under_way", "Calls in progress.", registry=registry).set_function(
             lambda: self.calls_under_way
         )
@@ -151,11 +162,11 @@ class Metrics:
         """
         match outcome:
             case None:
-                word = "CANCELLED"
+                word = _CANCELLED
             case Failure(reason=reason):
                 word = reason.value
             case _:
-                word = "RESULT"
+                word = _RESULT
         self._outcomes.labels(kind.value, word).inc()
         self._task_seconds.labels(kind.value).observe(seconds)
 

@@ -5,13 +5,14 @@ second finds that there is nothing left to do.
 """
 
 from collections.abc import Collection, Iterator
+from dataclasses import replace
 from functools import cache
 from typing import Any
 
-from sqlalchemy import Connection, Row, and_, bindparam, delete, func, insert, or_, select, tuple_, update
+from sqlalchemy import Connection, Row, and_, bindparam, delete, func, insert, literal, or_, select, tuple_, update
 
 from robosc_server.store.eviction import choose_evicted
-from robosc_server.store.records import ACTIVE, STEP, JobFilter, JobRecord, JobState
+from robosc_server.store.records import ACTIVE, STEP, JobFilter, JobRecord, JobState, OwnerLoad
 from robosc_server.store.result_rows import insert_result
 from robosc_server.store.schema import JOBS, REPLICAS, REQUESTS, RESULTS
 from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskKind
@@ -153,6 +154,44 @@ def counts_by_state(connection: Connection) -> dict[JobState, int]:
     for row in connection.execute(select(JOBS.c.state, func.count().label("number")).group_by(JOBS.c.state)):
         found[JobState(row.state)] = row.number
     return found
+
+
+def loads(connection: Connection, owner: str | None, since_us: int) -> list[OwnerLoad]:
+    """Return the load of each owner that has unfinished jobs, or jobs that have ended since a time.
+
+    Args:
+        connection: Connection, in a transaction.
+        owner: The only owner; None: all.
+        since_us: The time.
+    """
+    counted = func.count().label("number"), func.min(JOBS.c.created_us).label("first")
+    active = select(JOBS.c.owner, JOBS.c.state, *counted).where(_IS_ACTIVE).group_by(JOBS.c.owner, JOBS.c.state)
+    ended = _ended_by_owner(owner, since_us)
+    if owner is not None:
+        active = active.where(JOBS.c.owner == owner)
+    found = {row.owner: OwnerLoad(row.owner, ended=row.number) for row in connection.execute(ended) if row.number}
+    for row in connection.execute(active):
+        load = found.get(row.owner, OwnerLoad(row.owner))
+        if row.state == JobState.QUEUED:
+            found[row.owner] = replace(load, queued=row.number, first_queued_us=row.first)
+        else:
+            found[row.owner] = replace(load, running=row.number)
+    return list(found.values())
+
+
+def _ended_by_owner(owner: str | None, since_us: int) -> Any:
+    """The number of jobs of each owner that have ended since a time.
+
+    It reads the index `jobs_ended` once for each owner and not all jobs: "Loose indexscan", wiki.postgresql.org.
+    """
+    if owner is not None:
+        number = select(func.count()).where(JOBS.c.owner == owner, JOBS.c.ended_us > since_us)
+        return select(literal(owner).label("owner"), number.scalar_subquery().label("number"))
+    owners = select(func.min(JOBS.c.owner).label("owner")).cte("owners", recursive=True)
+    following = select(func.min(JOBS.c.owner)).where(JOBS.c.owner > owners.c.owner).scalar_subquery()
+    owners = owners.union_all(select(following).where(owners.c.owner.is_not(None)))
+    number = select(func.count()).where(JOBS.c.owner == owners.c.owner, JOBS.c.ended_us > since_us)
+    return select(owners.c.owner, number.scalar_subquery().label("number")).where(owners.c.owner.is_not(None))
 
 
 def accept(

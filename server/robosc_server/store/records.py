@@ -87,6 +87,25 @@ class JobFilter:
     kind: TaskKind | None
 
 
+@dataclass(frozen=True, slots=True)
+class OwnerLoad:
+    """Load that one owner's jobs are, at all servers.
+
+    Attributes:
+        owner: Owner of the jobs.
+        queued: Number of its queued jobs.
+        running: Number of its running jobs.
+        ended: Number of its jobs that have ended lately.
+        first_queued_us: Time of acceptance of the first of its queued jobs, in microseconds; None: none is queued.
+    """
+
+    owner: str
+    queued: int = 0
+    running: int = 0
+    ended: int = 0
+    first_queued_us: int | None = None
+
+
 def blocks_of(messages: Sequence[bytes]) -> Iterator[bytes]:
     """Messages in blocks of about half a megabyte, each message with its length before it."""
     block = bytearray()
@@ -110,4 +129,4 @@ def messages_of(block: bytes) -> Iterator[bytes]:
         place += size
 
 
-__all__ = ["ACTIVE", "STEP", "JobFilter", "JobRecord", "JobState", "blocks_of", "messages_of"]
+__all__ = ["ACTIVE", "STEP", "JobFilter", "JobRecord", "JobState", "OwnerLoad", "blocks_of", "messages_of"]

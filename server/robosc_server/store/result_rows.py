@@ -13,8 +13,8 @@ from robosc_server.tasks.task import Result, TaskKind
 
 # Built once: building a statement takes longer than executing it.
 _INSERT = {
-    "postgresql": postgresql.insert(RESULTS).on_conflict_do_nothing(),
-    "sqlite": sqlite.insert(RESULTS).on_conflict_do_nothing(),
+    "postgresql": postgresql.insert(RESULTS).on_conflict_do_nothing().returning(RESULTS.c.key),
+    "sqlite": sqlite.insert(RESULTS).on_conflict_do_nothing().returning(RESULTS.c.key),
 }
 _INSERT_BLOCK = insert(BLOCKS)
 _KIND = select(RESULTS.c.kind).where(RESULTS.c.key == bindparam("of"))
@@ -26,7 +26,8 @@ def insert_result(connection: Connection, key: str, kind: TaskKind, result: Resu
     """Keep a result that was made for an owner, unless there is one of that key."""
     size = sum(map(len, result.messages))
     new = {"key": key, "kind": kind, "size": size, "used_us": now_us, "owner": owner}
-    if connection.execute(_INSERT[connection.dialect.name], new).rowcount:
+    # Not by the number of inserted rows: a driver may not know it, and say -1.
+    if connection.scalar(_INSERT[connection.dialect.name], new) is not None:
         for number, block in enumerate(blocks_of(result.messages)):
             connection.execute(_INSERT_BLOCK, {"key": key, "number": number, "content": block})
 

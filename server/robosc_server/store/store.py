@@ -14,7 +14,7 @@ from sqlalchemy import Connection, func, select
 from robosc_server.clock import wall_clock_s
 from robosc_server.store import job_rows, replica_rows, result_rows
 from robosc_server.store.database import Database
-from robosc_server.store.records import JobFilter, JobRecord, JobState, messages_of
+from robosc_server.store.records import JobFilter, JobRecord, JobState, OwnerLoad, messages_of
 from robosc_server.tasks.task import Failure, Report, Result, TaskKind
 
 _SWEPT_AT_ONCE = 200
@@ -106,6 +106,11 @@ class Store:
     async def counts_by_state(self) -> dict[JobState, int]:
         """Return the number of jobs in each state."""
         return await self._database.read(job_rows.counts_by_state)
+
+    async def loads(self, owner: str | None, within_s: float) -> list[OwnerLoad]:
+        """Return the load of owners, with what has ended within so many seconds; see `job_rows.loads`."""
+        since_us = self.now_us() - round(within_s * 1e6)
+        return await self._database.read(lambda connection: job_rows.loads(connection, owner, since_us))
 
     async def begin(self, job_id: str, replica: str) -> tuple[JobRecord, bytes] | None:
         """Have a waiting job run; see `job_rows.begin`."""

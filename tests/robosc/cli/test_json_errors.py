@@ -39,7 +39,7 @@ WRONG_USE: dict[str, list[str]] = {
 
 CLIENT = [
     "bench", "cancel", "check", "explain-synthesis", "explore", "format", "generate", "get", "health", "list", "synth",
-    "targets", "verify", "version", "watch",
+    "targets", "top", "verify", "version", "watch",
 ]  # fmt: skip
 """The commands of `robosc-client` with `--json`; `submit` and `profile` have commands of their own."""
 

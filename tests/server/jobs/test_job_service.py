@@ -196,6 +196,57 @@ def test_pages_hold_all_jobs_once_and_tokens_hold_for_one_list(tmp_path: Path) -
     in_loop(test)
 
 
+def test_the_load_of_callers_is_for_themselves_and_an_admin(tmp_path: Path) -> None:
+    async def test() -> None:
+        current = [Caller("me")]
+        choices = Choices(capacity=1)
+        async with service(tmp_path, choices, lambda _: current[0]) as (_, stub):
+
+            async def loads(*, all_callers: bool = False) -> dict[str, pb.CallerLoad]:
+                answer = await stub.GetLoad(pb.GetLoadRequest(all_callers=all_callers))
+                assert (answer.workers, answer.running_tasks, answer.waiting_tasks, answer.servers) == (1, 1, 2, 1)
+                assert answer.time.ToSeconds() == choices.times.wall_s
+                return {load.caller: load for load in answer.callers}
+
+            done = (await stub.SubmitJob(submission("done"))).job.id
+            async for _ in stub.WatchJob(pb.WatchJobRequest(id=done)):
+                pass
+            running = (await stub.SubmitJob(submission(_NEVER))).job.id
+            choices.times.wall_s += 59.0
+            first = (await stub.SubmitJob(submission("first"))).job
+            current[0] = Caller("you")
+            choices.times.wall_s += 2.0
+            await stub.SubmitJob(submission("second"))
+            await until(lambda: _is_running(stub, running, current))
+
+            current[0] = Caller("me")
+            mine = pb.CallerLoad(
+                caller="me", waiting_tasks=1, running_tasks=1, queued_jobs=1, running_jobs=1, ended_jobs=0
+            )
+            mine.first_queued_time.CopyFrom(first.create_time)
+            # What has ended a minute ago counts no more.
+            assert await loads() == {"me": mine}
+            choices.times.wall_s -= 2.0
+            assert (await loads())["me"].ended_jobs == 1
+            choices.times.wall_s += 2.0
+            denied = (grpc.StatusCode.PERMISSION_DENIED, "PERMISSION_DENIED")
+            assert await refusal_of(stub.GetLoad(pb.GetLoadRequest(all_callers=True))) == denied
+            current[0] = Caller("boss", is_admin=True)
+            assert await loads() == {}
+            everything = await loads(all_callers=True)
+            assert list(everything) == ["me", "you"] and everything["me"] == mine
+            assert (everything["you"].queued_jobs, everything["you"].waiting_tasks) == (1, 1)
+
+    in_loop(test)
+
+
+async def _is_running(stub: Any, job_id: str, current: list[Caller]) -> bool:
+    asking, current[0] = current[0], Caller("me")
+    state = (await stub.GetJob(pb.GetJobRequest(id=job_id))).job.state
+    current[0] = asking
+    return bool(state == pb.JOB_STATE_RUNNING)
+
+
 _ALL = JobFilter("me", frozenset({JobState.FAILED}), None)
 
 

@@ -8,6 +8,7 @@ from pathlib import Path
 import hypothesis.strategies as st
 import pytest
 from hypothesis import given, settings
+from sqlalchemy import CursorResult
 
 from robosc_server.failures import RefusedError
 from robosc_server.jobs import Caller, JobLimits, retention
@@ -183,6 +184,22 @@ def test_beyond_the_bound_of_jobs_those_of_a_caller_are_forgotten_that_ended_fir
             await ended(made.manager, slow.id)
             more, _ = await made.manager.submit(task_of("more"), ME)
             assert (await ended(made.manager, more.id)).state is JobState.SUCCEEDED
+
+    in_loop(test)
+
+
+def test_a_result_that_is_there_is_kept_whatever_its_driver_counts(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """The driver of PostgreSQL says -1, and its blocks must not be written again."""
+
+    async def test() -> None:
+        store = open_store(tmp_path)
+        monkeypatch.setattr(CursorResult, "rowcount", property(lambda result: -1))
+        for text in (b"first", b"second"):
+            await store.keep_results([("k", KIND, Result((text,)), "me")])
+        assert await store.find_result("k") == (KIND, Result((b"first",)))
+        store.close()
 
     in_loop(test)
 

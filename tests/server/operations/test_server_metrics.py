@@ -11,10 +11,14 @@ import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
 from robosc_api.security import SecurityError
+from robosc_server.jobs import JOB_METHODS, JOB_SERVICE_NAME
 from robosc_server.operations import metrics as metrics_module
 from robosc_server.operations.instrumented_workers import InstrumentedWorkers
 from robosc_server.operations.metrics import Metrics, MetricsEndpoint, metric_names
+from robosc_server.synthesis_service import METHODS, SERVICE_NAME
 from robosc_server.tasks.task import Failure, Outcome, Reason, Result, Task, TaskKind, TaskLimits
+from support.ports import lasting_port, port_of
+from support.service import served
 from support.waiting import PATIENCE_S, limited
 
 
@@ -142,6 +146,31 @@ def test_a_loop_that_does_not_answer_is_a_failure(monkeypatch: pytest.MonkeyPatc
             assert b" 500 " in connection.recv(100)
 
     asked(Metrics("1"), test)
+
+
+def test_what_alerts_count_is_0_before_it_first_happens() -> None:
+    """Check that the first event is an increase: of a series that is new with it, Prometheus sees none."""
+    metrics = Metrics("1")
+    for kind in TaskKind:
+        for outcome in ("RESULT", "CANCELLED", *Reason):
+            assert value(metrics, "robosc_server_tasks_total", kind=kind, outcome=outcome) == 0
+        assert value(metrics, "robosc_server_task_seconds_count", kind=kind) == 0
+    for reason in Reason:
+        assert value(metrics, "robosc_server_failures_total", reason=reason) == 0
+
+
+def test_calls_of_each_method_are_counted_from_0() -> None:
+    with lasting_port() as keeper:
+        address = f"127.0.0.1:{port_of(keeper)}"
+        with (
+            served(metrics_address=address),
+            urllib.request.urlopen(f"http://{address}/metrics", timeout=PATIENCE_S) as answer,
+        ):
+            found = samples(answer.read().decode())
+    for service, names in ((SERVICE_NAME, METHODS), (JOB_SERVICE_NAME, JOB_METHODS)):
+        for name in names:
+            method = frozenset({("method", f"/{service}/{name}"), ("code", "OK")})
+            assert found["robosc_server_calls_total", method] == 0
 
 
 def test_where_other_machines_reach_it_only_if_it_is_told() -> None:

@@ -1,0 +1,37 @@
+"""A few jobs on a service under a proxy while its parts are killed; `soak/outgrow.py` runs thousands."""
+
+import json
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+from support.outgrown_site import Kind, proxy_program
+from support.postgresql import skip_without_postgresql
+
+PROGRAM = Path(__file__).parents[2] / "soak" / "outgrow.py"
+
+
+@pytest.mark.real_time
+@pytest.mark.timeout(1200)
+def test_every_job_ends_once_with_its_right_result(tmp_path: Path) -> None:
+    skip_without_postgresql()
+    if proxy_program() is None:
+        pytest.skip("haproxy is not installed (Debian's package: haproxy)")
+    file = tmp_path / "ledger.json"
+    command = [sys.executable, str(PROGRAM), "--jobs", "60", "--kill-every", "5", "--seed", "1", "--json", str(file)]
+    done = subprocess.run([*command, "--folder", str(tmp_path)], capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    ledger = json.loads(file.read_text())
+    assert ledger["problems"] == []
+    assert ledger["accepted"] == ledger["answered"] == 60 + sum(ledger["given_up"].values())
+    assert ledger["right"] == 60
+    assert ledger["wrong"] == ledger["lost"] == ledger["ended_twice"] == 0
+    assert set(ledger["kills"]) == set(Kind) and sum(ledger["kills"].values()) > 0
+
+
+def test_wrong_use_is_told() -> None:
+    done = subprocess.run([sys.executable, PROGRAM, "--jobs", "0"], capture_output=True, text=True, check=False)
+    assert (done.returncode, done.stdout) == (2, "")
+    assert "--jobs, --workers and --throughput take numbers above 0" in done.stderr

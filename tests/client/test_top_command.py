@@ -1,0 +1,172 @@
+"""`top` against a server that answers what a test has written."""
+
+import json
+import os
+import pty
+import subprocess
+import sys
+import threading
+from typing import Any
+
+import grpc
+import pytest
+
+from robosc_api.v1 import jobs_pb2
+from support.answers import job, load
+from support.client_commands import interrupted, run
+from support.scripted_service import Refusal, scripted
+from support.waiting import PATIENCE_S, wait_until
+
+_NOW_S = 1_700_000_100
+"""Time of the answers."""
+
+
+def caller(name: str, first_s: int | None = None, **numbers: Any) -> Any:
+    found = jobs_pb2.CallerLoad(caller=name, **numbers)
+    if first_s is not None:
+        found.first_queued_time.seconds = first_s
+    return found
+
+
+def running(number: int, started_s: int, **fields: Any) -> Any:
+    found = job(id=f"run-{number}", **fields)
+    found.start_time.seconds = started_s
+    return found
+
+
+def queued(number: int, created_s: int, **fields: Any) -> Any:
+    found = job(1, jobs_pb2.JOB_STATE_QUEUED, id=f"wait-{number}", **fields)
+    found.create_time.seconds = created_s
+    return found
+
+
+LOAD = load(
+    caller("ann", _NOW_S - 4000, waiting_tasks=2, running_tasks=1, queued_jobs=2, running_jobs=1, ended_jobs=7),
+    caller("bob\x1b[31m", ended_jobs=5),
+)
+RUNNING = running(1, _NOW_S - 75, owner="ann", label="nightly")
+RUNNING.progress.stage, RUNNING.progress.message = "synthesis", "round 3"
+# A list of jobs begins with the youngest.
+QUEUED = [queued(2, _NOW_S - 2, owner="ann", waiting_before=1), queued(1, _NOW_S - 4000, owner="ann")]
+
+
+LISTED = [
+    [jobs_pb2.ListJobsResponse(jobs=[RUNNING])],
+    [jobs_pb2.ListJobsResponse(jobs=QUEUED)],
+]
+
+
+def test_one_look_as_text(capfd: pytest.CaptureFixture[str]) -> None:
+    with scripted(GetLoad=[[LOAD]], ListJobs=LISTED) as (address, script):
+        status, out, err = run(capfd, "top", "--once", "--server", address)
+    assert (status, err) == (0, "")
+    head, blank, columns, ann, bob, _, names, *jobs = out.splitlines()
+    assert head == "22:15:00 UTC  servers 3  workers 4, busy 1  waiting 2  ended in the last minute 12"
+    assert blank == ""
+    assert columns.split()[:3] == ["CALLER", "QUEUED", "RUNNING"]
+    assert ann.split() == ["ann", "2", "1", "2", "1", "7", "1", "h", "6", "min"]
+    assert bob.split() == ["bob\\x1b[31m", "0", "0", "0", "0", "5"]
+    assert names.split() == ["JOB", "STATE", "AGE", "BEFORE", "KIND", "CALLER", "MODEL", "DOING"]
+    assert [line.split() for line in jobs] == [
+        "run-1 running 1 min 15 s synthesize ann nightly synthesis: round 3".split(),
+        "wait-1 queued 1 h 6 min synthesize ann robot.rscd".split(),
+        "wait-2 queued 2.0 s 1 synthesize ann robot.rscd".split(),
+    ]
+    states = [list(request.states) for request in script.of("ListJobs")]
+    assert states == [[jobs_pb2.JOB_STATE_RUNNING], [jobs_pb2.JOB_STATE_QUEUED]]
+    assert not any(request.all_owners for request in script.of("ListJobs"))
+    assert not script.of("GetLoad")[0].all_callers
+
+
+def test_one_look_as_json_of_all_callers(capfd: pytest.CaptureFixture[str]) -> None:
+    with scripted(GetLoad=[[LOAD]], ListJobs=LISTED) as (address, script):
+        status, out, _ = run(capfd, "top", "--once", "--json", "--all", "--most", "1", "--server", address)
+    assert (status, out.count("\n")) == (0, 1)
+    found = json.loads(out)
+    assert (found["workers"], found["running_tasks"], found["waiting_tasks"], found["servers"]) == (4, 1, 2, 3)
+    assert (found["ended_jobs_per_minute"], found["more_jobs"]) == (12, 1)
+    assert found["callers"][0] == {
+        "caller": "ann",
+        "waiting_tasks": 2,
+        "running_tasks": 1,
+        "queued_jobs": 2,
+        "running_jobs": 1,
+        "ended_jobs_per_minute": 7,
+        "waiting_s": 4000.0,
+    }
+    assert found["callers"][1]["waiting_s"] is None
+    assert [(item["id"], item["age_s"]) for item in found["running"] + found["queued"]] == [
+        ("run-1", 75.0),
+        ("wait-1", 4000.0),
+    ]
+    assert all(request.all_owners for request in script.of("ListJobs"))
+    assert script.of("GetLoad")[0].all_callers
+
+
+def test_a_caller_who_is_no_admin_is_refused_all(capfd: pytest.CaptureFixture[str]) -> None:
+    refusal = Refusal(grpc.StatusCode.PERMISSION_DENIED, "needs a token with the scope 'admin'", "PERMISSION_DENIED")
+    with scripted(GetLoad=[[refusal]], ListJobs=LISTED) as (address, script):
+        status, out, err = run(capfd, "top", "--once", "--all", "--server", address)
+    assert (status, out) == (3, "")
+    assert "the scope 'admin'" in err
+    assert not script.of("ListJobs")
+
+
+def test_an_earlier_server_has_no_load(capfd: pytest.CaptureFixture[str]) -> None:
+    with scripted(GetLoad=[[Refusal(grpc.StatusCode.UNIMPLEMENTED)]]) as (address, _):
+        status, out, err = run(capfd, "top", "--once", "--server", address)
+    assert (status, out) == (3, "")
+    assert "is not a RoboSC server of this version" in err
+
+
+def test_lines_of_json_come_until_it_is_interrupted() -> None:
+    asked = threading.Event()
+    looks = 0
+
+    def counted(context: Any) -> Any:
+        nonlocal looks
+        looks += 1
+        if looks == 3:
+            asked.set()
+        yield LOAD
+
+    with scripted(GetLoad=[[counted]], ListJobs=[[jobs_pb2.ListJobsResponse()]]) as (address, _):
+        words = ["-m", "robosc_client.main", "top", "--json", "--interval", "0.01", "--server", address]
+        status, out, _ = interrupted(words, asked)
+    assert status == 130
+    # Each is whole, and written as soon as it is known.
+    lines = [json.loads(line) for line in out.splitlines()]
+    assert len(lines) >= 2
+    assert {line["workers"] for line in lines if "error" not in line} == {4}
+
+
+def test_a_terminal_is_drawn_again_and_again_and_given_back() -> None:
+    with scripted(GetLoad=[[LOAD]], ListJobs=[[jobs_pb2.ListJobsResponse()]]) as (address, script):
+        ours, theirs = pty.openpty()
+        words = [sys.executable, "-m", "robosc_client.main", "top", "--interval", "0.01", "--server", address]
+        variables = {**os.environ, "TERM": "xterm", "COLUMNS": "150", "LINES": "40"}
+        process = subprocess.Popen(words, stdin=theirs, stdout=theirs, stderr=theirs, env=variables)
+        os.close(theirs)
+        shown = bytearray()
+        reader = threading.Thread(target=_read, args=(ours, shown))
+        reader.start()
+        try:
+            wait_until(lambda: len(script.of("GetLoad")) >= 3, "the third look")
+            process.send_signal(2)
+            assert process.wait(PATIENCE_S) == 130
+        finally:
+            process.kill()
+            process.wait()
+            reader.join(PATIENCE_S)
+            os.close(ours)
+    assert b"workers 4, busy 1" in shown
+    # The other screen is left again.
+    assert shown.index(b"\x1b[?1049h") < shown.rindex(b"\x1b[?1049l")
+
+
+def _read(descriptor: int, shown: bytearray) -> None:
+    while True:
+        try:
+            shown += os.read(descriptor, 65536)
+        except OSError:
+            return

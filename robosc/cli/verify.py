@@ -133,7 +133,7 @@ def _verify_supervisor(arguments: argparse.Namespace) -> int:
     bundle = read_bundle(arguments)
     try:
         if arguments.signed_by:
-            tell_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
+            report_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
         supervisor = decode(content)
     except (InvalidSupervisorError, SignatureError) as error:
         return report_malformed(arguments, error)
@@ -203,11 +203,11 @@ def _verify_signature(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json({"status": "signed", "model": name, "deployment": deployment, "signed_by": key.fingerprint})
     else:
-        tell_signer(arguments, key)
+        report_signer(arguments, key)
     return ExitCode.OK
 
 
-def tell_signer(arguments: argparse.Namespace, key: "PublicKey") -> None:
+def report_signer(arguments: argparse.Namespace, key: "PublicKey") -> None:
     """Print whose signature it is, for people who are not to be left in peace."""
     if not arguments.quiet and not arguments.json:
         sys.stdout.write(visible(f"{arguments.supervisor}: signed by {key}") + "\n")

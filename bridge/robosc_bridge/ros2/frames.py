@@ -92,7 +92,7 @@ def places_of(turtlebot: str, scan: Place | None) -> Places | None:
 
     Args:
         turtlebot: TurtleBot3 as its bridge names it; empty: another robot.
-        scan: Place of its LiDAR, if that is told; None: as the TurtleBot3 has it.
+        scan: Place of its LiDAR, if that is reported; None: as the TurtleBot3 has it.
 
     Returns:
         None: it is not known where the LiDAR is.

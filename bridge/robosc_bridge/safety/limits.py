@@ -12,7 +12,7 @@ REVOLUTIONS = 3
 """Revolutions of a scanner without a full scan after which it counts as silent."""
 
 SCAN_TIMEOUT_S = 0.6
-"""Time after which a scanner counts as silent whose driver does not tell how long a revolution takes, in seconds."""
+"""Time after which a scanner counts as silent whose driver does not state the time of a revolution, in seconds."""
 
 SCAN_TIMEOUTS_S: Mapping[str, float] = MappingProxyType({"lds01": 0.6, "lds02": 0.5, "lds03": 0.3})
 """Time after which a scanner counts as silent, by its driver's name: three revolutions, in seconds."""

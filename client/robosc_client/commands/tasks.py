@@ -298,7 +298,7 @@ def _verify_supervisor(arguments: argparse.Namespace, client: Client) -> int:
     bundle = read_bundle(arguments)
     try:
         if arguments.signed_by:
-            verify_here.tell_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
+            verify_here.report_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
         supervisor = decode(content)
     except (InvalidSupervisorError, SignatureError) as error:
         return verify_here.report_malformed(arguments, error)

@@ -66,7 +66,7 @@ class Watchers:
             watch.notify(record)
 
     def notify_gone(self, job_id: str) -> None:
-        """Tell the watchers of a job that it was deleted."""
+        """Notify the watchers of a job that it was deleted."""
         for watch in self._by_job.get(job_id, ()):
             watch.is_gone = True
             watch.wake()

@@ -150,8 +150,8 @@ class DriveWorker:
         self._silent = 0
         self._due_s = self._open_at_s = -math.inf
         self._notice = SafetyNotice((), ())
-        # Faults that a person was told of since it was opened or reset: one that comes and goes is told once.
-        self._told: frozenset[MotorFault] = frozenset()
+        # Faults that were reported since it was opened or reset: one that comes and goes is reported once.
+        self._reported: frozenset[MotorFault] = frozenset()
 
     def is_cycling(self, now_s: float) -> bool:
         """Return True if its steps come to an end, each in its time; asked by other threads."""
@@ -197,7 +197,7 @@ class DriveWorker:
         self._base.open()
         self._backoff.succeeded()
         self._is_open, self._has_torque = True, False
-        self._told = frozenset()
+        self._reported = frozenset()
         self._silent = 0
         self._due_s = now_s
         self._report(DeviceUp(Device.DRIVE))
@@ -223,9 +223,9 @@ class DriveWorker:
             raise
         self._timing.exchanged(began_s, scan_s)
         self._silent = 0
-        if news := reading.faults - self._told:
+        if news := reading.faults - self._reported:
             _log.warning("the motors report: %s", ", ".join(sorted(news)))
-            self._told |= news
+            self._reported |= news
         self._gate.on_drive_reading(reading)
         self._report(reading)
         if is_reset:
@@ -248,7 +248,7 @@ class DriveWorker:
 
     def _reset(self) -> None:
         self._has_torque = False
-        self._told = frozenset()
+        self._reported = frozenset()
         try:
             self._base.reset()
         except BridgeError as error:

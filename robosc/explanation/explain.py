@@ -16,7 +16,7 @@ from robosc.explanation.notation import events_text
 from robosc.explanation.problems import Problems
 from robosc.explanation.reports import Reporter
 from robosc.explanation.requests import MAXIMUM_SHOWN, RequestError
-from robosc.explanation.words import Words
+from robosc.explanation.subjects import Words
 from robosc.source import visible
 from robosc.synthesis.controlled import ControlledSystem
 from robosc.synthesis.encoding import Encoding

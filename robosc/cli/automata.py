@@ -193,7 +193,7 @@ def verify(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Ex
         UsageError: An argument means nothing for it, or it cannot be read.
         UnsupportedModelError: The automata cannot be handled.
     """
-    from robosc.cli.verify import report_malformed
+    from robosc.cli.sign import report_malformed
     from robosc.explanation import from_text
     from robosc.pipeline.results import SynthesisStatus, VerificationStatus
     from robosc.pipeline.systems import system_verification_text
@@ -231,8 +231,7 @@ def _verified(arguments: argparse.Namespace, model: "LoadedAutomata", options: "
         SignatureError: It is not signed as it must be.
         UsageError: A file cannot be read.
     """
-    from robosc.cli.sign import read_supervisor, signer_of
-    from robosc.cli.verify import report_signer
+    from robosc.cli.sign import read_supervisor, report_signer, signer_of
     from robosc.pipeline.automata_models import file_verification
     from robosc.pipeline.systems import decode_system
     from robosc.verification import Limits

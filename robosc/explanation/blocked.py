@@ -312,12 +312,12 @@ class Requests:
                 needed = listed(list(rule.moves.targets))
                 yield f"{automaton_text(rule.moves.plant, self._components)} is in {location}, not in {needed}"
         for part in rule.parts:
-            yield from self._hindered(part, state)
+            yield from self._blocking_causes(part, state)
         for need in rule.needs:
             if not need.condition.holds(state):
                 yield self._violated(need, state)
 
-    def _hindered(self, part: _Part, state: State) -> Iterator[str]:
+    def _blocking_causes(self, part: _Part, state: State) -> Iterator[str]:
         location = str(state[self._places[Subject(part.name)]])
         if location not in part.kept:
             yield f"{part.name} is in {location}, not in {listed(list(part.kept))}"

@@ -1,7 +1,7 @@
 # Two commands do everything on a machine with git, make, Python 3.12 and pip:
 #   make demo    the main job: model -> gRPC server -> bridge -> serial lines -> simulated robot, out of a maze
-#   make test    the tests that need nothing else; `make acceptance` tries the real parts, `make soak` goes on for long
-# Each makes .venv from the lock if it is not there. PYTHON=... chooses the interpreter.
+#   make test    the tests that need nothing else; `make acceptance` tries the real parts, `make soak` runs random tests for long
+# Each makes .venv from the lock if there is none. PYTHON=... chooses the interpreter.
 
 VENV := .venv
 BIN := $(VENV)/bin
@@ -39,8 +39,8 @@ $(CHECKERS)/.ready: deploy/requirements-checkers.txt deploy/make_checkers.sh dep
 	BIN=$(BIN) sh deploy/make_checkers.sh $(CHECKERS)
 	@touch $@
 
-# The theme tells its successor's name in each build unless it is asked not to. Not --quiet: what is not told is not
-# counted, and so no error.
+# The theme announces its successor in each build unless it is asked not to. Not --quiet: a warning that is not printed
+# does not count as an error.
 docs: $(CHECKERS)/.ready ## build the site of the documentation, out/site; every warning is an error
 	NO_MKDOCS_2_WARNING=1 $(CHECKERS)/bin/mkdocs build --strict
 
@@ -74,7 +74,7 @@ vscode: ## install the VS Code that the extension's tests run in
 	$(NPM) ci --prefix acceptance/vscode --ignore-scripts
 	cd $(VSCODE) && $(NPM) install --omit=dev --ignore-scripts
 
-demo: $(READY) ## lead a simulated robot out of a maze, from model to serial bytes; DEMO='--scene maze-spiral' and so on
+demo: $(READY) ## drive a simulated robot out of a maze, from model to serial bytes; DEMO='--scene maze-spiral' and so on
 	$(BIN)/python deploy/demo/demo.py $(DEMO)
 
 WORKERS := $(shell nproc 2>/dev/null || echo 2)
@@ -82,14 +82,14 @@ PYTEST := $(BIN)/python -m pytest
 
 TESTS := tests
 
-test: $(READY) ## the suite that says the same on every machine; TESTS=... chooses, WORKERS=... says how many at a time
+test: $(READY) ## the suite that gives the same result on every machine; TESTS=... chooses, WORKERS=... says how many at a time
 	$(PYTEST) -n $(WORKERS) --dist worksteal --durations 20 -r fE $(TESTS)
 
 # One worker more than cores: these tests wait for real middleware.
 acceptance: $(READY) ## real parts and real time: ROS, compilers, browser, databases, clusters; TESTS=acceptance/... chooses
 	@PYTHON=$(BIN)/python WORKERS=$$(( $(WORKERS) + 1 )) sh acceptance/run.sh $(filter-out tests,$(TESTS))
 
-smoke: $(READY) demo ## one of each real part; SMOKE=--no-skips wants all of them to be there
+smoke: $(READY) demo ## one of each real part; SMOKE=--no-skips requires all of them
 	$(PYTEST) -n $(WORKERS) --dist loadfile --durations 0 --durations-min 1 -r fEsR -m smoke $(SMOKE) acceptance
 
 EFFORT := 20
@@ -121,12 +121,12 @@ mutants: $(TOOLS)/.ready ## mutation tests of the bridge's safety layer
 
 FAULTS := --number 50 --seed 1
 
-faults: $(TOOLS)/.ready ## put small faults into functions drawn by chance, one at a time, and tell which the tests find
+faults: $(TOOLS)/.ready ## put small faults into functions drawn by chance, one at a time, and report which the tests find
 	PYTHONPATH=$(CURDIR)/$(TOOLS) $(BIN)/python soak/faults.py $(FAULTS)
 
 MISTAKES :=
 
-mistakes: $(READY) ## print how many mistakes in models are told well, by category; MISTAKES=--long shows the others
+mistakes: $(READY) ## print how many mistakes in models get a good message, by category; MISTAKES=--long shows the others
 	$(BIN)/python tests/support/mistakes.py $(MISTAKES)
 
 DECODERS := lds01 lds02 lds03 mavlink dynamixel registers

@@ -266,7 +266,7 @@ def _run(arguments: argparse.Namespace) -> int:
         signal.signal(number, lambda *_: sys.exit(OK))
     level = logging.DEBUG if arguments.verbose else logging.INFO
     logging.basicConfig(format="%(asctime)s %(levelname)s %(message)s", stream=sys.stderr, level=level)
-    tell = logging.getLogger("robosc_bridge").info
+    report = logging.getLogger("robosc_bridge").info
     loaded = load(arguments.config)
     configuration = loaded.configuration
     if arguments.view is not None:
@@ -278,7 +278,7 @@ def _run(arguments: argparse.Namespace) -> int:
     credentials = credentials_of(configuration.supervisor)
     cache_path = None if server is None else cache_folder(arguments.keep, configuration.supervisor)
     source = Source(arguments.model, deployment, server, cache_path, trusted, credentials, arguments.allow_livelock)
-    supervisor = obtain(source, tell)
+    supervisor = obtain(source, report)
     mapping = map_channels(supervisor.model, configuration, loaded.document)
     log: EventLog = NullLog()
     if configuration.log.folder is not None:
@@ -301,7 +301,7 @@ def _run(arguments: argparse.Namespace) -> int:
             signal.signal(number, lambda *_: machine.quit())
         with Keyboard(lambda key: machine.daemon.post(Key(key))) as keyboard:
             if not keyboard.is_there:
-                tell("there is no terminal: no key stops the robot")
+                report("there is no terminal: no key stops the robot")
             have_ended = machine.run(endpoints)
     finally:
         if recorder is not None:

@@ -77,17 +77,17 @@ def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
             asked = follower.wait_for(r"^asked (\d+) times, blocked (\d+) times$")
     motion = setting.read_motion()
     faults = (*watch.faults, *check_line(place, motion, watch.halts))
-    told = {"asked": float(asked[1]), "blocked": float(asked[2])}
-    return setting.outcome("line", "serial", faults, {**figures, **line_figures(place, motion), **told})
+    counts = {"asked": float(asked[1]), "blocked": float(asked[2])}
+    return setting.outcome("line", "serial", faults, {**figures, **line_figures(place, motion), **counts})
 
 
 def _play(rig: Rig, watch: Watch) -> None:
     """Let the events happen to the robot, one after the other; after the first fault, nothing is waited for."""
-    tell = rig.simulator.tell
+    send = rig.simulator.send
     with BridgeClient(rig.address, Credentials()) as operator:
         watch.drive("along the line")
-        tell(f"obstacle {BOX} back")
-        watch.stand("for the box on the line", lambda: tell(f"obstacle {BOX} away"), is_told=False)
+        send(f"obstacle {BOX} back")
+        watch.stand("for the box on the line", lambda: send(f"obstacle {BOX} away"), is_commanded=False)
         watch.drive("without the box")
         _click(rig, "button_1")
         watch.stand("after the stop button", lambda: _click(rig, "button_2"))
@@ -99,9 +99,9 @@ def _play(rig: Rig, watch: Watch) -> None:
 
 def _click(rig: Rig, button: str) -> None:
     """Press a button and let it go: held for three seconds, it lets OpenCR drive by itself."""
-    rig.simulator.tell(f"press {button}")
+    rig.simulator.send(f"press {button}")
     time.sleep(_PRESSED_S)
-    rig.simulator.tell(f"let {button}")
+    rig.simulator.send(f"let {button}")
 
 
 def line_figures(scene: Scene, motion: Motion) -> dict[str, float]:

@@ -202,7 +202,7 @@ class Program:
         # utime and stime, proc(5).
         return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
 
-    def told(self) -> str:
+    def output(self) -> str:
         """The end of its log."""
         try:
             data = self.log.read_bytes()
@@ -213,7 +213,7 @@ class Program:
     def require(self) -> None:
         """Raise ScenarioError if it has ended by itself."""
         if self.status is not None:
-            raise ScenarioError(f"{self.name} ended by itself with status {self.status}:\n{self.told()}")
+            raise ScenarioError(f"{self.name} ended by itself with status {self.status}:\n{self.output()}")
 
     def wait_for(self, pattern: str, limit_s: float = START_LIMIT_S) -> re.Match[str]:
         """Wait until its log has a line.
@@ -225,19 +225,19 @@ class Program:
         while True:
             # Before the look: what it has told just before its end counts.
             has_ended = self.status is not None
-            told = self.log.read_text(encoding="utf-8", errors="replace")
+            output = self.log.read_text(encoding="utf-8", errors="replace")
             # The last line may be half of one as long as the program lives.
-            whole = told if has_ended else told[: told.rfind("\n") + 1]
+            whole = output if has_ended else output[: output.rfind("\n") + 1]
             found = re.search(pattern, whole, re.MULTILINE)
             if found:
                 return found
             if has_ended:
                 self.require()
             if time.monotonic() > end_s:
-                raise ScenarioError(f"{self.name} did not tell {pattern!r} in {limit_s:g} s:\n{self.told()}")
+                raise ScenarioError(f"{self.name} did not tell {pattern!r} in {limit_s:g} s:\n{self.output()}")
             time.sleep(_POLL_S)
 
-    def tell(self, command: str) -> None:
+    def send(self, command: str) -> None:
         """Have it do something that it does not answer."""
         stdin = self._used.stdin
         if stdin is None:
@@ -246,7 +246,7 @@ class Program:
             stdin.write(command + "\n")
             stdin.flush()
         except OSError as error:
-            raise ScenarioError(f"{self.name} takes no commands any more:\n{self.told()}") from error
+            raise ScenarioError(f"{self.name} takes no commands any more:\n{self.output()}") from error
 
     def answer(self, limit_s: float = ANSWER_LIMIT_S) -> str:
         """The next line of its output.
@@ -257,15 +257,15 @@ class Program:
         try:
             found = self._answers.get(timeout=limit_s)
         except queue.Empty:
-            raise ScenarioError(f"{self.name} did not answer in {limit_s:g} s:\n{self.told()}") from None
+            raise ScenarioError(f"{self.name} did not answer in {limit_s:g} s:\n{self.output()}") from None
         if found is None:
             self._answers.put(None)
-            raise ScenarioError(f"{self.name} has ended:\n{self.told()}")
+            raise ScenarioError(f"{self.name} has ended:\n{self.output()}")
         return found
 
     def ask(self, command: str) -> str:
         """Have it answer with a line."""
-        self.tell(command)
+        self.send(command)
         return self.answer()
 
     def stop(self) -> None:
@@ -305,4 +305,4 @@ def finish(program: Program) -> None:
     program.require()
     program.stop()
     if program.status != 0:
-        raise ScenarioError(f"{program.name} ended with status {program.status}:\n{program.told()}")
+        raise ScenarioError(f"{program.name} ended with status {program.status}:\n{program.output()}")

@@ -197,10 +197,10 @@ def machine_facts(date: str) -> dict[str, str]:
     gcc = shutil.which("gcc")
     if gcc is not None:
         try:
-            told = subprocess.check_output([gcc, "--version"], text=True, timeout=_LIMIT_S)  # noqa: S603
+            version = subprocess.check_output([gcc, "--version"], text=True, timeout=_LIMIT_S)  # noqa: S603
         except (OSError, subprocess.SubprocessError):
-            told = "unknown\n"
-        facts["gcc"] = told.splitlines()[0]
+            version = "unknown\n"
+        facts["gcc"] = version.splitlines()[0]
     return facts
 
 

@@ -80,14 +80,14 @@ class Ros1(ros.Middleware):
             with program as master:
                 while master.status is None and not _answers(variables["ROS_MASTER_URI"]):
                     if time.monotonic() > end_s:
-                        raise ScenarioError(f"the master of ROS 1 does not answer:\n{master.told()}")
+                        raise ScenarioError(f"the master of ROS 1 does not answer:\n{master.output()}")
                     time.sleep(_POLL_S)
                 # Somebody else may have taken the port.
                 if master.status is None:
                     yield variables
                     return
             if time.monotonic() > end_s:
-                raise ScenarioError(f"the master of ROS 1 does not start:\n{master.told()}")
+                raise ScenarioError(f"the master of ROS 1 does not start:\n{master.output()}")
 
     def arguments(self, parameters: Mapping[str, object], remappings: Mapping[str, str]) -> list[str]:
         """Private parameters and names."""

@@ -259,7 +259,7 @@ def _wait_for_supervisor(client: Program) -> None:
             raise ScenarioError(f"the server had no supervisor after {_SYNTHESIS_LIMIT_S:g} s")
         time.sleep(0.02)
     if client.status != 0:
-        raise ScenarioError(f"the client ended with status {client.status}:\n{client.told()}")
+        raise ScenarioError(f"the client ended with status {client.status}:\n{client.output()}")
 
 
 def _words(begin: str, *places: Path, **options: object) -> list[str]:

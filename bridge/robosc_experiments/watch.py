@@ -80,17 +80,17 @@ class Watch:
                 return
         self.faults.append(f"the robot did not drive {what} within {self._step_s:g} s")
 
-    def stand(self, why: str, release: Callable[[], object], *, is_told: bool = True) -> None:
+    def stand(self, why: str, release: Callable[[], object], *, is_commanded: bool = True) -> None:
         """Wait until it has stood still for a while; then it may go on.
 
         Args:
             why: Reason, for a person.
             release: Function that lets it go on.
-            is_told: True if it has just been told to stand still; else it is to see for itself.
+            is_commanded: True if it has just been commanded to stand still; else it is to see for itself.
         """
         if self.faults:
             return
-        told_s = latest(self._motion).world_s
+        commanded_s = latest(self._motion).world_s
         begin_s: float | None = None
         for now in self.samples(f"stands {why}", self._step_s):
             if not now.is_standing:
@@ -98,7 +98,7 @@ class Watch:
             elif begin_s is None:
                 begin_s = now.world_s
             elif now.world_s - begin_s >= self._settle_s + HELD_S:
-                self.halts.append(Halt(told_s if is_told else begin_s, now.world_s, why))
+                self.halts.append(Halt(commanded_s if is_commanded else begin_s, now.world_s, why))
                 release()
                 return
         self.faults.append(f"the robot did not stand still {why} within {self._step_s:g} s")

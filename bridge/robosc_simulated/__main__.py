@@ -75,10 +75,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
             stack.enter_context(errors)
             recorder = None
             if options.record is not None:
-                recorder = Recorder(stack.enter_context(contextlib.closing(Output(options.record, errors.tell))))
+                recorder = Recorder(stack.enter_context(contextlib.closing(Output(options.record, errors.report))))
             motion = None
             if options.motion is not None:
-                motion = stack.enter_context(contextlib.closing(Output(options.motion, errors.tell)))
+                motion = stack.enter_context(contextlib.closing(Output(options.motion, errors.report)))
             robot = stack.enter_context(_robot(options, recorder))
             if motion is not None:
                 stack.enter_context(contextlib.closing(MotionRecorder(robot.world, motion)))

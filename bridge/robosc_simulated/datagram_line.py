@@ -9,9 +9,8 @@ import socket
 import threading
 from collections.abc import Iterable
 from dataclasses import dataclass
-from types import TracebackType
-from typing import Self
 
+from robosc_simulated.closing import Closing
 from robosc_simulated.line import Device, Sending
 from robosc_simulated.timebase import Timebase
 
@@ -33,7 +32,7 @@ class DatagramFaults:
     is_deaf: bool = False
 
 
-class DatagramLine:
+class DatagramLine(Closing):
     """Line that serves a device on a UDP port of this computer until it is closed.
 
     It is for devices whose answers take no time.
@@ -76,14 +75,6 @@ class DatagramLine:
         self._socket.close()
         os.close(self._woken)
         os.close(self._waker)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _serve(self) -> None:
         poll = select.poll()

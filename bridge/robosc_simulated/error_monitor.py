@@ -27,7 +27,7 @@ class ErrorMonitor:
         """Status of the program at its end: 1 if anything went wrong."""
         return int(self._is_any)
 
-    def tell(self, sentence: str) -> None:
+    def report(self, sentence: str) -> None:
         """Report an error after which the simulator goes on."""
         self._is_any = True
         # Also standard error may be a file on a full disk.
@@ -49,5 +49,5 @@ class ErrorMonitor:
             return
         threading.__excepthook__(what)
         name = "a thread" if what.thread is None else f"the thread {what.thread.name!r}"
-        self.tell(f"the simulation ends, because {name} has failed: {what.exc_type.__name__}: {what.exc_value}")
+        self.report(f"the simulation ends, because {name} has failed: {what.exc_type.__name__}: {what.exc_value}")
         self.has_crashed = True

@@ -212,7 +212,7 @@ def parse_track(text: str) -> Track:
     """A line on the floor from text.
 
     Raises:
-        ValueError: A line of the text has no two finite numbers, which is told with its number, or there is no track.
+        ValueError: A line of the text, which the message names, has no two finite numbers, or there is no track.
     """
     found: list[Point] = []
     for number, line in enumerate(text.splitlines(), start=1):

@@ -217,7 +217,7 @@ class Lidar(ABC):
 
 
 class Lds01(Lidar):
-    """LDS-01 (HLS-LFCD2): `b` starts the motor, `e` stops it; it rotates at power-on without being told."""
+    """LDS-01 (HLS-LFCD2): `b` starts the motor, `e` stops it; it rotates at power-on without a command."""
 
     baud = 230_400
     nominal_hz = 5.0

@@ -10,9 +10,9 @@ from collections import deque
 from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
-from types import TracebackType
-from typing import Protocol, Self
+from typing import Protocol
 
+from robosc_simulated.closing import Closing
 from robosc_simulated.recorder import Tap
 from robosc_simulated.terminal_end import TerminalEnd
 from robosc_simulated.timebase import Timebase
@@ -119,7 +119,7 @@ class Faults:
         self.__dict__.update(Faults().__dict__)
 
 
-class SimulatedLine:
+class SimulatedLine(Closing):
     """Line that serves a device until it is closed.
 
     It is on a pseudo-terminal, or on a port of the `VirtualHost` that it lives by.
@@ -208,14 +208,6 @@ class SimulatedLine:
         self._time.leave(self._catch_up)
         self.disconnect()
         self._end.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _serve(self) -> None:
         while self._is_open:

@@ -203,8 +203,8 @@ class Parser:
 
     def _packet(self, data: bytes, layout: Layout, is_signed: bool) -> bytes | None:
         end = len(data) - is_signed * _SIGNATURE_LENGTH
-        told = int.from_bytes(data[end - 2 : end], "little")
-        return data if told == checksum(data[1 : end - 2] + bytes((layout.extra,))) else None
+        expected = int.from_bytes(data[end - 2 : end], "little")
+        return data if expected == checksum(data[1 : end - 2] + bytes((layout.extra,))) else None
 
     def _counts(self, data: bytes, is_signed: bool) -> bool:
         if self._key is None:

@@ -36,7 +36,7 @@ class Halt:
     """Time in which the robot has to stand still.
 
     Attributes:
-        begin_s: World time from which it was told so, or had a reason to.
+        begin_s: World time from which it was commanded so, or had a reason to.
         end_s: World time until which that holds.
         why: Reason for a person, such as `the stop button`.
     """
@@ -145,10 +145,10 @@ def _record_faults(motion: Motion) -> Iterator[str]:
 
 def _touch_faults(scene: Scene, motion: Motion, radius_m: float) -> Iterator[str]:
     counted = motion.samples[-1].collisions if motion.samples else 0
-    told = [event for event in motion.happenings if event.happening == "collision"]
-    if told or counted:
-        where = f", first at {told[0].world_s:.2f} s{_what(told[0])}" if told else ""
-        yield f"it has touched something {max(counted, len(told))} times{where}"
+    touches = [event for event in motion.happenings if event.happening == "collision"]
+    if touches or counted:
+        where = f", first at {touches[0].world_s:.2f} s{_what(touches[0])}" if touches else ""
+        yield f"it has touched something {max(counted, len(touches))} times{where}"
     obstacles = {
         obstacle.name: (obstacle.x_m, obstacle.y_m, obstacle.radius_m)
         for obstacle in scene.obstacles

@@ -373,7 +373,7 @@ class OpenCr:
     def _end_calibration(self, ended_s: float) -> list[Sending]:
         self._busy_until_s = None
         self._put(_CALIBRATE, 0)
-        # Its cycles stood still meanwhile, and what it told before is told until the next one.
+        # Its cycles stood still meanwhile, and what it reported before is reported until the next one.
         self._cycle_s = ended_s + self._period_s
         self._pass_end_s = ended_s
         return [self._sending(Error.NONE, b"")]

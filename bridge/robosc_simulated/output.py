@@ -20,15 +20,15 @@ class Output:
 
     Args:
         path: Of the file; what was in it is gone.
-        tell: Takes one sentence, once, when it cannot be written to any more.
+        report: Takes one sentence, once, when it cannot be written to any more.
 
     Raises:
         OSError: It cannot be opened.
     """
 
-    def __init__(self, path: Path, tell: Callable[[str], None]) -> None:
+    def __init__(self, path: Path, report: Callable[[str], None]) -> None:
         self._path = path
-        self._tell = tell
+        self._report = report
         self._is_sound = True
         self._stream = path.open("w", encoding="ascii")
 
@@ -59,4 +59,4 @@ class Output:
 
     def _end(self, error: OSError) -> None:
         self._is_sound = False
-        self._tell(f"{self._path} is not whole, because it cannot be written to any more: {error.strerror}")
+        self._report(f"{self._path} is not whole, because it cannot be written to any more: {error.strerror}")

@@ -161,20 +161,20 @@ class Rover:
         return [] if self.is_silent else [Sending(answer) for answer in answers]
 
     def update(self) -> Iterable[Sending]:
-        """Drive until now, and tell what is due."""
+        """Drive until now, and return the packets that are due."""
         self._world.catch_up()
         now_s = self._time.now_s()
-        told: list[bytes] = []
+        packets: list[bytes] = []
         if self._target is not None and now_s - self._target_s >= TARGET_LIMIT_S:
             self._target = None
             self._drive()
-            told += self._texts(4, "target not received last 3secs, stopping")
+            packets += self._texts(4, "target not received last 3secs, stopping")
         for number, due_s in self._due_s.items():
             if now_s >= due_s:
                 interval_s = self._interval_s[number]
                 self._due_s[number] = due_s + interval_s * (math.floor((now_s - due_s) / interval_s) + 1)
-                told += self._telemetry(number)
-        return [] if self.is_silent else [Sending(packet) for packet in told]
+                packets += self._telemetry(number)
+        return [] if self.is_silent else [Sending(packet) for packet in packets]
 
     def due_s(self) -> float:
         """Return the time when its next message or the expiry of its target is due."""
@@ -212,20 +212,20 @@ class Rover:
     def _after_command(self, packet: Packet) -> list[bytes]:
         number, parameters = packet.values["command"], packet.values["parameters"]
         self.commands.append((number, parameters))
-        told: list[bytes] = []
+        packets: list[bytes] = []
         match number:
             case 176:  # DO_SET_MODE
                 result = self._after_mode(round(parameters[0]), round(parameters[1]))
             case 400:  # COMPONENT_ARM_DISARM
                 result = self._after_arming(parameters[0] == 1.0, round(parameters[1]) == _FORCE)
                 if result == FAILED:
-                    told += self._texts(2, f"PreArm: {self.refusal}")
+                    packets += self._texts(2, f"PreArm: {self.refusal}")
             case 511:  # SET_MESSAGE_INTERVAL
                 result = self._after_interval(round(parameters[0]), parameters[1] / 1e6)
             case _:
                 result = UNSUPPORTED
         if self.answers_commands:
-            told.append(
+            packets.append(
                 self._encoder.encode(
                     "COMMAND_ACK",
                     command=number,
@@ -234,7 +234,7 @@ class Rover:
                     target_component=packet.component,
                 )
             )
-        return told
+        return packets
 
     def _after_mode(self, base: int, mode: int) -> int:
         if not base & _CUSTOM or mode not in MODES:
@@ -272,7 +272,7 @@ class Rover:
         self._target = (speed_m_s, -values["yaw_rate"])
         self._target_s = self._time.now_s()
 
-    # What it tells.
+    # Its telemetry.
 
     def _telemetry(self, number: int) -> list[bytes]:
         boot_s = self._time.now_s() - self._began_s

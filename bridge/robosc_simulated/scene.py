@@ -209,7 +209,7 @@ def parse_scene(data: bytes, name: str, file: str, seed: int = 0) -> Scene:
 
 
 class _Maker:
-    """Makes a scene of what its file says; a problem is told with its place."""
+    """Makes a scene of what its file says; a problem is reported with its place."""
 
     def __init__(self, document: Document, seed: int) -> None:
         self._document = document

@@ -4,12 +4,11 @@ Its body may also have the autopilot of a MAVLink rover in place of its own base
 """
 
 from pathlib import Path
-from types import TracebackType
-from typing import Self
 
 from robosc.execution.runtime.clock import Clock
 from robosc_simulated.battery import Battery
 from robosc_simulated.camera import SimulatedCamera
+from robosc_simulated.closing import Closing
 from robosc_simulated.floor import Track
 from robosc_simulated.lidar import LIDARS, Lidar
 from robosc_simulated.line import Faults, SimulatedLine
@@ -58,7 +57,7 @@ def wheel_servos(world: World, battery: Battery | None = None) -> tuple[Servo, S
     return left, right
 
 
-class SimulatedTurtleBot3:
+class SimulatedTurtleBot3(Closing):
     """A robot whose devices are served until it is closed.
 
     Args:
@@ -227,11 +226,3 @@ class SimulatedTurtleBot3:
             self.camera.close()
         self.base_line.close()
         self.scanner_line.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()

@@ -15,10 +15,11 @@ from collections import deque
 from collections.abc import Callable
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 from robosc_bridge.errors import LineBusyError, LineLostError, LineMissingError
 from robosc_bridge.host import NetworkPort
+from robosc_simulated.closing import Closing
 from robosc_simulated.virtual_network import VirtualNetwork, VirtualServer
 
 _END_S = 10.0
@@ -54,7 +55,7 @@ class _Slot:
         self.is_over = False
 
 
-class VirtualHost:
+class VirtualHost(Closing):
     """A host on virtual time. The thread that makes it alternates with those that are made by it.
 
     Args:
@@ -174,14 +175,6 @@ class VirtualHost:
             self._waiting.popleft().given.release()
         for thread in self._threads:
             thread.join(_END_S)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
     def _pass_on(self, slot: _Slot) -> None:
         """Give the processor to whoever's wait is over first, and wait for the own one."""

@@ -108,10 +108,10 @@ Looks = np.ndarray[tuple[int], np.dtype[np.int64]]
 """For each ray, the place in `tuple(Look)` of the look of what it meets."""
 
 OnStep = Callable[[float], None]
-"""Is told the world time of every step that was lived."""
+"""Receives the world time of every step that was simulated."""
 
 OnWorldEvent = Callable[[float, WorldEvent], None]
-"""Is told what happened, and the world time."""
+"""Receives what happened, and the world time."""
 
 
 class World:
@@ -242,7 +242,7 @@ class World:
                 raise ValueError(f"there is no obstacle {name!r}; there is {known}")
             found = self._obstacles[name] = change(self._obstacles[name])
             self._see_obstacles()
-            self._tell(WorldEvent("obstacle", found.x_m, found.y_m, name, found.radius_m, found.is_there))
+            self._notify(WorldEvent("obstacle", found.x_m, found.y_m, name, found.radius_m, found.is_there))
 
     def _see_obstacles(self) -> None:
         self._there = tuple(obstacle for obstacle in self._obstacles.values() if obstacle.is_there)
@@ -259,16 +259,16 @@ class World:
         self._clear_m = 0.0
 
     def watch(self, on_step: OnStep, on_event: OnWorldEvent) -> None:
-        """Tell somebody of every step and of what happens, under the lock of the time."""
+        """Notify somebody of every step and of what happens, under the lock of the time."""
         with self.time.lock:
             self._watchers.append((on_step, on_event))
 
     def unwatch(self, on_step: OnStep, on_event: OnWorldEvent) -> None:
-        """Tell them no more."""
+        """Notify them no more."""
         with self.time.lock:
             self._watchers.remove((on_step, on_event))
 
-    def _tell(self, happening: WorldEvent) -> None:
+    def _notify(self, happening: WorldEvent) -> None:
         for _, on_event in self._watchers:
             on_event(self.lived_s, happening)
 
@@ -276,7 +276,7 @@ class World:
         goal = self.scene.goal
         if goal is not None and self.reached_s is None and goal.is_reached(self.x_m, self.y_m):
             self.reached_s = self.lived_s
-            self._tell(WorldEvent("goal", self.x_m, self.y_m))
+            self._notify(WorldEvent("goal", self.x_m, self.y_m))
 
     def catch_up(self) -> None:
         """Live until now, in whole steps; what is commanded now acts from here on."""
@@ -323,7 +323,7 @@ class World:
                 if forward_m != 0.0 and not self.is_touching:
                     self.is_touching = True
                     self.collisions += 1
-                    self._tell(WorldEvent("collision", self.x_m, self.y_m, name))
+                    self._notify(WorldEvent("collision", self.x_m, self.y_m, name))
                 return False
             self._clear_m = nearest_m
             self.is_touching = self.is_touching and nearest_m < radius_m + _APART_M

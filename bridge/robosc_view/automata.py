@@ -147,7 +147,7 @@ class EdgesTaken:
                 self._edges.setdefault(edge.event, {}).setdefault(item.name, []).append((number, way, guard))
 
     def of(self, before: StateInWords, step: Step) -> list[int]:
-        """Return the edges that a step took from a state; of an automaton that has several none is told."""
+        """Return the edges that a step took from a state; of an automaton that has several none is reported."""
         parts = before.parts
         state = tuple(parts[name] for name in self._subjects)
         found = []

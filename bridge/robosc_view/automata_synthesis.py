@@ -22,7 +22,7 @@ from robosc_view.automata import distinct_initial_states, too_large
 from robosc_view.watched_model import SynthesizedModel, finding_text
 
 MAXIMUM_FINDINGS = 10
-"""Errors that are told; of more the rest is counted."""
+"""Errors that are reported; of more the rest is counted."""
 
 
 def playable_automata(model: LoadedAutomata, found: SystemSynthesis) -> SynthesizedModel | str:
@@ -34,7 +34,7 @@ def playable_automata(model: LoadedAutomata, found: SystemSynthesis) -> Synthesi
     if found.supervisor is None:
         return _reason(found)
     whole = None if model.libraries else model.main.text
-    told = tuple(finding_text(item.severity, item.message, item.code) for item in found.diagnostics)
+    findings = tuple(finding_text(item.severity, item.message, item.code) for item in found.diagnostics)
     language = Path(model.main.name).suffix.removeprefix(".")
     system = found.supervisor.system
     why_not = too_large(system)
@@ -42,7 +42,7 @@ def playable_automata(model: LoadedAutomata, found: SystemSynthesis) -> Synthesi
         return why_not
     # A copy, since the values that a supervisor keeps for itself cannot be pickled.
     begin = distinct_initial_states(system, initial_states_in_words(replace(found.supervisor)))
-    return SynthesizedModel(found.supervisor, told, whole, language, begin)
+    return SynthesizedModel(found.supervisor, findings, whole, language, begin)
 
 
 def _reason(found: SystemSynthesis) -> str:

@@ -1,7 +1,7 @@
 """Broadcast from one source to all viewers: the latest state, and every event once, for slow readers too.
 
-All of it lives in the event loop of the server. A source runs as long as somebody looks; one that is lost is told, and
-tried again after a while that grows.
+All of it lives in the event loop of the server. A source runs as long as a page is open; a lost one is reported, and
+tried again after a growing pause.
 """
 
 import asyncio
@@ -53,7 +53,7 @@ class Viewer:
         self._lost = 0
 
     def define(self, text: str) -> None:
-        """Another robot: what was told of the one before is of no use any more."""
+        """Another robot: what is known of the one before is of no use any more."""
         self._lost += len(self._events)
         self._events.clear()
         self._bytes = 0
@@ -67,7 +67,7 @@ class Viewer:
         self._news.set()
 
     def jump(self) -> None:
-        """The replay is elsewhere: what waits was told of another place."""
+        """The replay is elsewhere: what waits is about another place."""
         self._events.clear()
         self._bytes = self._lost = 0
         self._update = self._scan = None
@@ -166,7 +166,7 @@ class Broadcaster:
         self._prepared: PreparedRobot | None = None
         self._builder: MessageBuilder | None = None
         self._status: Status | None = None
-        self._told_s = 0.0
+        self._updated_s = 0.0
         self._number = 0
         self._update: str | None = None
         self._position: str | None = None
@@ -257,7 +257,7 @@ class Broadcaster:
     def show(self, status: Status) -> None:
         """Receive what the robot is doing."""
         self._status = status
-        self._told_s = asyncio.get_running_loop().time()
+        self._updated_s = asyncio.get_running_loop().time()
         self._is_dirty.set()
 
     def append_events(self, batch: EventBatch, first: int | None = None) -> None:
@@ -315,7 +315,7 @@ class Broadcaster:
                     viewer.source_lost(self._gone)
             return
         self._number += 1
-        age_s = self._status.age_s + asyncio.get_running_loop().time() - self._told_s
+        age_s = self._status.age_s + asyncio.get_running_loop().time() - self._updated_s
         self._update = self._builder.update(self._status, self._number, age_s)
         for viewer in self._viewers:
             viewer.show(self._update)

@@ -141,8 +141,8 @@ class Robot:
     @property
     def requests(self) -> tuple[str, ...]:
         """Every request, in the model's order."""
-        told = str(CommunicationKind.OUTGOING_MESSAGE)
-        return tuple(f"{item.name}.request" for item in self.communications if item.kind != told)
+        incoming = str(CommunicationKind.OUTGOING_MESSAGE)
+        return tuple(f"{item.name}.request" for item in self.communications if item.kind != incoming)
 
 
 def robot_of(

@@ -149,8 +149,8 @@ class MessageBuilder:
                 return [], [], warnings
             why = {event: [NOT_KNOWN] for event in events}
         else:
-            told = available.enabled if status.enabled is None else [f"{name}.request" for name in status.enabled]
-            known = set(told)
+            enabled = available.enabled if status.enabled is None else [f"{name}.request" for name in status.enabled]
+            known = set(enabled)
             why = {item.event: list(item.why) for item in available.blocked}
             if status.enabled is not None:
                 why = {event: why.get(event) or [NOT_KNOWN] for event in events}
@@ -212,8 +212,8 @@ class TransitionTracker:
         kind = entry.get("kind")
         if "transitions" in entry:
             # Told with the entry: only the bridge's own sources do that; in a log anything may stand.
-            told = entry["transitions"]
-            for number in told if isinstance(told, list | tuple) else ():
+            numbers = entry["transitions"]
+            for number in numbers if isinstance(numbers, list | tuple) else ():
                 if isinstance(number, int) and number in self._component:
                     yield self._component[number], number
         elif kind == "restart":
@@ -247,14 +247,14 @@ def _states(components: Any) -> dict[str, str | None]:
 
 def entry_text(entry: Entry) -> str:
     """Return the text of an entry beside its event, for a person."""
-    told = [_word(entry[name]) for name in ("identifier", "what") if name in entry]
+    words = [_word(entry[name]) for name in ("identifier", "what") if name in entry]
     rest = {name: value for name, value in entry.items() if name not in (*_SHOWN_APART, "identifier", "what")}
-    told += [
+    words += [
         _word(value) if name == "data" else f"{name}: {_word(value)}"
         for name, value in sorted(rest.items())
         if value not in (None, {}, [])
     ]
-    text = "; ".join(told)
+    text = "; ".join(words)
     return text if len(text) <= MAXIMUM_TEXT else f"{text[: MAXIMUM_TEXT - 4]} ..."
 
 
@@ -301,7 +301,7 @@ def run_text(run: "ManualRun", entries: int, report: RunReport, beginning: int =
         report: Report of what was done.
         beginning: Number of the state that it has begun in, of those that the definition tells.
     """
-    hindered = run.hindrances()
+    blocked = run.blocked()
     undone = run.undone
     return _text(
         {
@@ -311,7 +311,7 @@ def run_text(run: "ManualRun", entries: int, report: RunReport, beginning: int =
             "undo": run.history[-1].event if len(run) else "",
             "redo": undone[0].event if undone else "",
             "is_marked": run.is_marked,
-            "hindered": {event: list(why) for event, why in hindered.items()},
+            "blocked": {event: list(why) for event, why in blocked.items()},
             "kind": report.kind,
             "lines": list(report.lines),
             "choice": None if report.choice is None else asdict(report.choice),

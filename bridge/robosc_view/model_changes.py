@@ -8,7 +8,7 @@ from robosc.pipeline.systems import SystemSupervisor
 from robosc_view.watched_model import SynthesizedModel
 
 MAXIMUM_CHANGES = 30
-"""Sentences that are told; of more the rest is counted."""
+"""Sentences that are reported; of more the rest is counted."""
 
 
 def model_changes(before: SynthesizedModel, after: SynthesizedModel) -> tuple[str, ...]:
@@ -47,8 +47,10 @@ def _conditions(old: _Synthesized, new: _Synthesized) -> Iterator[str]:
     for event in dict.fromkeys((*before, *after)):
         was, now = before.get(event, ""), after.get(event, "")
         if was != now:
-            told = f"the supervisor adds to {event}: {now}" if now else f"the supervisor adds nothing more to {event}"
-            yield f"{told}{f' (before: {was})' if was else ''}"
+            sentence = (
+                f"the supervisor adds to {event}: {now}" if now else f"the supervisor adds nothing more to {event}"
+            )
+            yield f"{sentence}{f' (before: {was})' if was else ''}"
 
 
 def _needs(made: _Synthesized) -> Mapping[str, str]:

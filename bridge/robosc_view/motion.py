@@ -8,7 +8,7 @@ from robosc.motion_record import Motion, Sample
 from robosc_view.reports import Drive
 
 MOST_POINTS = 2000
-"""Points of the whole way that the page is told."""
+"""Points of the whole way that are sent to the page."""
 
 _DIGITS = 4
 

@@ -122,7 +122,7 @@ class Playground:
         file: File of the model, for saved tests; None: it has none.
         make: Function that makes a model of a text and its language: of a link that is opened.
         scene: Scene for the map.
-        clock: Function that returns the time of what is told, in seconds since 1970-01-01 UTC.
+        clock: Function that returns the time of what is reported, in seconds since 1970-01-01 UTC.
     """
 
     def __init__(
@@ -156,8 +156,8 @@ class Playground:
         # In another thread, since that of large automata takes its time.
         self._run, self._edges = await asyncio.to_thread(_run_of, made, beginning)
         self._made, self._beginning, self._is_begun = made, beginning, True
-        # The steps that were told, and the entries of each.
-        self._told: tuple[Step, ...] = ()
+        # The steps that were reported, and the entries of each.
+        self._reported: tuple[Step, ...] = ()
         self._entries: list[list[dict[str, Any]]] = []
 
     async def run(self, sink: Sink) -> None:
@@ -219,11 +219,11 @@ class Playground:
                 if isinstance(step, RunReport):
                     await self._show(sink, step)
                     return
-                told = [*step.unknown, *(f"{name} keeps its value, since what it was to take is unknown"
+                sentences = [*step.unknown, *(f"{name} keeps its value, since what it was to take is unknown"
                                          for name in step.skipped)]  # fmt: skip
                 changes = changes_text(before, step.state) or "nothing has changed"
                 await self._show(
-                    sink, RunReport("unknown" if told else "step", (f"{event_text(step)}: {changes}", *told))
+                    sink, RunReport("unknown" if sentences else "step", (f"{event_text(step)}: {changes}", *sentences))
                 )
             case HistoryMove.UNDO:
                 step_back = run.undo()
@@ -274,10 +274,10 @@ class Playground:
             return run.step(event, *given, to=ways[way].parts)
         if len(ways) <= 1:
             return run.step(event, *given)
-        told = f"{event} can lead to {len(ways)} states: choose one beside its button"
-        told += f", which offers the first {MAXIMUM_WAYS}" if len(ways) > MAXIMUM_WAYS else ""
-        told += ", or enter its data" if run.data_fields(event) else ""
-        return RunReport("choose", (told,), Choice(event, line, distinguishing_parts(ways)[:MAXIMUM_WAYS]))
+        sentence = f"{event} can lead to {len(ways)} states: choose one beside its button"
+        sentence += f", which offers the first {MAXIMUM_WAYS}" if len(ways) > MAXIMUM_WAYS else ""
+        sentence += ", or enter its data" if run.data_fields(event) else ""
+        return RunReport("choose", (sentence,), Choice(event, line, distinguishing_parts(ways)[:MAXIMUM_WAYS]))
 
     def _saved(self, form: Form) -> tuple[str, str]:
         """Name and text of a file.
@@ -302,10 +302,10 @@ class Playground:
         if len(self._run) or is_same:
             return
         self._own = kept.own or self._own
-        told = await self._repeat(kept.own or self._made, kept.beginning, kept.history)
+        sentences = await self._repeat(kept.own or self._made, kept.beginning, kept.history)
         if kept.own is not None:
             await self._define(sink)
-        report = ("changed", told) if told else ("step", ("what this page did before is here again",))
+        report = ("changed", sentences) if sentences else ("step", ("what this page did before is here again",))
         await self._show(sink, RunReport(*report))
 
     @property
@@ -363,12 +363,12 @@ class Playground:
             # Its warning alone is news.
             await self._show(sink, RunReport())
             return
-        told = list(await asyncio.to_thread(model_changes, before, after))
-        told += await self._repeat(after, self._initial_parts, self._run.history)
+        sentences = list(await asyncio.to_thread(model_changes, before, after))
+        sentences += await self._repeat(after, self._initial_parts, self._run.history)
         await self._define(sink)
-        await self._show(sink, RunReport("changed", ("the model has changed", *told)))
+        await self._show(sink, RunReport("changed", ("the model has changed", *sentences)))
 
-    # What is told
+    # What is reported
 
     def _initial_report(self) -> RunReport:
         """Report of where a run has begun; an empty one where there is no choice."""
@@ -377,8 +377,8 @@ class Playground:
             return RunReport()
         offered = f", of which the first {MAXIMUM_WAYS} are offered" if count > MAXIMUM_WAYS else ""
         where = distinguishing_parts(self._made.beginnings)[self._beginning]
-        told = f"there are {count} states to begin in{offered}, and this begins where {where}"
-        return RunReport("step", (f"{told}: choose another one, and restart",))
+        sentence = f"there are {count} states to begin in{offered}, and this begins where {where}"
+        return RunReport("step", (f"{sentence}: choose another one, and restart",))
 
     async def _define(self, sink: Sink) -> None:
         robot = await asyncio.to_thread(playable, self._made, self._scene)
@@ -388,9 +388,9 @@ class Playground:
     async def _show(self, sink: Sink, report: RunReport) -> None:
         run = self._run
         history = run.history
-        # A trouble that is as it was when it was told before is not told again.
+        # A trouble that is as it was when it was reported before is not reported again.
         same = 0
-        while same < min(len(history), len(self._entries)) and self._told[same] is history[same]:
+        while same < min(len(history), len(self._entries)) and self._reported[same] is history[same]:
             same += 1
         sink.replay_jumped()
         del self._entries[same:]
@@ -398,7 +398,7 @@ class Playground:
         for number, step in enumerate(history[same:], start=same + 1):
             before = history[number - 2].state if number > 1 else run.initial
             self._entries.append(self._entries_of(before, step, number))
-        self._told = history
+        self._reported = history
         sink.begin(state_by_component(history[same - 1].state if same else run.initial))
         new = [entry for entries in self._entries[same:] for entry in entries]
         if new:

@@ -220,7 +220,7 @@ class _Watch:
                 _settle(self._loop, self._next, response)
         except Exception as error:
             why = _translated(error)
-        # What ended it is the last thing to be told, after the response before it was taken.
+        # What ended it is the last thing to be reported, after the response before it was taken.
         self._go.acquire()
         if not self._is_over:
             _settle(self._loop, self._next, error=why)
@@ -233,37 +233,37 @@ def _pass_on(response: WatchResponse, sink: Sink) -> None:
         sink.show(status_of(response.snapshot))
     if response.HasField("scan"):
         pose = response.snapshot.drive.pose if response.snapshot.HasField("drive") else None
-        told = None if pose is None else (pose.x_m, pose.y_m, pose.heading_rad)
-        sink.show_scan(LaserScan(list(response.scan.ranges_m), told))
+        place = None if pose is None else (pose.x_m, pose.y_m, pose.heading_rad)
+        sink.show_scan(LaserScan(list(response.scan.ranges_m), place))
 
 
-def robot_from(told: Any, scene: Any = None) -> Robot:
+def robot_from(answer: Any, scene: Any = None) -> Robot:
     """The robot that a bridge defines.
 
     Raises:
         DefinitionError: It makes no sense.
     """
-    supervisor = _supervisor(told)
-    channels = {item.name: item.channel for item in told.communications}
+    supervisor = _supervisor(answer)
+    channels = {item.name: item.channel for item in answer.communications}
     if supervisor is not None:
         return robot_of(
-            supervisor, SourceKind.BRIDGE, version=told.version, channels=channels, can_command=True, scene=scene
+            supervisor, SourceKind.BRIDGE, version=answer.version, channels=channels, can_command=True, scene=scene
         )
     try:
-        shape = shape_of(json.loads(told.definition))
+        shape = shape_of(json.loads(answer.definition))
     except (ValueError, RecursionError) as error:
         raise DefinitionError(f"the robot's definition is malformed: {str(error)[:300]}") from error
     table: dict[str, dict[str, dict[str, int]]] = {}
-    for item in told.transitions:
+    for item in answer.transitions:
         table.setdefault(item.event, {}).setdefault(item.component, {})[item.state] = item.id
     return Robot(
         source=SourceKind.BRIDGE,
-        version=told.version,
-        is_layer=told.is_layer,
+        version=answer.version,
+        is_layer=answer.is_layer,
         shape=shape,
         communications=tuple(
             CommunicationInfo(item.name, item.component, _KINDS.get(item.kind, ""), item.identifier, item.channel)
-            for item in told.communications
+            for item in answer.communications
         ),
         table=table,
         supervisor=None,
@@ -272,9 +272,9 @@ def robot_from(told: Any, scene: Any = None) -> Robot:
     )
 
 
-def _supervisor(told: Any) -> Supervisor | None:
+def _supervisor(answer: Any) -> Supervisor | None:
     try:
-        return decode(told.supervisor) if told.supervisor else None
+        return decode(answer.supervisor) if answer.supervisor else None
     except RoboscError as error:
         # A later bridge may have another format: all but the reasons is shown.
         _log.warning("the bridge's supervisor cannot be read, so that reasons are not known: %s", error)

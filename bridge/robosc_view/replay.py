@@ -24,13 +24,13 @@ from robosc_view.reports import EventBatch, LogSpan, SourceKind, Status
 from robosc_view.sources import Pause, Play, RefusedError, ReplayCommand, Seek, Sink, ViewError
 
 HISTORY = 200
-"""Entries before the place that is gone to which are told again."""
+"""Entries before the place that is gone to which are reported again."""
 
 MAXIMUM_STOPS = 50
 """Stops that hold at the same time; of more the oldest are forgotten. A robot has as many as it has sensors."""
 
 MOST_AT_ONCE = 2000
-"""Entries that are told in one step of a replay; those before them count as lost."""
+"""Entries that are reported in one step of a replay; those before them count as lost."""
 
 STEP_S = 0.04
 """Between two steps of a replay."""
@@ -246,7 +246,7 @@ class Replay:
         loop = asyncio.get_running_loop()
         player = self._player
         await sink.define(self._recording.robot)
-        told = self._go_to(sink)
+        shown = self._go_to(sink)
         last_s = loop.time()
         while True:
             if player.is_playing:
@@ -263,9 +263,9 @@ class Replay:
             for command in commands:
                 player.control_replay(command)
             if player.time_s != before_s or any(isinstance(command, Seek) for command in commands):
-                told = self._go_to(sink)
+                shown = self._go_to(sink)
             else:
-                told = self._go_on(sink, told)
+                shown = self._go_on(sink, shown)
 
     async def order(self, command: OperatorCommand, by: str) -> None:
         """Not here: it is over.
@@ -283,11 +283,11 @@ class Replay:
         self._is_steered.set()
 
     def _go_to(self, sink: Sink) -> int:
-        """Tell a place anew, with what came before it; returns how many entries were told."""
+        """Send a place anew, with what came before it; returns how many entries were reported."""
         count = self._recording.count(self._player.time_s)
         first = max(count - HISTORY, 0)
         sink.replay_jumped()
-        self._tell_position(sink)
+        self._send_position(sink)
         sink.begin(self._recording.frame(first).components)
         entries: Sequence[Any] = self._recording.documents[first:count]
         if entries:
@@ -295,19 +295,19 @@ class Replay:
         sink.show(self._status(count))
         return count
 
-    def _go_on(self, sink: Sink, told: int) -> int:
+    def _go_on(self, sink: Sink, shown: int) -> int:
         """Tell what happened since the last step."""
         count = self._recording.count(self._player.time_s)
-        if count > told:
-            first = max(told, count - MOST_AT_ONCE)
+        if count > shown:
+            first = max(shown, count - MOST_AT_ONCE)
             sink.begin(self._recording.frame(first).components)
             entries: Sequence[Any] = self._recording.documents[first:count]
-            sink.append_events(EventBatch(entries, first - told), first + 1)
-        self._tell_position(sink)
+            sink.append_events(EventBatch(entries, first - shown), first + 1)
+        self._send_position(sink)
         sink.show(self._status(count))
-        return max(count, told)
+        return max(count, shown)
 
-    def _tell_position(self, sink: Sink) -> None:
+    def _send_position(self, sink: Sink) -> None:
         sink.show_position(self._player.time_s, self._player.speed, is_playing=self._player.is_playing)
 
     def _status(self, count: int) -> Status:

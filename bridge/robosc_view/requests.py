@@ -60,7 +60,7 @@ class TakeEvent:
 
     Attributes:
         line: The event with its data, as in a file of events.
-        way: Number of the state that it leads to, of those that were told; None: there is one.
+        way: Number of the state that it leads to, of those that were reported; None: there is one.
     """
 
     line: str

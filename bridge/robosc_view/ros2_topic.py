@@ -220,17 +220,17 @@ def _components(current: object) -> Mapping[str, Mapping[str, Any]]:
     return current
 
 
-def _communications(told: object, robot: Robot) -> Mapping[str, str]:
+def _communications(locations: object, robot: Robot) -> Mapping[str, str]:
     """Return the locations of services and actions; empty for a node that does not report them."""
-    if told is None:
+    if locations is None:
         return {}
-    if not isinstance(told, dict):
+    if not isinstance(locations, dict):
         raise DefinitionError("where services and actions are makes no sense on /state")
     places = {info.name: _PLACES.get(info.kind, ()) for info in robot.communications}
-    for name, place in told.items():
+    for name, place in locations.items():
         if place not in places.get(name, ()):
             raise DefinitionError(f"where '{name[:100]}' is makes no sense on /state")
-    return told
+    return locations
 
 
 @dataclass
@@ -342,7 +342,7 @@ class _Listener:
         except Exception as error:
             failure = SourceLostError(f"ROS 2: {error}")
         if not self._is_over:
-            self._tell(failure=failure)
+            self._notify(failure=failure)
 
     def _listen(self) -> None:
         """Until nothing has come for a while."""
@@ -372,9 +372,9 @@ class _Listener:
     def _hear(self, message: Any) -> None:
         self._heard_s = time.monotonic()
         robot, status, entries = self._reader.read(message.data, time.time())
-        self._tell(_Received(robot, status), entries)
+        self._notify(_Received(robot, status), entries)
 
-    def _tell(
+    def _notify(
         self,
         latest: _Received | None = None,
         entries: list[dict[str, Any]] | None = None,

@@ -55,7 +55,7 @@ class Sink(Protocol):
         """Receive the message `run` of a run that is stepped by hand; the latest alone counts."""
 
     def answer(self, text: str) -> None:
-        """Receive a message that answers a page; each is told once."""
+        """Receive a message that answers a page; each is reported once."""
 
 
 @dataclass(frozen=True, slots=True)

@@ -170,8 +170,8 @@ async def synthesized(words: Sequence[str], text: str | None = None) -> Synthesi
         status, output, errors = await _output("robosc.cli.main", "synth", "--json", "--output", str(made), *words)
         if status != 0:
             raise NoSupervisorError(_reason(output, errors))
-        told = msgspec.json.decode(output, type=_FailureOutput)
-        return SynthesizedModel(read(made), tuple(map(str, told.diagnostics)), text)
+        failure = msgspec.json.decode(output, type=_FailureOutput)
+        return SynthesizedModel(read(made), tuple(map(str, failure.diagnostics)), text)
 
 
 async def synthesized_automata(arguments: argparse.Namespace, text: str | None = None) -> SynthesizedModel:
@@ -256,13 +256,13 @@ class _FailureOutput(msgspec.Struct):
 
 def _reason(output: bytes, errors: bytes) -> str:
     try:
-        told = msgspec.json.decode(output, type=_FailureOutput)
+        failure = msgspec.json.decode(output, type=_FailureOutput)
     except msgspec.DecodeError:
         lines = errors.decode(errors="replace").strip().splitlines()
         return lines[-1] if lines else "synthesis failed"
-    wrong = [item for item in told.diagnostics if item.severity == "error"]
-    if told.error is not None or not wrong:
-        return told.error.message if told.error is not None else told.reason or "synthesis failed"
+    wrong = [item for item in failure.diagnostics if item.severity == "error"]
+    if failure.error is not None or not wrong:
+        return failure.error.message if failure.error is not None else failure.reason or "synthesis failed"
     first = wrong[0]
     place = f"{first.file}, line {first.line}: " if first.file is not None else ""
     more = f" ({len(wrong)} errors)" if len(wrong) > 1 else ""

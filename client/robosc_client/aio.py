@@ -1,4 +1,7 @@
-"""Client for programs on asyncio, with the same methods as `robosc_client.client`."""
+"""Client for programs on asyncio, with the same methods as `robosc_client.client`.
+
+The list of methods is written in both: type checkers then know each signature, awaited here and blocking there.
+"""
 
 import asyncio
 from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapping

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import msgspec
 
+from robosc.certification import Progress
 from robosc.errors import Diagnostic
 from robosc.explanation import EmptyExplanation
 from robosc.expressions import Value
@@ -16,19 +17,6 @@ from robosc.pipeline.results import (
     Verification,
     VerificationStatus,
 )
-
-
-@dataclass(frozen=True, slots=True)
-class Progress:
-    """Progress of long work.
-
-    Attributes:
-        stage: `check`, `synthesis`, `verification` or `controller`.
-        message: One short line.
-    """
-
-    stage: str
-    message: str
 
 
 @dataclass(frozen=True, slots=True)

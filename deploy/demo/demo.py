@@ -74,7 +74,7 @@ def main() -> int:
         progress.end()
         sys.stderr.write(f"demo: {error}\n")
         return 1
-    _tell(outcome, written)
+    _report(outcome, written)
     return 0 if outcome.has_passed else 1
 
 
@@ -96,7 +96,7 @@ def _keep(outcome: Outcome, folder: Path) -> list[Path]:
     return [trajectory, sequence, *map(Path, kept)]
 
 
-def _tell(outcome: Outcome, written: list[Path]) -> None:
+def _report(outcome: Outcome, written: list[Path]) -> None:
     figures = outcome.figures
     sys.stdout.write(
         f"\n{outcome.scene.name}: {figures.get('way_m', 0.0):.1f} m in {figures.get('world_s', 0.0):.0f} s of the world"

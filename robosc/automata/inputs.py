@@ -26,7 +26,7 @@ def valuations(inputs: Iterable[InputVariable], given: Data = NO_DATA) -> Iterat
     Args:
         inputs: The inputs.
         given: Data that is not chosen, None where it is unknown. It counts also where none of the inputs is it: what is
-            known of an array tells of its other elements.
+            known of an array says something about its other elements.
     """
     inputs = dict.fromkeys(inputs)
     paths = {item.path for item in inputs}

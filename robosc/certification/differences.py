@@ -11,7 +11,7 @@ from robosc.expressions.text import expression_text
 from robosc.model.structure import Interface, Model, Transition
 
 MAXIMUM_DIFFERENCES = 20
-"""Differences that are told: where there are more, the models have little in common."""
+"""Differences that are reported: where there are more, the models have little in common."""
 
 _MAXIMUM_TEXT = 120
 
@@ -43,11 +43,11 @@ _EXPRESSIONS = get_args(Expression)
 _TYPES = get_args(Type)
 
 
-def model_differences(told: Model, model: Model) -> tuple[str, ...]:
+def model_differences(stored: Model, model: Model) -> tuple[str, ...]:
     """Return the differences of a supervisor's model from a model; none if they are the same to the last bit.
 
     Args:
-        told: The supervisor's.
+        stored: The supervisor's.
         model: The one it should be.
 
     Raises:
@@ -55,7 +55,7 @@ def model_differences(told: Model, model: Model) -> tuple[str, ...]:
     """
     found: list[str] = []
     try:
-        for difference in _differences("", told, model):
+        for difference in _differences("", stored, model):
             if len(found) == MAXIMUM_DIFFERENCES:
                 return (*found, "and more")
             found.append(difference)
@@ -64,19 +64,19 @@ def model_differences(told: Model, model: Model) -> tuple[str, ...]:
     return tuple(found)
 
 
-def _differences(place: str, told: Any, model: Any) -> Iterator[str]:
+def _differences(place: str, stored: Any, model: Any) -> Iterator[str]:
     # As it is written down, 1 is neither 1.0 nor true.
-    if _ENCODER.encode(told) == _ENCODER.encode(model):
+    if _ENCODER.encode(stored) == _ENCODER.encode(model):
         return
-    if isinstance(told, tuple) and isinstance(model, tuple):
-        yield from _in_rows(place, told, model)
-    elif isinstance(told, msgspec.Struct) and type(told) is type(model) and not _is_leaf(told):
-        for name in told.__struct_fields__:
+    if isinstance(stored, tuple) and isinstance(model, tuple):
+        yield from _in_rows(place, stored, model)
+    elif isinstance(stored, msgspec.Struct) and type(stored) is type(model) and not _is_leaf(stored):
+        for name in stored.__struct_fields__:
             word = _WORDS.get(name, name.replace("_", " "))
             inner = ": ".join(part for part in (place, word) if part)
-            yield from _differences(inner, getattr(told, name), getattr(model, name))
+            yield from _differences(inner, getattr(stored, name), getattr(model, name))
     else:
-        yield f"{place}: {_text(told)} in the supervisor, {_text(model)} in the model"
+        yield f"{place}: {_text(stored)} in the supervisor, {_text(model)} in the model"
 
 
 def _is_leaf(value: Any) -> bool:
@@ -84,18 +84,18 @@ def _is_leaf(value: Any) -> bool:
     return isinstance(value, (*_EXPRESSIONS, *_TYPES, Interface))
 
 
-def _in_rows(place: str, told: tuple[Any, ...], model: tuple[Any, ...]) -> Iterator[str]:
+def _in_rows(place: str, stored: tuple[Any, ...], model: tuple[Any, ...]) -> Iterator[str]:
     """Differences between rows: of things with names by these, of others by their numbers."""
-    names = [_names(row) for row in (told, model)]
-    if names[0] is None or names[1] is None or len(set(names[0])) < len(told) or len(set(names[1])) < len(model):
-        for number, (mine, theirs) in enumerate(zip(told, model, strict=False), start=1):
+    names = [_names(row) for row in (stored, model)]
+    if names[0] is None or names[1] is None or len(set(names[0])) < len(stored) or len(set(names[1])) < len(model):
+        for number, (mine, theirs) in enumerate(zip(stored, model, strict=False), start=1):
             yield from _differences(f"{place} {number}{_hint(mine)}", mine, theirs)
-        for number, item in enumerate(told[len(model) :], start=len(model) + 1):
+        for number, item in enumerate(stored[len(model) :], start=len(model) + 1):
             yield f"{place} {number}{_hint(item)}: in the supervisor only"
-        for number, item in enumerate(model[len(told) :], start=len(told) + 1):
+        for number, item in enumerate(model[len(stored) :], start=len(stored) + 1):
             yield f"{place} {number}{_hint(item)}: in the model only"
         return
-    mine, theirs = dict(zip(names[0], told, strict=True)), dict(zip(names[1], model, strict=True))
+    mine, theirs = dict(zip(names[0], stored, strict=True)), dict(zip(names[1], model, strict=True))
     for name, item in mine.items():
         if name in theirs:
             yield from _differences(f"{place} {name}", item, theirs[name])

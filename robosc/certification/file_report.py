@@ -69,7 +69,7 @@ def file_verification_text(
         document: Document as `file_verification_json` makes it.
         supervisor: Name of the supervisor; empty: the lines begin without one.
         model: Name of the model.
-        is_quiet: True if only what is wrong is told.
+        is_quiet: True if only what is wrong is reported.
     """
     lines: list[str] = []
     checks, is_right = document["checks"], document["status"] == "passed"

@@ -175,9 +175,9 @@ def verify_supervisor_file(
         )
 
     # What the file says of its size decides only what is tried first: a false figure must not prevent the search.
-    told = int(supervisor.certificate.states)
-    report = verified_with(told)
-    if told > limits.states and not report.is_complete:
+    stated = int(supervisor.certificate.states)
+    report = verified_with(stated)
+    if stated > limits.states and not report.is_complete:
         report = verified_with(0)
     found = report.verification
     faults += [Fault("certificate", text) for text in _false_claims(supervisor.certificate, found)]
@@ -187,7 +187,7 @@ def verify_supervisor_file(
             executable,
             supervisor.added,
             is_nonblocking=found.nonblocking is CheckOutcome.PASSED,
-            states=found.states or told,
+            states=found.states or stated,
             semantics=semantics,
             should_stop=should_stop,
         ).certified()
@@ -220,24 +220,24 @@ def _notes(certificate: Certificate, bundle: Bundle | None) -> list[str]:
 def _false_claims(certificate: Certificate, found: Verification) -> list[str]:
     """Return the false claims of a certificate."""
     claims = []
-    for what, told, counted in (
+    for what, stated, counted in (
         ("states", certificate.states, found.states),
         ("transitions", certificate.transitions, found.transitions),
     ):
-        if told is not None and counted is not None and int(told) != counted:
-            claims.append(f"it tells of {told} {what}, there are {counted}")
+        if stated is not None and counted is not None and int(stated) != counted:
+            claims.append(f"it tells of {stated} {what}, there are {counted}")
     for name in PROPERTIES:
         if getattr(certificate, name) == "passed" and getattr(found, name) is CheckOutcome.FAILED:
             claims.append(f"it says '{name.replace('_', ' ')}: passed', which is false")
     return claims
 
 
-def _false_properties(told: ControllerProperties, found: ControllerProperties) -> list[str]:
+def _false_properties(stated: ControllerProperties, found: ControllerProperties) -> list[str]:
     """Return the false claims of a certificate about the controller."""
     return [
         f"it says '{name.replace('_', ' ')} of the controller: passed', which is false"
         for name in ("finite_response", "confluence", "nonblocking")
-        if getattr(told, name) == "passed" and getattr(found, name) == "failed"
+        if getattr(stated, name) == "passed" and getattr(found, name) == "failed"
     ]
 
 
@@ -252,7 +252,7 @@ def _beliefs(certificate: Certificate, found: Verification) -> list[str]:
 
 
 def state_in_words(system: System, model: Model | None, state: State) -> StateInWords:
-    """A state of automata in the words of their model; without one, the location of each automaton is told."""
+    """A state of automata in the words of their model; without one, the location of each automaton is reported."""
     values = {(item.automaton, item.variable): value for item, value in zip(subjects(system), state, strict=True)}
     variables = {f"{owner}.{name}": value for (owner, name), value in values.items() if name is not None}
     if model is None:

@@ -4,8 +4,8 @@ import re
 from bisect import bisect_right
 
 from robosc.cif import syntax
+from robosc.cif.reserved_words import KEYWORDS
 from robosc.cif.tokens import Kind, tokenize
-from robosc.cif.words import KEYWORDS
 from robosc.errors import Diagnostic, Severity
 from robosc.language.limits import MAXIMUM_NAME, MAXIMUM_NESTING, MAXIMUM_SYNTAX_ERRORS
 from robosc.source import Location, SourceFile

@@ -2,8 +2,8 @@
 
 from robosc.cif import syntax
 from robosc.cif.cursor import Cursor
+from robosc.cif.reserved_words import FUNCTIONS
 from robosc.cif.tokens import Kind
-from robosc.cif.words import FUNCTIONS
 from robosc.source import Location
 
 _LEVELS: tuple[frozenset[str], ...] = (

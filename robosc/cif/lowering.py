@@ -355,7 +355,7 @@ class Lowering:
         if all(term.is_static for term, _ in terms):
             values: tuple[Value, ...] = tuple(dict.fromkeys(term.value for term, _ in terms))
             return DiscreteVariable(item.name.text, type_, values)
-        # Each is asked, so that all that synthesis does not take is told.
+        # Each is asked, so that all that synthesis does not take is reported.
         usable = [self.typing.usable(term, at) for term, at in terms]
         if not all(usable):
             return None

@@ -15,8 +15,8 @@ from functools import partial
 from robosc.cif import syntax
 from robosc.cif.cursor import Fault, Stop
 from robosc.cif.expression_parser import ExpressionParser
+from robosc.cif.reserved_words import INPUT_OUTPUT, ROLES
 from robosc.cif.tokens import Kind
-from robosc.cif.words import INPUT_OUTPUT, ROLES
 from robosc.errors import LanguageError
 from robosc.language.limits import MAXIMUM_NESTING
 from robosc.recursion import allow_depth

@@ -7,7 +7,7 @@ import re
 from enum import IntEnum
 from typing import NamedTuple
 
-from robosc.cif.words import KEYWORDS
+from robosc.cif.reserved_words import KEYWORDS
 
 _ID = r"\$?[A-Za-z_][A-Za-z0-9_]*+"
 _WHOLE = r"(?:0|[1-9][0-9]*+)"

@@ -92,20 +92,20 @@ def check(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Exi
     from robosc.pipeline.results import SynthesisStatus
 
     model = loaded(arguments)
-    told: dict[str, object] = {}
+    outcome_json: dict[str, object] = {}
     synthesis = None
     if arguments.synthesize:
         synthesis = machine.synthesize(model, synthesis_options(arguments), is_modular=False)
         if synthesis.status is not SynthesisStatus.MODEL_ERRORS:
-            told = {"status": str(synthesis.status), "reason": synthesis.reason}
+            outcome_json = {"status": str(synthesis.status), "reason": synthesis.reason}
     diagnostics = machine.check(model) if synthesis is None else synthesis.diagnostics
     if arguments.json:
-        print_json({"file": str(arguments.model), **told, **diagnostics_json(diagnostics)})
+        print_json({"file": str(arguments.model), **outcome_json, **diagnostics_json(diagnostics)})
     elif diagnostics:
         print_diagnostics(diagnostics, model)
     else:
         sys.stdout.write(f"{arguments.model}: {counts_text(diagnostics)}\n")
-    if told and synthesis is not None and synthesis.supervisor is None:
+    if outcome_json and synthesis is not None and synthesis.supervisor is None:
         if not arguments.json:
             sys.stderr.write(f"{arguments.model}: {visible(synthesis.reason)}\n")
         return ExitCode.FAILED
@@ -193,7 +193,7 @@ def verify(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Ex
         UsageError: An argument means nothing for it, or it cannot be read.
         UnsupportedModelError: The automata cannot be handled.
     """
-    from robosc.cli.verify import report_malformed
+    from robosc.cli.sign import report_malformed
     from robosc.explanation import from_text
     from robosc.pipeline.results import SynthesisStatus, VerificationStatus
     from robosc.pipeline.systems import system_verification_text
@@ -231,19 +231,18 @@ def _verified(arguments: argparse.Namespace, model: "LoadedAutomata", options: "
         SignatureError: It is not signed as it must be.
         UsageError: A file cannot be read.
     """
-    from robosc.cli.sign import read_supervisor, signer_of
-    from robosc.cli.verify import tell_signer
+    from robosc.cli.sign import read_supervisor, report_signer, signer_of
     from robosc.pipeline.automata_models import file_verification
     from robosc.pipeline.systems import decode_system
     from robosc.verification import Limits
 
     content = read_supervisor(arguments.supervisor)
     if arguments.signed_by:
-        tell_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
+        report_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
     supervisor, limits = decode_system(content), Limits.of(arguments.limit)
     return watched(
-        lambda told: file_verification(
-            model, supervisor, options, limits, told, lambda: False, is_strict=arguments.strict
+        lambda report: file_verification(
+            model, supervisor, options, limits, report, lambda: False, is_strict=arguments.strict
         )
     )
 
@@ -455,13 +454,13 @@ def report_none(
 
     explanation = made.explanation if isinstance(made.explanation, EmptyExplanation) else None
     if arguments.json:
-        told = {
+        outcome_json = {
             "status": str(made.status),
             "reason": made.reason,
             "explanation": document(explanation) if explanation else None,
             **({} if figures is None else {"statistics": figures.document()}),
         }
-        print_json({**told, **diagnostics_json(made.diagnostics)})
+        print_json({**outcome_json, **diagnostics_json(made.diagnostics)})
     else:
         print_diagnostics(made.diagnostics, model)
         if made.reason:

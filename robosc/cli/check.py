@@ -127,8 +127,8 @@ def _synthesized(outcome: "SynthesisOutcome") -> _Synthesized:
 
 def _report_synthesized(arguments: argparse.Namespace, found: _Synthesized, bundle: Bundle) -> ExitCode:
     """Print the findings and what became of the synthesis as asked, and return the exit status."""
-    told = {"status": found.status, **synth.reasons_json(found)}
-    status = report_check(arguments, found.diagnostics, bundle, told)
+    summary = {"status": found.status, **synth.reasons_json(found)}
+    status = report_check(arguments, found.diagnostics, bundle, summary)
     if not arguments.json:
         synth.report_reasons(found, bundle)
     return ExitCode.FAILED if found.has_failed else status
@@ -138,11 +138,11 @@ def report_check(
     arguments: argparse.Namespace,
     diagnostics: tuple[Diagnostic, ...],
     bundle: Bundle | None,
-    told: Mapping[str, object] = MappingProxyType({}),
+    summary: Mapping[str, object] = MappingProxyType({}),
 ) -> ExitCode:
-    """Print the findings, in JSON with what else is told, and return the exit status."""
+    """Print the findings, in JSON with what else is reported, and return the exit status."""
     if arguments.json:
-        print_json({"file": str(arguments.model), **told, **diagnostics_json(diagnostics)})
+        print_json({"file": str(arguments.model), **summary, **diagnostics_json(diagnostics)})
     elif diagnostics:
         print_diagnostics(diagnostics, bundle)
     else:

@@ -78,8 +78,10 @@ def run(arguments: argparse.Namespace) -> int:
         )
     else:
         motion = ", with the robot's motion" if converted.has_motion else ""
-        told = f"{converted.messages} messages on {len(converted.topics)} topics of {converted.entries} entries{motion}"
-        sys.stdout.write(visible(f"{converted.path}: {told}") + "\n")
+        contents = (
+            f"{converted.messages} messages on {len(converted.topics)} topics of {converted.entries} entries{motion}"
+        )
+        sys.stdout.write(visible(f"{converted.path}: {contents}") + "\n")
         if layout is not None:
             sys.stdout.write(visible(f"{layout}: a layout for Foxglove") + "\n")
         sys.stdout.write("".join(f"note: {visible(note)}\n" for note in converted.notes))

@@ -84,7 +84,7 @@ class ThisMachine:
         # Not `robosc.synthesize`: it loads what models of RoboSC need.
         from robosc.pipeline.automata_models import automata_synthesis
 
-        return watched(lambda told: automata_synthesis(model, options, told, lambda: False, is_modular=is_modular))
+        return watched(lambda report: automata_synthesis(model, options, report, lambda: False, is_modular=is_modular))
 
     def write_supervisor(self, output: "Path", made: "SystemSupervisor") -> None:
         """Write a supervisor's file."""
@@ -94,7 +94,7 @@ class ThisMachine:
         """Return the graph of the controlled system."""
         from robosc.pipeline.exploring import explore
 
-        return watched(lambda told: explore(model, options, maximum_states=maximum_states, on_progress=told))
+        return watched(lambda report: explore(model, options, maximum_states=maximum_states, on_progress=report))
 
     def verify(
         self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int, is_strict: bool
@@ -103,8 +103,8 @@ class ThisMachine:
         from robosc.pipeline.verifying import verify
 
         return watched(
-            lambda told: verify(
-                model, options=options, maximum_states=maximum_states, is_strict=is_strict, on_progress=told
+            lambda report: verify(
+                model, options=options, maximum_states=maximum_states, is_strict=is_strict, on_progress=report
             )
         )
 
@@ -120,7 +120,7 @@ class ThisMachine:
         """Generate the files of a target."""
         from robosc.pipeline.generating import generate
 
-        return watched(lambda told: generate(model, target, generation, options, initial=initial, on_progress=told))
+        return watched(lambda report: generate(model, target, generation, options, initial=initial, on_progress=report))
 
     def explain(
         self,
@@ -134,7 +134,9 @@ class ThisMachine:
         """Explain what synthesis does to the automata."""
         from robosc.pipeline.explaining import explain
 
-        return watched(lambda told: explain(model, options, event=event, state=state, after=after, on_progress=told))
+        return watched(
+            lambda report: explain(model, options, event=event, state=state, after=after, on_progress=report)
+        )
 
 
 def watched[T](work: "Callable[[OnProgress], T]") -> T:

@@ -30,7 +30,7 @@ class WrongArguments(SystemExit):
 class Parser(argparse.ArgumentParser):
     """A parser that says what is wrong in its exception, too; so do those of its commands.
 
-    One that has commands, and is given nothing at all, prints its help; it tells of options before the command.
+    One that has commands, and is given nothing at all, prints its help; it reports options before the command.
     """
 
     def parse_known_args(self, args: Any = None, namespace: Any = None) -> Any:
@@ -77,7 +77,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def parse(parser: Parser, argv: Sequence[str] | None) -> argparse.Namespace:
-    """The arguments; where `--json` is one of those that are wrong, that is told on standard output, too.
+    """The arguments; where `--json` is one of those that are wrong, that is reported on standard output, too.
 
     Raises:
         SystemExit: They are wrong, or ask for help.
@@ -152,5 +152,5 @@ def _print_error(status: int, message: str, diagnostics: Sequence[Diagnostic] = 
         print_json({"error": {"status": int(status), "message": message, **found}})
         sys.stdout.flush()
     except OSError:
-        # It was told on standard error.
+        # It was reported on standard error.
         sys.stdout = None

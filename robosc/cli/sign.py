@@ -1,4 +1,4 @@
-"""`robosc key` and `robosc sign`: key pairs, and signatures of supervisor files."""
+"""`robosc key` and `robosc sign`: key pairs, and signatures of supervisor files; reports about supervisor files."""
 
 import argparse
 import sys
@@ -14,7 +14,7 @@ from robosc.pipeline.files import FileAccessError, read_bounded
 from robosc.source import visible
 
 if TYPE_CHECKING:
-    from robosc.signatures import PublicKey
+    from robosc.signatures import PublicKey, SignatureError
 
 _KEY = """\
 Make a key pair for signing supervisor files: NAME.key, the private key, which only its owner may read and which has no
@@ -153,3 +153,20 @@ def _read(file: Path, most: int) -> bytes:
         return read_bounded(file, most)
     except FileAccessError as error:
         raise UsageError(str(error)) from error
+
+
+def report_signer(arguments: argparse.Namespace, key: "PublicKey") -> None:
+    """Print whose signature it is, unless the output is JSON or quiet."""
+    if not arguments.quiet and not arguments.json:
+        sys.stdout.write(visible(f"{arguments.supervisor}: signed by {key}") + "\n")
+
+
+def report_malformed(arguments: argparse.Namespace, error: "InvalidSupervisorError | SignatureError") -> ExitCode:
+    """Print that a file is no supervisor, or not signed as it must be, and return the exit status."""
+    from robosc.certification.file_report import malformed_json
+
+    if arguments.json:
+        print_json(malformed_json(error))
+    else:
+        sys.stderr.write(f"{arguments.supervisor}: {visible(str(error))}\n")
+    return ExitCode.FAILED

@@ -41,7 +41,7 @@ EVENT [DATA] [-> STATE]    an event: press, sensor true, take -> Buffer = full w
 
 _MOST = 1_000_000
 _MOST_TOLD = 20
-"""Steps of a walk that are told at once."""
+"""Steps of a walk that are reported at once."""
 
 
 class _CommandFault(Exception):
@@ -77,7 +77,7 @@ class Shell:
     def loop(self, stream: TextIO) -> int:
         """Do the commands of a stream until it ends; returns the exit status.
 
-        On a terminal what cannot be done is told, and the next command read; elsewhere it ends everything.
+        On a terminal what cannot be done is reported, and the next command read; elsewhere it ends everything.
         """
         is_terminal = stream.isatty()
         if is_terminal:
@@ -252,8 +252,8 @@ class Shell:
 
 
 def _carried(fields: Sequence[DataField]) -> str:
-    told = [f"{item.name}: {' | '.join(item.choices) or item.type}" for item in fields if item.is_read]
-    return f"  ({', '.join(told)})" if told else ""
+    texts = [f"{item.name}: {' | '.join(item.choices) or item.type}" for item in fields if item.is_read]
+    return f"  ({', '.join(texts)})" if texts else ""
 
 
 def _no_words(name: str, words: Sequence[str]) -> None:

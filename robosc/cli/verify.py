@@ -14,15 +14,15 @@ from robosc.cli.arguments import (
     read_bundle,
 )
 from robosc.cli.output import ExitCode, ProgressLine, UsageError, print_diagnostics, print_json
-from robosc.cli.sign import name_and_deployment, read_supervisor, signer_of
+from robosc.cli.sign import name_and_deployment, read_supervisor, report_malformed, report_signer, signer_of
 from robosc.errors import Diagnostic, InvalidSupervisorError
 from robosc.model.structure import Deployment
 from robosc.pipeline.options import FOREIGN_STATES
 from robosc.signatures import SignatureError
-from robosc.source import Bundle, visible
+from robosc.source import Bundle
 
 if TYPE_CHECKING:
-    from robosc.signatures import PublicKey
+    pass
 
 _USAGE = """robosc verify [options] FILE.rsup MODEL
        robosc verify [options] [FILE.rsup] MODEL --property PROPERTY
@@ -133,7 +133,7 @@ def _verify_supervisor(arguments: argparse.Namespace) -> int:
     bundle = read_bundle(arguments)
     try:
         if arguments.signed_by:
-            tell_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
+            report_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
         supervisor = decode(content)
     except (InvalidSupervisorError, SignatureError) as error:
         return report_malformed(arguments, error)
@@ -203,22 +203,5 @@ def _verify_signature(arguments: argparse.Namespace) -> int:
     if arguments.json:
         print_json({"status": "signed", "model": name, "deployment": deployment, "signed_by": key.fingerprint})
     else:
-        tell_signer(arguments, key)
+        report_signer(arguments, key)
     return ExitCode.OK
-
-
-def tell_signer(arguments: argparse.Namespace, key: "PublicKey") -> None:
-    """Print whose signature it is, for people who are not to be left in peace."""
-    if not arguments.quiet and not arguments.json:
-        sys.stdout.write(visible(f"{arguments.supervisor}: signed by {key}") + "\n")
-
-
-def report_malformed(arguments: argparse.Namespace, error: InvalidSupervisorError | SignatureError) -> ExitCode:
-    """Print that a file is no supervisor, or not signed as it must be, and return the exit status."""
-    from robosc.certification.file_report import malformed_json
-
-    if arguments.json:
-        print_json(malformed_json(error))
-    else:
-        sys.stderr.write(f"{arguments.supervisor}: {visible(str(error))}\n")
-    return ExitCode.FAILED

@@ -167,7 +167,7 @@ def _shortened(space: Space, words: Words, cubes: list[Cube], wanted: Node) -> l
 
 
 def _shortest(space: Space, words: Words, variable: int, low: int, high: int) -> int:
-    """The set of classes between two sets that is told in the fewest words, as far as it is found; rather one range."""
+    """The set of classes between two sets that takes the fewest words, as far as it is found; rather one range."""
     candidates = [_filled(space, variable, low, high)] if variable in space.integers else []
     candidates += [_stepwise(words, variable, high, high & ~low), _stepwise(words, variable, low, high & ~low)]
 

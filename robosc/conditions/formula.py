@@ -207,19 +207,19 @@ class _Formulas:
     def _described(self, description: Description, is_negated: bool) -> list[Expression] | None:
         """The parts of a description, or of its negation; None where one of them has no formula."""
         operator: BinaryOperator = "or" if is_negated else "and"
-        told = [self._relations.expression(item.opposite if is_negated else item) for item in description.relations]
+        terms = [self._relations.expression(item.opposite if is_negated else item) for item in description.relations]
         if description.single != 1:
             single = self._space.without(1, description.single) if is_negated else description.single
             part = self.shortest(single)
             if part is None:
                 return None
-            told += spine(operator, part)
+            terms += spine(operator, part)
         if description.inner is not None:
             inner = self._described(description.inner, not is_negated)
             if inner is None:
                 return None
-            told += spine(operator, self._join("and" if is_negated else "or", inner))
-        return told
+            terms += spine(operator, self._join("and" if is_negated else "or", inner))
+        return terms
 
     def _divided(self, node: Node, tested: Iterable[int]) -> Iterator[Expression]:
         """Yield formulas by cases over each place's values: what is left for a case may be relations alone."""
@@ -233,17 +233,17 @@ class _Formulas:
     def _cases(self, variable: int, outcomes: dict[Node, int]) -> Iterator[Expression]:
         """Tests of one place, each with what is left for its values."""
         parts = {outcome: self.shortest(outcome) for outcome in outcomes if outcome > 1}
-        told = []
+        terms = []
         for outcome, mask in outcomes.items():
             part = parts.get(outcome, TRUE)
             if part is None:
                 return
             if outcome == 1 or (outcome and 1 in outcomes and len(outcomes) == 2):
                 # What is true for the other values needs no test of its own.
-                told.append(part if outcome > 1 else self._words.test(variable, mask))
+                terms.append(part if outcome > 1 else self._words.test(variable, mask))
             elif outcome:
-                told.append(self._join("and", [self._words.test(variable, mask), part]))
-        yield self._join("or", told)
+                terms.append(self._join("and", [self._words.test(variable, mask), part]))
+        yield self._join("or", terms)
         if len(parts) == len(outcomes) == 2:
             yield from self._choice(variable, outcomes)
 

@@ -123,7 +123,7 @@ def size(expression: Expression) -> Size:
 
 
 def _length(text: str) -> int:
-    """Characters of a text in which `!` will be told as `not`."""
+    """Characters of a text in which `!` will be written as `not`."""
     return len(text) + 3 * (text.count("!") - text.count("!="))
 
 

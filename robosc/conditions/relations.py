@@ -305,7 +305,7 @@ class Relations:
         return replace(description, relations=tuple(found))
 
     def _shortest(self, relation: Relation, last: int) -> Relation:
-        """The relation with the bound, from its own to the last, that is told in the fewest words."""
+        """The relation with the bound, from its own to the last, that takes the fewest words."""
         low, high = min(relation.bound, last), max(relation.bound, last)
         bounds = [relation.bound, *(bound for bound in (0, -1, 1, last) if low <= bound <= high)]
         found = [replace(relation, bound=bound) for bound in bounds]

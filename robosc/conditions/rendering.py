@@ -1,7 +1,7 @@
 """The supervisor's conditions in the model's words: a short formula, else the decision diagram node by node.
 
-The diagram is told as numbered lines that read from the top down, each in the language's own `if ... then ... else`,
-where `[n]` stands for line n; a line is told once however often it is needed, so the text is never larger than the
+The diagram is written as numbered lines that read from the top down, each in the language's own `if ... then ... else`,
+where `[n]` stands for line n; a line is written once however often it is needed, so the text is never larger than the
 diagram.
 """
 
@@ -165,7 +165,7 @@ def _branches(diagram: DecisionDiagram, domains: Domains) -> tuple[list[Branches
 
 
 def _order(branches: list[Branches], leads_to: list[int], root: int) -> list[int]:
-    """The numbers of the nodes that the text tells, in its order."""
+    """The numbers of the nodes in the text, in its order."""
     needed = {leads_to[root]}
     for number in reversed(range(2, len(leads_to))):
         if number in needed:
@@ -183,11 +183,11 @@ def _line(
 ) -> Line:
     subject = (node.automaton, node.variable)
     tests = [(vocabulary.test(subject, where), child) for child, where in branches.items()]
-    # The longest test goes without saying; where all is decided, what it takes to be true is told.
+    # The longest test goes without saying; where all is decided, what it takes to be true is written.
     is_decided = all(child < 2 for child in branches)
     *cases, (_, last) = sorted(tests, key=lambda case: (-case[1] if is_decided else 0, case[0].size))
-    told = tuple((test, _reached(child, numbers)) for test, child in cases)
-    return Line(number, told, _reached(last, numbers))
+    targets = tuple((test, _reached(child, numbers)) for test, child in cases)
+    return Line(number, targets, _reached(last, numbers))
 
 
 def _reached(child: int, numbers: Mapping[int, int]) -> Target:

@@ -17,13 +17,13 @@ _WIDTH = 100
 """Columns that a condition takes in the summary for people; it goes on in the next line."""
 
 _NODES = 150
-"""Nodes that the diagrams in a text for people may have together; what is beyond is told by its size."""
+"""Nodes that the diagrams in a text for people may have together; a larger one is replaced by its size."""
 
 FROM_THE_FIRST = ", to be read from [1] on:"
 """Words between a diagram's size and its nodes."""
 
 ELSEWHERE = "; --json tells it node by node"
-"""Words after the size of a diagram that is not told node by node."""
+"""Words after the size of a diagram that is not written node by node."""
 
 _TRUE = DecisionDiagram((), 1)
 
@@ -154,7 +154,7 @@ def added_lines(supervisor: Supervisor, system: System) -> list[str]:
 
 
 def short_diagrams(diagrams: Iterable[DecisionDiagram]) -> set[DecisionDiagram]:
-    """Return those of some diagrams that a text tells node by node: the first ones that have few nodes together."""
+    """Return those of some diagrams that a text writes node by node: the first ones that have few nodes together."""
     found, left = set(), _NODES
     for diagram in diagrams:
         if len(diagram.nodes) <= left:

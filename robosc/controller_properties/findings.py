@@ -79,12 +79,12 @@ def _conflict(model: Model, system: System, places: Places, conflict: Conflict) 
 
 def _order_words(model: Model, system: System, order: Order, beside: Order) -> str:
     """An order and where it ends, as far as that is not where another one ends."""
-    told = _listed((*order.events, *order.cycle))
+    listed = _listed((*order.events, *order.cycle))
     if order.end is None:
-        return f"{told} never ends"
+        return f"{listed} never ends"
     if beside.end is None:
-        return f"{told} ends"
-    return f"{told} ends with {_difference(model, system, order.end, beside.end)}"
+        return f"{listed} ends"
+    return f"{listed} ends with {_difference(model, system, order.end, beside.end)}"
 
 
 def _difference(model: Model, system: System, state: State, other: State) -> str:

@@ -168,7 +168,7 @@ def parse_page(code: str, markdown: str) -> Page:
     """The page in a text.
 
     Raises:
-        InternalError: It does not have the shape of a page; `code` is told.
+        InternalError: It does not have the shape of a page; the message names `code`.
     """
     head = _HEAD.fullmatch(markdown)
     if head is None or head["code"] != code:

@@ -81,25 +81,25 @@ def examine(machine: Machine, purposes: Iterable[Purpose] = (), server: str | No
     Args:
         machine: The machine.
         purposes: Purposes that it is to serve, besides checking, synthesizing and generating. Only what these need is
-            `MISSING`; without any, all parts are told.
+            `MISSING`; without any, all parts are reported.
         server: `HOST` or `HOST:PORT` of a synthesis server that it is to reach; None: none.
     """
     wanted = frozenset(purposes)
     needed, is_all = wanted or frozenset({Purpose.SYNTH}), not wanted
 
-    def is_told(*parts: Purpose) -> bool:
+    def is_listed(*parts: Purpose) -> bool:
         return is_all or not needed.isdisjoint(parts)
 
-    found = [*_python(machine), *_packages(machine, needed, all_told=is_all)]
-    if is_told(Purpose.ROS2):
+    found = [*_python(machine), *_packages(machine, needed, all_parts=is_all)]
+    if is_listed(Purpose.ROS2):
         found += _ros2(machine, Purpose.ROS2 in needed)
-    if is_told(Purpose.ROS1):
+    if is_listed(Purpose.ROS1):
         found += _ros1(machine, Purpose.ROS1 in needed)
-    if is_told(Purpose.ROS1, Purpose.ROS2):
+    if is_listed(Purpose.ROS1, Purpose.ROS2):
         found += _tools(machine, needed)
-    if is_told(Purpose.BRIDGE):
+    if is_listed(Purpose.BRIDGE):
         found += _ports(machine, Purpose.BRIDGE in needed)
-    if is_told(Purpose.VIEW):
+    if is_listed(Purpose.VIEW):
         found += _browser(machine)
     if server is not None:
         found += _server(machine, server)
@@ -123,7 +123,7 @@ def _python(machine: Machine) -> Iterator[Finding]:
         yield Finding("Python", Grade.OK, f"{version} ({machine.python})")
 
 
-def _packages(machine: Machine, needed: frozenset[Purpose], *, all_told: bool) -> Iterator[Finding]:
+def _packages(machine: Machine, needed: frozenset[Purpose], *, all_parts: bool) -> Iterator[Finding]:
     """RoboSC's own packages, and those of its extras."""
     requirements = machine.requirements()
     if requirements is None:
@@ -149,7 +149,7 @@ def _packages(machine: Machine, needed: frozenset[Purpose], *, all_told: bool) -
         )
     wanted = {_EXTRAS[purpose] for purpose in needed if purpose in _EXTRAS}
     for extra in _TOLD_EXTRAS:
-        if all_told or extra in wanted:
+        if all_parts or extra in wanted:
             parts = _required(requirements, extra)
             yield _extra(
                 machine, f"extra {extra}", parts, is_needed=extra in wanted, fix=f"pip install 'robosc[{extra}]'"
@@ -166,7 +166,7 @@ def _kernel() -> Finding:
 
 
 def _extra(machine: Machine, part: str, required: list[tuple[str, str]], *, is_needed: bool, fix: str) -> Finding:
-    lacking, told = [], []
+    lacking, listed = [], []
     for package, bound in required:
         version = machine.version(package)
         if version is None:
@@ -174,10 +174,10 @@ def _extra(machine: Machine, part: str, required: list[tuple[str, str]], *, is_n
         elif not _is_enough(version, bound):
             lacking.append(f"{package} {bound} (there is {version})")
         else:
-            told.append(f"{package} {version}")
+            listed.append(f"{package} {version}")
     if lacking:
         return Finding(part, _lack(is_needed), f"not installed: {', '.join(lacking)}", fix)
-    return Finding(part, Grade.OK, ", ".join(told))
+    return Finding(part, Grade.OK, ", ".join(listed))
 
 
 _REQUIREMENT = re.compile(r"([A-Za-z0-9._-]+)(?:\[[^\]]*\])?\s*([<>=!~][^;]*)?(?:;(.*))?")
@@ -270,8 +270,8 @@ def _tools(machine: Machine, needed: frozenset[Purpose]) -> Iterator[Finding]:
     """Programs that build generated packages."""
     catkin = ("catkin_make", "catkin_make_isolated", "catkin")
     both = frozenset({Purpose.ROS1, Purpose.ROS2})
-    # Where no ROS is needed all of them are told, and none is missed.
-    told = needed & both or both
+    # Where no ROS is needed all of them are reported, and none is missed.
+    listed = needed & both or both
     for part, names, builders, what, fix in (
         ("colcon", ("colcon",), {Purpose.ROS2}, "builds ROS 2 packages", "pip install colcon-common-extensions"),
         ("catkin", catkin, {Purpose.ROS1}, "builds ROS 1 packages", f"{_APT}catkin"),
@@ -279,7 +279,7 @@ def _tools(machine: Machine, needed: frozenset[Purpose]) -> Iterator[Finding]:
         ("C++ compiler", ("c++", "g++", "clang++"), (), "builds the targets ros2-cpp and ros1-cpp", f"{_APT}g++"),
         ("CMake", ("cmake",), (), "builds ROS packages in C++ and with interfaces", f"{_APT}cmake"),
     ):
-        if builders and told.isdisjoint(builders):
+        if builders and listed.isdisjoint(builders):
             continue
         paths = list(filter(None, map(machine.find_program, names)))
         if paths:

@@ -1,7 +1,7 @@
 """The page of a robot, section by section, from the checked model alone.
 
 The same model gives the same bytes: everything stands in the model's own order, and no time, version or
-place of a file is told.
+place of a file is reported.
 """
 
 from collections.abc import Callable, Sequence

@@ -51,9 +51,9 @@ def hover_text(
 def _used(holders: Sequence[str]) -> str:
     if not holders:
         return "not used"
-    told = [f"{holder} ({count} times)" if count > 1 else holder for holder, count in Counter(holders).items()]
-    more = [f"{len(told) - _MOST_PLACES} more"] if len(told) > _MOST_PLACES else []
-    return "used by " + ", ".join([*told[:_MOST_PLACES], *more])
+    names = [f"{holder} ({count} times)" if count > 1 else holder for holder, count in Counter(holders).items()]
+    more = [f"{len(names) - _MOST_PLACES} more"] if len(names) > _MOST_PLACES else []
+    return "used by " + ", ".join([*names[:_MOST_PLACES], *more])
 
 
 def _arcs(automaton: Automaton) -> str:

@@ -107,7 +107,7 @@ def bands_of(run: LoggedRun, begin_s: float, end_s: float) -> tuple[tuple[Band, 
         end_s: Its end.
     """
     states = _changes(run, lambda state: ((name, part["state"]) for name, part in state.items()))
-    return _chosen([_band(name, told, begin_s, end_s) for name, told in states.items()], "components")
+    return _chosen([_band(name, samples, begin_s, end_s) for name, samples in states.items()], "components")
 
 
 def variables_of(
@@ -141,13 +141,13 @@ def variables_of(
             raise PlotError(f"no variable of the log is called '{pattern}'; there are {known}")
         wanted |= found
     bands, curves = [], []
-    for name, told in changes.items():
+    for name, samples in changes.items():
         if name in wanted:
-            kind = common_kind({kind_of(value) for _, value in told if value is not None})
+            kind = common_kind({kind_of(value) for _, value in samples if value is not None})
             if kind.is_number:
-                curves.append(_curve(name, told, begin_s, end_s))
+                curves.append(_curve(name, samples, begin_s, end_s))
             else:
-                bands.append(_band(name, told, begin_s, end_s))
+                bands.append(_band(name, samples, begin_s, end_s))
     shown, notes = _chosen(bands, "variables")
     if len(curves) > MAXIMUM_CURVES:
         notes += (f"of {len(curves)} numbers the first {MAXIMUM_CURVES} are drawn",)
@@ -193,30 +193,30 @@ def _changes(run: LoggedRun, values: Any) -> dict[str, list[tuple[float, Any]]]:
     for entry in run.entries:
         time_s = entry.time_s - run.begin_s
         if entry.kind == "restart":
-            for told in found.values():
-                told.append((time_s, None))
+            for samples in found.values():
+                samples.append((time_s, None))
         elif entry.kind == "event":
             for name, value in values(entry.state):
-                told = found.setdefault(name, [])
+                samples = found.setdefault(name, [])
                 # Equal in Python, but 1 and true are different values.
-                if not told or told[-1][1] != value or type(told[-1][1]) is not type(value):
-                    told.append((time_s, value))
+                if not samples or samples[-1][1] != value or type(samples[-1][1]) is not type(value):
+                    samples.append((time_s, value))
     return found
 
 
-def _band(name: str, told: Iterable[tuple[float, Any]], begin_s: float, end_s: float) -> Band:
+def _band(name: str, samples: Iterable[tuple[float, Any]], begin_s: float, end_s: float) -> Band:
     spans = (
         Span(max(begin_s, from_s), min(end_s, to_s), text_of(value))
-        for from_s, to_s, value in _spans(told, end_s)
+        for from_s, to_s, value in _spans(samples, end_s)
         if value is not None and to_s > begin_s and from_s < end_s
     )
     return Band(name, tuple(span for span in spans if span.end_s > span.begin_s))
 
 
-def _spans(told: Iterable[tuple[float, Any]], end_s: float) -> Iterator[tuple[float, float, Any]]:
+def _spans(samples: Iterable[tuple[float, Any]], end_s: float) -> Iterator[tuple[float, float, Any]]:
     """The begin and end of each value, and the value; the last one lasts to the end."""
     waiting: tuple[float, Any] | None = None
-    for time_s, value in told:
+    for time_s, value in samples:
         if waiting is not None:
             yield waiting[0], time_s, waiting[1]
         waiting = time_s, value
@@ -224,9 +224,9 @@ def _spans(told: Iterable[tuple[float, Any]], end_s: float) -> Iterator[tuple[fl
         yield waiting[0], max(end_s, waiting[0]), waiting[1]
 
 
-def _curve(name: str, told: Iterable[tuple[float, Any]], begin_s: float, end_s: float) -> Curve:
+def _curve(name: str, samples: Iterable[tuple[float, Any]], begin_s: float, end_s: float) -> Curve:
     times_s, values = [], []
-    for from_s, to_s, value in _spans(told, end_s):
+    for from_s, to_s, value in _spans(samples, end_s):
         if to_s >= begin_s and from_s <= end_s:
             times_s.append(max(begin_s, from_s))
             values.append(math.nan if value is None else float(as_kind(value, Kind.NUMBER)))

@@ -19,7 +19,7 @@ from robosc.model.structure import CommunicationKind, Deployment, EventKind
 from robosc.supervisor import Supervisor
 
 MAXIMUM_VIOLATIONS = 1000
-"""Violations that are told one by one: more are only counted."""
+"""Violations that are reported one by one: more are only counted."""
 
 KINDS = frozenset(
     ("event", "unexpected", "unknown", "release", "blocked", "fault", "stop", "resume", "restart", "dropped")

@@ -90,7 +90,7 @@ def is_provided(logged: object, data: object) -> bool:
 
 
 class NotLogged:
-    """The log tells nothing of it."""
+    """The log says nothing about it."""
 
 
 NOT_TOLD: Final = NotLogged()

@@ -164,7 +164,7 @@ def log_messages(entries: Iterable[LogEntry], topics: LogTopics, name: str) -> I
         name: Name of the log, which stands in the messages.
     """
     components: dict[str, Any] = {}
-    told: dict[str, Any] = {}
+    published: dict[str, Any] = {}
     for entry in entries:
         time_ns = _nanoseconds(entry.time_s)
         stamp = _stamp(time_ns)
@@ -188,8 +188,8 @@ def log_messages(entries: Iterable[LogEntry], topics: LogTopics, name: str) -> I
             for path, value in leaves(part["variables"], (component,)):
                 topic, kind = topics.variables[path]
                 converted = as_kind(value, kind)
-                if topic not in told or told[topic] != converted:
-                    told[topic] = converted
+                if topic not in published or published[topic] != converted:
+                    published[topic] = converted
                     yield Message(time_ns, topic, {"data": converted})
 
 
@@ -197,7 +197,7 @@ def motion_messages(motion: Motion) -> Iterator[Message]:
     """Return the messages of a robot's motion, but for what happened.
 
     Raises:
-        LogError: A time of it cannot be told.
+        LogError: A time of it cannot be reported.
     """
     if any(not 0 <= sample.time < _SECONDS_END for sample in motion.samples):
         raise LogError("a time of the record of motion is before 1970 or after 2038, which messages cannot tell")

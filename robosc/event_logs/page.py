@@ -59,7 +59,7 @@ def page(sequence: EventSequence, title: str) -> tuple[bytes, EventSequence]:
         template="plotly_white",
         height=sum(heights),
         barmode="overlay",
-        # A state whose name does not fit is told when it is pointed at.
+        # A state whose name does not fit is reported when it is pointed at.
         uniformtext={"minsize": 10, "mode": "hide"},
         legend={"orientation": "h", "yanchor": "bottom", "y": 1.0, "x": 0},
         shapes=[

@@ -1,8 +1,8 @@
-"""A supervisor's automata, led through what a log tells.
+"""A supervisor's automata, led through the entries of a log.
 
 This is deliberately not the executor: what can happen and where it leads comes from the explicit meaning of the
 automata (`robosc.automata.Semantics`) and the conditions that synthesis has added. Variables that synthesis leaves out
-are computed by the slow evaluator, as far as the log tells what they are made of: it leaves out arrays.
+are computed by the slow evaluator, as far as the log contains their operands: it leaves out arrays.
 """
 
 from collections.abc import Mapping
@@ -217,18 +217,18 @@ class Replay:
 
     def _trust_all(self, logged: Mapping[str, Mapping[str, Any]]) -> None:
         for component, behaviour in self._behaviours.items():
-            told = logged.get(component)
-            if told is not None:
+            entry = logged.get(component)
+            if entry is not None:
                 place = self._places[Subject(component)]
-                if told["state"] in self._domains[place]:
-                    self._put(place, told["state"])
+                if entry["state"] in self._domains[place]:
+                    self._put(place, entry["state"])
                 for variable in behaviour.variables:
                     self._trust(component, variable.name, logged)
 
     def _trust(self, component: str, name: str, logged: Mapping[str, Mapping[str, Any]]) -> None:
         variable = next(item for item in self._behaviours[component].variables if item.name == name)
-        told = logged.get(component, {}).get("variables", {}).get(name)
-        value = value_of(told, variable.type)
+        entry = logged.get(component, {}).get("variables", {}).get(name)
+        value = value_of(entry, variable.type)
         if value is None or isinstance(value, Misfit):
             return
         if variable.is_synthesis:
@@ -281,14 +281,14 @@ class Replay:
         """Return the differences of the logged state from the replayed one."""
         found: list[str] = []
         for component, behaviour in self._behaviours.items():
-            told = logged.get(component)
-            if told is None:
+            entry = logged.get(component)
+            if entry is None:
                 found.append(f"nothing is told of {component}")
                 continue
             location = self.state[self._places[Subject(component)]]
-            if told["state"] != location:
-                found.append(f"{component} is in {location}, not in {_short(told['state'])}")
-            values = told["variables"]
+            if entry["state"] != location:
+                found.append(f"{component} is in {location}, not in {_short(entry['state'])}")
+            values = entry["variables"]
             for variable in behaviour.variables:
                 value = self._variable(component, variable.name)
                 if not is_same(values.get(variable.name, MISFIT), value, variable.type):

@@ -103,8 +103,8 @@ class EventSequence:
         left_out = self.drawn - sum(len(row.times_s) for row in rows)
         notes = list(self.notes)
         if left_out:
-            told = f"of {self.drawn} events {left_out} are not drawn: they stand where a mark of the same event is"
-            notes.append(told)
+            note = f"of {self.drawn} events {left_out} are not drawn: they stand where a mark of the same event is"
+            notes.append(note)
         bands = tuple(band.thinned(self.begin_s, self.end_s, places) for band in self.bands)
         if any(len(band.spans) < len(whole.spans) for band, whole in zip(bands, self.bands, strict=True)):
             notes.append("of states that change more often than can be seen the longer ones are drawn")

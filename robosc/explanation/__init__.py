@@ -19,15 +19,15 @@ if TYPE_CHECKING:
         whole_from_text,
     )
     from robosc.explanation.requests import RequestError
+    from robosc.explanation.subjects import ModelWords, SystemWords
     from robosc.explanation.text import empty_text, explanation_text
-    from robosc.explanation.words import ModelWords, SystemWords
 
 _HOMES = {
     "EmptyExplanation": "explanations",
     "Explanation": "explanations",
-    "ModelWords": "words",
+    "ModelWords": "subjects",
     "RequestError": "requests",
-    "SystemWords": "words",
+    "SystemWords": "subjects",
     "document": "explanations",
     "empty_text": "text",
     "explain_empty": "blame",

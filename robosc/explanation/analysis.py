@@ -30,7 +30,7 @@ MAXIMUM_UNFOUND = 2
 """Ways that took too long to find after which an analysis looks for shortest ones only."""
 
 
-class HindranceKind(StrEnum):
+class BlockingCauseKind(StrEnum):
     """Kind of cause that keeps an event from happening."""
 
     BEHAVIOUR = "behaviour"
@@ -44,7 +44,7 @@ class HindranceKind(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Hindrance:
+class BlockingCause:
     """A cause that keeps an event from happening in some states.
 
     Attributes:
@@ -58,7 +58,7 @@ class Hindrance:
         condition: Place in `System.conditions`.
     """
 
-    kind: HindranceKind
+    kind: BlockingCauseKind
     event: str
     where: Any
     automaton: str | None = None
@@ -109,14 +109,14 @@ class Detour:
         events: The events of the whole run.
         stopped_at: Place of the first event that is not allowed, or that leads to a state to be avoided.
         state: The state before it.
-        hindrances: Hindrances that keep it from happening there; none where it is uncontrollable and leads to
+        blocking_causes: Causes that keep it from happening there; none where it is uncontrollable and leads to
             trouble.
     """
 
     events: tuple[str, ...]
     stopped_at: int
     state: State
-    hindrances: tuple[Hindrance, ...]
+    blocking_causes: tuple[BlockingCause, ...]
 
 
 class Analysis:
@@ -164,7 +164,7 @@ class Analysis:
         """The states that a supervisor may be in."""
         free = (*dropped, *(item for item in constraints if item.kind is not ConstraintKind.MARKING))
         _, self._free = problems.without(free)
-        self._enabling: dict[str, tuple[Hindrance, ...]] = {}
+        self._enabling: dict[str, tuple[BlockingCause, ...]] = {}
         self._kept: dict[str, Any] = {}
         self._unfound = 0
 
@@ -175,27 +175,29 @@ class Analysis:
 
     # Why events cannot happen
 
-    def _behaviours(self, event: str) -> tuple[Hindrance, ...]:
+    def _behaviours(self, event: str) -> tuple[BlockingCause, ...]:
         """Return all that could keep the plants from doing an event, each with the states where it does."""
         if event not in self._enabling:
             system = self._encoding.system
             plants = [item for item in system.automata if event in item.alphabet]
             found = [
-                Hindrance(HindranceKind.BEHAVIOUR, event, ~self._has_edge(item, event), automaton=item.name)
+                BlockingCause(BlockingCauseKind.BEHAVIOUR, event, ~self._has_edge(item, event), automaton=item.name)
                 for item in plants
                 if event not in item.monitors
             ]
             found += [
-                Hindrance(HindranceKind.BEHAVIOUR, event, ~self._encoder.holds(item.condition), plant_condition=place)
+                BlockingCause(
+                    BlockingCauseKind.BEHAVIOUR, event, ~self._encoder.holds(item.condition), plant_condition=place
+                )
                 for place, item in enumerate(system.plant_conditions)
                 if item.event == event
             ]
             if not plants:
-                found.append(Hindrance(HindranceKind.BEHAVIOUR, event, self._manager.true))
+                found.append(BlockingCause(BlockingCauseKind.BEHAVIOUR, event, self._manager.true))
             if system.plant_invariants:
                 able = self._encoding.all_of(~item.where for item in found)
                 where = able & ~self.wanted(event)
-                found.append(Hindrance(HindranceKind.BEHAVIOUR, event, where, is_impossible=True))
+                found.append(BlockingCause(BlockingCauseKind.BEHAVIOUR, event, where, is_impossible=True))
             self._enabling[event] = tuple(found)
         return self._enabling[event]
 
@@ -235,8 +237,8 @@ class Analysis:
         """Return the states where an event is more than a step that changes nothing."""
         return self._steps[event].moving()
 
-    def hindrances(self, event: str, states: Any, good: Any | None = None) -> tuple[Hindrance, ...]:
-        """Return the hindrances that keep an event from happening in some of the states, whatever else does.
+    def blocking_causes(self, event: str, states: Any, good: Any | None = None) -> tuple[BlockingCause, ...]:
+        """Return the causes that keep an event from happening in some of the states, whatever else does.
 
         Args:
             event: The event.
@@ -249,15 +251,17 @@ class Analysis:
         if steps.event.is_controllable:
             wanted = states & self.wanted(event)
             found += [
-                Hindrance(HindranceKind.RANGE, event, wanted & leaving, range=item)
+                BlockingCause(BlockingCauseKind.RANGE, event, wanted & leaving, range=item)
                 for item, leaving in self._leaving(event)
             ]
             found += [
-                Hindrance(HindranceKind.REQUIREMENT, event, wanted & ~self._problems.condition(place), condition=place)
+                BlockingCause(
+                    BlockingCauseKind.REQUIREMENT, event, wanted & ~self._problems.condition(place), condition=place
+                )
                 for place in self._conditions_on(event)
             ]
             lost = states & steps.plant & steps.condition & ~self._staying(event, good)
-            found.append(Hindrance(HindranceKind.SUPERVISOR, event, lost))
+            found.append(BlockingCause(BlockingCauseKind.SUPERVISOR, event, lost))
         return tuple(item for item in found if item.where != self._manager.false)
 
     def _leaving(self, event: str) -> Iterable[tuple[RelaxableConstraint, Any]]:
@@ -404,13 +408,13 @@ class Analysis:
             (*before.events, *beyond.events),
             len(before.events),
             before.states[-1],
-            self.hindrances(event, here, good),
+            self.blocking_causes(event, here, good),
         )
 
     def _ways(self, goal: Any) -> tuple[Ways, Ways]:
         """Return the ways to a goal under the requirements, and those of the plants alone.
 
-        They are tried in this order: what synthesis keeps from happening is told before what is forbidden anyhow.
+        They are tried in this order: what synthesis keeps from happening is reported before what is forbidden anyhow.
         """
         return self._marked_ways if goal == self._fixed_point.marked else self._ways_to(goal)
 

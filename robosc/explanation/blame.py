@@ -10,7 +10,7 @@ from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
 from robosc.explanation.explanations import Blamed, CounterexampleReport, EmptyExplanation, Path, StateValues
 from robosc.explanation.problems import Problems
 from robosc.explanation.reports import Reporter
-from robosc.explanation.words import Words
+from robosc.explanation.subjects import Words
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.monitor import BoundedMonitor, EffortSpentError
 from robosc.synthesis.result import SynthesisProgress

@@ -312,12 +312,12 @@ class Requests:
                 needed = listed(list(rule.moves.targets))
                 yield f"{automaton_text(rule.moves.plant, self._components)} is in {location}, not in {needed}"
         for part in rule.parts:
-            yield from self._hindered(part, state)
+            yield from self._blocking_causes(part, state)
         for need in rule.needs:
             if not need.condition.holds(state):
                 yield self._violated(need, state)
 
-    def _hindered(self, part: _Part, state: State) -> Iterator[str]:
+    def _blocking_causes(self, part: _Part, state: State) -> Iterator[str]:
         location = str(state[self._places[Subject(part.name)]])
         if location not in part.kept:
             yield f"{part.name} is in {location}, not in {listed(list(part.kept))}"
@@ -337,8 +337,8 @@ class Requests:
         read = tuple(dict.fromkeys(subject for part in failing for subject in part.reads))
         if len(need.parts) == 1:
             return f"{need.text}, which does not hold{self._values(read, state)}"
-        told = " and ".join(part.text for part in failing[:MAXIMUM_NAMES])
-        return f"{need.text}: {told} do{'' if len(failing) > 1 else 'es'} not hold{self._values(read, state)}"
+        words = " and ".join(part.text for part in failing[:MAXIMUM_NAMES])
+        return f"{need.text}: {words} do{'' if len(failing) > 1 else 'es'} not hold{self._values(read, state)}"
 
     def _values(self, read: Iterable[Subject], state: State) -> str:
         return bracketed([self._value_words(subject, state) for subject in read])
@@ -351,15 +351,15 @@ class Requests:
     def _decided(self, decision: Decision, state: State) -> tuple[bool | None, list[str]]:
         """Return whether a diagram is true, None where it looks at what is not known, and what it looked at."""
         order = tuple(self._places)
-        number, told = decision.root, list[str]()
+        number, words = decision.root, list[str]()
         while number > 1:
             node = decision.nodes[number - 2]
             value = state[node.place]
             if value is None:
-                return None, told
-            told.append(self._value_words(order[node.place], state))
+                return None, words
+            words.append(self._value_words(order[node.place], state))
             number = node.child(decision.indices[node.place](value))
-        return number == 1, told
+        return number == 1, words
 
 
 def read_value(type_: Type, raw: Any) -> Value | None:

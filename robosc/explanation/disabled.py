@@ -2,7 +2,7 @@
 
 They follow the definition of the controlled system (`robosc.automata.controlled`): a plant has no edge whose guard is
 true, a requirement automaton has none, a condition on the event does not hold, an update would leave a variable's
-range, every step is against a plant invariant, or the supervisor forbids it. The last is told where nothing else is:
+range, every step is against a plant invariant, or the supervisor forbids it. The last is reported if nothing else is:
 what it adds means nothing elsewhere.
 """
 

@@ -8,7 +8,7 @@ from typing import Any
 
 from robosc.automata.state import subjects
 from robosc.errors import InternalError
-from robosc.explanation.analysis import Analysis, Hindrance, HindranceKind
+from robosc.explanation.analysis import Analysis, BlockingCause, BlockingCauseKind
 from robosc.explanation.blame import explain_problem
 from robosc.explanation.conflict import minimal_conflict
 from robosc.explanation.explanations import EventHere, EventReport, Explanation, Reason, Remark, StateReport, Stopped
@@ -16,7 +16,7 @@ from robosc.explanation.notation import events_text
 from robosc.explanation.problems import Problems
 from robosc.explanation.reports import Reporter
 from robosc.explanation.requests import MAXIMUM_SHOWN, RequestError
-from robosc.explanation.words import Words
+from robosc.explanation.subjects import Words
 from robosc.source import visible
 from robosc.synthesis.controlled import ControlledSystem
 from robosc.synthesis.encoding import Encoding
@@ -130,7 +130,7 @@ class _Explainer:
         return run
 
     def _stopped(self, goal: Any) -> tuple[Stopped | None, str]:
-        """Return a way of the plants to a goal and where it is stopped, or what is to be told instead of one."""
+        """Return a way of the plants to a goal and where it is stopped, or what is to be reported instead of one."""
         try:
             detour = self._analysis.detour(self._initial, goal, self._analysis.good, self._reachable, self._runs)
         except WayNotFoundError:
@@ -144,8 +144,8 @@ class _Explainer:
         possible, wanted = self._possible[event], self._reachable & self._analysis.wanted(event)
         found = [
             item
-            for item in self._analysis.hindrances(event, self._reachable)
-            if item.kind is not HindranceKind.BEHAVIOUR or has_behaviours
+            for item in self._analysis.blocking_causes(event, self._reachable)
+            if item.kind is not BlockingCauseKind.BEHAVIOUR or has_behaviours
         ]
         is_never = possible == self._false
         status = "never" if is_never else "free" if possible == wanted else "restricted"
@@ -163,11 +163,11 @@ class _Explainer:
             unfound=unfound,
         )
 
-    def _decisive(self, event: str, found: list[Hindrance], wanted: Any) -> list[Hindrance]:
-        """Return the hindrances needed to keep an event from ever happening; behaviours where they alone do it."""
-        candidates = [item for item in found if item.kind is not HindranceKind.BEHAVIOUR]
+    def _decisive(self, event: str, found: list[BlockingCause], wanted: Any) -> list[BlockingCause]:
+        """Return the causes needed to keep an event from ever happening; behaviours where they alone do it."""
+        candidates = [item for item in found if item.kind is not BlockingCauseKind.BEHAVIOUR]
         if wanted == self._false:
-            candidates = found or list(self._analysis.hindrances(event, self._reachable))
+            candidates = found or list(self._analysis.blocking_causes(event, self._reachable))
             wanted = self._reachable
 
         def is_never(kept: frozenset[int]) -> bool:
@@ -180,7 +180,7 @@ class _Explainer:
             return candidates
         return [candidates[place] for place in minimal_conflict(range(len(candidates)), is_never)]
 
-    def _reason(self, item: Hindrance) -> Reason:
+    def _reason(self, item: BlockingCause) -> Reason:
         run = self._run_to(item.where)
         return self._reporter.reason(item, run.states[-1], self._analysis.good, run)
 
@@ -198,8 +198,8 @@ class _Explainer:
             if following == self._false:
                 before = f"after {events_text(run[:place])}" if place else "in the initial state"
                 here = decoded(self._encoding, states)
-                hindrances = self._analysis.hindrances(event, self._analysis.predicate(here))
-                reasons = [self._reporter.reason(item, here, self._analysis.good) for item in hindrances]
+                blocking_causes = self._analysis.blocking_causes(event, self._analysis.predicate(here))
+                reasons = [self._reporter.reason(item, here, self._analysis.good) for item in blocking_causes]
                 raise RequestError(f"'{event}' cannot happen {before}: {_messages(reasons)}")
             states = following
         return states
@@ -239,7 +239,7 @@ class _Explainer:
             chosen = states & ~self._possible[event]
         run = self._run_to(chosen)
         if after is not None:
-            # Only the state after it is told, so the states on its way need not be found.
+            # Only the state after it is reported, so the states on its way need not be found.
             run = SystemRun(after, (run.states[-1],), is_shortest=len(after) == len(run.events) and run.is_shortest)
         here = self._analysis.predicate(run.states[-1])
         names = [item.name for item in self._system.events] if event is None else [event]
@@ -251,7 +251,7 @@ class _Explainer:
 
     def _here(self, event: str, here: Any, state: Any) -> EventHere:
         can_happen = here & self._possible[event] != self._false
-        reasons = () if can_happen else self._analysis.hindrances(event, here)
+        reasons = () if can_happen else self._analysis.blocking_causes(event, here)
         return EventHere(
             event=event,
             is_controllable=self._system.event(event).is_controllable,

@@ -56,7 +56,7 @@ def listed(names: Sequence[str]) -> str:
     )
 
 
-def bracketed(told: Sequence[str]) -> str:
+def bracketed(words: Sequence[str]) -> str:
     """Values that were looked at, in brackets with a blank before; empty where there are none."""
-    shown = ", ".join(told[:MAXIMUM_NAMES]) + (", ..." if len(told) > MAXIMUM_NAMES else "")
+    shown = ", ".join(words[:MAXIMUM_NAMES]) + (", ..." if len(words) > MAXIMUM_NAMES else "")
     return f" ({shown})" if shown else ""

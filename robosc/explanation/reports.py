@@ -3,7 +3,7 @@
 from typing import Any
 
 from robosc.automata.compile import State
-from robosc.explanation.analysis import Analysis, Counterexample, Detour, Hindrance, HindranceKind
+from robosc.explanation.analysis import Analysis, BlockingCause, BlockingCauseKind, Counterexample, Detour
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
 from robosc.explanation.explanations import CounterexampleReport, Path, Reason, Stopped
 from robosc.explanation.notation import value_text
@@ -11,7 +11,7 @@ from robosc.explanation.terms import Terms
 from robosc.synthesis.runs import SystemRun
 
 MAXIMUM_REASONS = 20
-"""Reasons, and parts that are broken, that are told of one state: thousands would tell nothing more."""
+"""Reasons, and parts that are broken, that are reported about one state: thousands would say nothing more."""
 
 
 _MARKER = RelaxableConstraint(ConstraintKind.MARKING, is_marker=True)
@@ -35,18 +35,18 @@ class Reporter:
         """A run."""
         return Path(run.events, run.is_shortest, self._terms.state(run.states[-1]))
 
-    def reason(self, item: Hindrance, state: State, good: Any, run: SystemRun | None = None) -> Reason:
+    def reason(self, item: BlockingCause, state: State, good: Any, run: SystemRun | None = None) -> Reason:
         """Return the reason why an event cannot happen in a state, to which a run leads."""
-        message, part = self._terms.hindered(item, state)
+        message, part = self._terms.blocked(item, state)
         trouble = None
-        if item.kind is HindranceKind.SUPERVISOR:
+        if item.kind is BlockingCauseKind.SUPERVISOR:
             lost = self._analysis.bad_after(item.event, self._analysis.predicate(state), good)
             trouble = self.counterexample(self._analysis.counterexample_after(lost))
         return Reason(str(item.kind), message, part, self.path(run) if run else None, trouble)
 
     def stopped(self, item: Detour, good: Any) -> Stopped:
         """A way of the behaviours, and where it is stopped."""
-        reasons = tuple(self.reason(hindrance, item.state, good) for hindrance in item.hindrances[:MAXIMUM_REASONS])
+        reasons = tuple(self.reason(cause, item.state, good) for cause in item.blocking_causes[:MAXIMUM_REASONS])
         return Stopped(item.events, item.stopped_at, self._terms.state(item.state), reasons)
 
     def counterexample(self, item: Counterexample) -> CounterexampleReport:

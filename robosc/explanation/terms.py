@@ -11,7 +11,7 @@ from robosc.automata.compile import NO_DATA, State, compile_expression, subjects
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import Subject, subject_type, subjects
 from robosc.automata.structure import System
-from robosc.explanation.analysis import Hindrance, HindranceKind
+from robosc.explanation.analysis import BlockingCause, BlockingCauseKind
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
 from robosc.explanation.explanations import Part, StateValues
 from robosc.explanation.notation import MAXIMUM_NAMES, cut, requirement_text, value_text
@@ -131,16 +131,16 @@ class Terms(ABC):
 
     # Sentences
 
-    def hindered(self, item: Hindrance, state: State) -> tuple[str, Part | None]:
+    def blocked(self, item: BlockingCause, state: State) -> tuple[str, Part | None]:
         """Return the reason why an event cannot happen in a state, and the part that is the cause."""
         match item.kind:
-            case HindranceKind.BEHAVIOUR:
+            case BlockingCauseKind.BEHAVIOUR:
                 return self._behaviour(item, state)
-            case HindranceKind.RANGE if item.range is not None and item.range.range is not None:
+            case BlockingCauseKind.RANGE if item.range is not None and item.range.range is not None:
                 subject = item.range.range
                 now = value_text(state[self._subjects[subject]])
                 return f"it would take {subject}, which is {now}, out of its range", self.part(item.range)
-            case HindranceKind.REQUIREMENT if item.condition is not None:
+            case BlockingCauseKind.REQUIREMENT if item.condition is not None:
                 part = self.condition_part(item.condition)
                 return f"'{part.text}' forbids it{self._forbidding(item.condition, state)}", part
             case _:
@@ -150,7 +150,7 @@ class Terms(ABC):
         """Return the end of a sentence about an event condition that is not true."""
         return self._read(self._system.conditions[place].condition, state)
 
-    def _behaviour(self, item: Hindrance, state: State) -> tuple[str, Part | None]:
+    def _behaviour(self, item: BlockingCause, state: State) -> tuple[str, Part | None]:
         if item.automaton is not None:
             return self._without_edge(item.automaton, item.event, state), self.automaton_part(item.automaton)
         if item.plant_condition is not None:

@@ -48,12 +48,12 @@ def _incomparable(a: Any, b: Any) -> bool:
 
 
 def equal(a: Any, b: Any) -> Any:
-    """Tell whether two values of one type are equal."""
+    """Return True if two values of one type are equal."""
     return None if _incomparable(a, b) else a == b
 
 
 def unequal(a: Any, b: Any) -> Any:
-    """Tell whether two values of one type differ."""
+    """Return True if two values of one type differ."""
     return None if _incomparable(a, b) else a != b
 
 

@@ -1,6 +1,6 @@
 """The structure of a text as its layout needs it: statements, and where their lines may be broken.
 
-Everything is told of the tokens by their indices, so nothing of a text can get lost. The text has been read by the
+Tokens are named by their indices, so nothing of a text can get lost. The text has been read by the
 parser before: what does not fit the grammar is not looked for.
 """
 

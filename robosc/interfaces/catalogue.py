@@ -81,7 +81,7 @@ class Catalogue:
         self._packages = {name.partition("/")[0] for name in self._shipped}
 
     def described(self, kind: str, package: str, type_: str) -> str:
-        """An interface in words; of a definition that comes with RoboSC, its distribution is told."""
+        """An interface in words; of a definition that comes with RoboSC, its distribution is reported."""
         is_own = self._is_found(f"{package}/{kind}/{type_}")
         return f"{package}/{type_}" + ("" if is_own else f" of {self.distribution.title}")
 

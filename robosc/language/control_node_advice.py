@@ -278,7 +278,7 @@ def _all(conditions: Sequence[str]) -> str:
 
 
 def _is_done_anyway(node: Node) -> bool:
-    """Return True if the executor does a node without being told."""
+    """Return True if the executor does a node without a request for it."""
     leaves = list(node.leaves())
     if len(leaves) < 2 and node.family is not Family.RUN_ONCE:
         return not any(child.family is Family.RUN_ONCE for child in node.children if isinstance(child, Node))

@@ -140,7 +140,7 @@ class Node:
 
 
 class Declared:
-    """Names that a text declares, as far as they can be told in a text with errors.
+    """Names that a text declares, as far as they can be reported in a text with errors.
 
     Args:
         tokens: All of the text.

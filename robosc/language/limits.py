@@ -10,4 +10,4 @@ MAXIMUM_NAME = 255
 """Characters that a name may have."""
 
 MAXIMUM_SYNTAX_ERRORS = 100
-"""Syntax errors of one text that are told; what follows them is left unread."""
+"""Syntax errors of one text that are reported; what follows them is left unread."""

@@ -61,7 +61,7 @@ def parse(file: SourceFile) -> Parsed:
     tokens, places = tokenize(file.text), Places(file)
     hidden = obstacle(file, tokens, places)
     if hidden is not None:
-        # What else is found may come of it: it is told alone, and the rest read for the sake of what is sound.
+        # What else is found may come of it: it is reported alone, and the rest read for the sake of what is sound.
         tokens = readable_tokens(file.text)
     # Whoever works with the tree walks it recursively too.
     allow_depth(MAXIMUM_NESTING, FRAMES_PER_LEVEL)
@@ -360,7 +360,7 @@ class _Parser(ExpressionParser):
             if token == name and self.texts[index + 1] in _BEFORE_VALUES:
                 values.append(index + 2)
         types = [found for index in values[:_MAXIMUM_VALUES] if (found := self._type_of_value(index))]
-        # Whole numbers are told as the range that has them all.
+        # Whole numbers are described as the range that has them all.
         whole = [int(found) for found in types if found.isdigit()]
         return f"integer(0..{max(whole)})" if whole and types[0].isdigit() else next(iter(types), "boolean")
 

@@ -45,7 +45,7 @@ _GROUPS: tuple[tuple[str, frozenset[str]], ...] = (
     ),
     ("a communication", frozenset({"'incoming'", "'outgoing'", "'service'", "'action'"})),
 )
-"""Words that are told in one, the larger groups before the smaller ones that they contain."""
+"""Words that are listed as one group, the larger groups before the smaller ones that they contain."""
 
 _MAXIMUM_WORDS = 8
 

@@ -25,7 +25,7 @@ class ArrayLengths:
     def __init__(self, types: Types, findings: Findings) -> None:
         self._types = types
         self._findings = findings
-        self._told: set[tuple[Location, str]] = set()
+        self._reported: set[tuple[Location, str]] = set()
         # The message is kept, so that its identity stays its own.
         self._checked: dict[tuple[str, int], Part] = {}
 
@@ -98,8 +98,8 @@ class ArrayLengths:
         array = None if field is None else field.array
         if field is None or array is None or array.length is None or not isinstance(index, syntax.Literal):
             return
-        if type(index.value) is int and index.value >= array.length and (place, field.name) not in self._told:
-            self._told.add((place, field.name))
+        if type(index.value) is int and index.value >= array.length and (place, field.name) not in self._reported:
+            self._reported.add((place, field.name))
             at_most = "at most " if array.is_bounded else ""
             self._findings.warning(
                 "index-outside-array",

@@ -359,15 +359,15 @@ class _Unknown:
     robot: Unit
     communications: Mapping[str, Communication]
     findings: Findings
-    told: set[str] = field(default_factory=set)
+    reported: set[str] = field(default_factory=set)
 
     def __call__(self, name: syntax.Name) -> None:
         if self.part.unit is self.robot:
             self.findings.unknown_communication(name.text, name.location, self.communications)
             return
-        if name.text in self.told or self.findings.explain(name.text):
+        if name.text in self.reported or self.findings.explain(name.text):
             return  # Several transitions may react to it: the import is wrong once.
-        self.told.add(name.text)
+        self.reported.add(name.text)
         self.findings.error(
             "unknown-name",
             f"the imported component '{self.part.tree.name.text}' reacts to '{name.text}', which is not imported",

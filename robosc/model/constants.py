@@ -44,7 +44,7 @@ class Constants:
         self._found: dict[tuple[Unit, str], Typed | None] = {}
         self._checkers: dict[Unit, ExpressionChecker] = {}
         self._open: list[tuple[Unit, str]] = []
-        self._has_told_depth = False
+        self._has_reported_depth = False
 
     def visible_in(self, unit: Unit) -> "VisibleConstants":
         """The constants that a file can name; reports what is wrong with those of the file and of its libraries."""
@@ -86,11 +86,11 @@ class Constants:
             self._findings.error("constant-cycle", message, tree.name.location, "Write one of them as a value.")
             self._found[key] = None
         elif len(self._open) >= _MAXIMUM_CHAIN and key not in self._found:
-            if not self._has_told_depth:
+            if not self._has_reported_depth:
                 message = f"constants need each other in a chain of more than {_MAXIMUM_CHAIN}"
                 fix = "Define them before they are used."
                 self._findings.error("nesting-too-deep", message, tree.name.location, fix)
-            self._has_told_depth = True
+            self._has_reported_depth = True
             self._found[key] = None
         if key not in self._found:
             self._open.append(key)

@@ -15,7 +15,7 @@ _MAXIMUM_COMPARED = 64
 """Characters of a name that is compared."""
 
 MAXIMUM_CHOICES = 6
-"""Names that are all told where none is near."""
+"""Names that are all listed where none is near."""
 
 _WORD = re.compile("[A-Za-z_][A-Za-z_0-9]*+")
 

@@ -1,6 +1,6 @@
 """Communications against the definitions of their middleware types (language A.5).
 
-Whatever a generated node would refuse at its start is told here, and is an error for the packages of ROS that have such
+Whatever a generated node would refuse at its start is reported here, and is an error for the ROS packages with such
 nodes (`robosc.targets.ros.errors`): a supervisor can be made all the same, for whatever runs without ROS. That holds
 for definitions of the user's own, too, which say for certain that a node would not start: what a model means does not
 depend on the packages that are installed where it is read.
@@ -120,7 +120,7 @@ class InterfaceChecker:
         self._types = types
         self._findings = findings
         self._noted: set[str] = set()
-        self._told: set[Fault] = set()
+        self._reported: set[Fault] = set()
         self.fields: dict[str, dict[str, Field]] = {}
 
     def check(
@@ -162,8 +162,8 @@ class InterfaceChecker:
         fitting = next((outcome for outcome in outcomes.values() if not outcome.faults), None)
         if fitting is None:
             # Told are the faults of the version that comes nearest.
-            told = [outcome for (_, language), outcome in outcomes.items() if language is Language.PYTHON]
-            for fault in min(told, key=lambda outcome: len(outcome.faults)).faults:
+            chosen = [outcome for (_, language), outcome in outcomes.items() if language is Language.PYTHON]
+            for fault in min(chosen, key=lambda outcome: len(outcome.faults)).faults:
                 self._report_once(fault)
             return None
         for type_, location in fitting.unknown.items():
@@ -177,9 +177,9 @@ class InterfaceChecker:
 
     def _report_once(self, fault: Fault) -> None:
         """Report a fault that all nodes have, once."""
-        if fault in self._told:
+        if fault in self._reported:
             return
-        self._told.add(fault)
+        self._reported.add(fault)
         near = self._findings.near(fault.name, fault.known) if fault.name else None
         hint, fix = (
             (fault.hint, fault.fix) if near is None else (f"; did you mean '{near}'?", f"Write '{spelled(near)}'.")

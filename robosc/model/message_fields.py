@@ -32,7 +32,7 @@ _MAXIMUM_SHOWN = 6
 """Fields that one finding lists."""
 
 MAXIMUM_FAULTS = 100
-"""Differences of one type that are told; more are told once these are fixed."""
+"""Differences of one type that are reported; more are reported once these are fixed."""
 
 _INTEGERS = frozenset(f"{sign}int{bits}" for sign in ("", "u") for bits in (8, 16, 32, 64))
 _PYTHON_FIELDS: dict[type[Type], frozenset[str]] = {

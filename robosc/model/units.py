@@ -11,7 +11,7 @@ from robosc.model.findings import Findings
 from robosc.source import Bundle, Location, SourceFile
 
 _MAXIMUM_SHOWN = 6
-"""Imports of a cycle that are told."""
+"""Imports of a cycle that are reported."""
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -199,7 +199,7 @@ class Libraries:
                 "Remove or rename one of the files, or do not search its folder.",
             )
             return None
-        # What is sound of a broken one is better known than nothing: its errors are told.
+        # What is sound of a broken one is better known than nothing: its errors are reported.
         for tree in (*found.values(), *partly.values()):
             return make_unit(tree, self._findings)
         if name.text not in self._broken:

@@ -67,7 +67,7 @@ class KripkeStructure:
             if event.name in conditions:
                 allowed = allowed & diagram_predicate(encoding, conditions[event.name])
             steps.append((found, allowed))
-            monitor.tell("encoding", len(steps), found.plant)
+            monitor.report("encoding", len(steps), found.plant)
         with place.reordering():
             closure = closure_under(encoding, starmap(self._onwards, steps), self.manager.true, monitor)
             self.states = closure.of(self.initial, "reachability")
@@ -122,7 +122,7 @@ class KripkeStructure:
         while True:
             kept = states & step(states)
             rounds += 1
-            self.monitor.tell(phase, rounds, kept)
+            self.monitor.report(phase, rounds, kept)
             if kept == states:
                 return kept
             states = kept

@@ -129,7 +129,7 @@ class Runs:
                         layers.append(_Layer(found, (move,)))
             if layers[-1].reached == before:
                 return None
-            self._monitor.tell("runs", len(layers) - 1, layers[-1].reached)
+            self._monitor.report("runs", len(layers) - 1, layers[-1].reached)
         return self._back(layers, within, goal)
 
     def _back(self, layers: Sequence[_Layer], within: Any, goal: Any) -> Path:

@@ -38,7 +38,7 @@ class ScriptedEvent:
     Attributes:
         line: Number of its line, from 1.
         event: Its name; empty: the model begins again.
-        data: Data that it carries; NO_DATA where none is told.
+        data: Data that it carries; NO_DATA where none is reported.
         target: Parts of the state that it leads to, as told; of events of automata.
     """
 
@@ -179,16 +179,16 @@ def _logged(stream: _Joined, name: str, model: Model) -> Iterator[ScriptedEvent]
             if entry.event not in known:
                 raise ScriptError(f"{name}:{entry.line}: {entry.event} is not an event of {model.name}")
             paths = () if entry.is_controllable else converted_paths(model, entry.event)
-            told = {path: received.value(entry.event, entry.data, path) for path in paths}
-            if MISFIT in told.values():
-                wrong = path_text(next(path for path, value in told.items() if value is MISFIT))
+            given = {path: received.value(entry.event, entry.data, path) for path in paths}
+            if MISFIT in given.values():
+                wrong = path_text(next(path for path, value in given.items() if value is MISFIT))
                 raise ScriptError(f"{name}:{entry.line}: {entry.event} carries no {wrong} of the declared type")
-            yield ScriptedEvent(entry.line, entry.event, _joined(told))
+            yield ScriptedEvent(entry.line, entry.event, _joined(given))
 
 
-def _joined(told: Mapping[tuple[PathStep, ...], object]) -> object:
-    """Data of which these parts are told, and the rest is unknown."""
-    known = {path: value for path, value in told.items() if value is not None and value is not NOT_TOLD}
+def _joined(given: Mapping[tuple[PathStep, ...], object]) -> object:
+    """Data of which these parts are reported, and the rest is unknown."""
+    known = {path: value for path, value in given.items() if value is not None and value is not NOT_TOLD}
     if () in known:
         return known[()]
     below: dict[PathStep, dict[tuple[PathStep, ...], object]] = {}

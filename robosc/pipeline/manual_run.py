@@ -163,7 +163,7 @@ class ManualRun(ABC):
         """
         return self._events[self._require_event(event)]
 
-    def hindrances(self) -> dict[str, tuple[str, ...]]:
+    def blocked(self) -> dict[str, tuple[str, ...]]:
         """Every event that cannot happen now, with the reasons why not, one sentence each."""
         return {event: self._why_not(event) for event in self._events if not self._can_happen(event)}
 

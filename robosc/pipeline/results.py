@@ -112,12 +112,12 @@ class Outcome:
 
     def __repr__(self) -> str:
         made = self._product()
-        told = [str(self.status)] if made is None else [repr(made)]
+        words = [str(self.status)] if made is None else [repr(made)]
         if made is None and self.reason:
-            told.append(self.reason)
+            words.append(self.reason)
         if self.diagnostics:
-            told.append(repr(Findings(self.diagnostics)).strip("<>"))
-        return visible(f"<{type(self).__name__}: {'; '.join(told)}>")
+            words.append(repr(Findings(self.diagnostics)).strip("<>"))
+        return visible(f"<{type(self).__name__}: {'; '.join(words)}>")
 
     def __str__(self) -> str:
         parts: list[object] = [Findings(self.diagnostics) if type(self.diagnostics) is tuple else self.diagnostics]

@@ -50,7 +50,7 @@ def entries_of(step: "Step", number: int) -> Iterator[dict[str, Any]]:
         step: The step.
         number: Its number in the run, from 1, which is its time in seconds, too.
     """
-    told = step.provided if step.is_controllable else dict(step.data)
+    values = step.provided if step.is_controllable else dict(step.data)
     if step.unknown:
         yield {"time": float(number), "kind": "unknown", "event": step.event, "unknown": list(step.unknown)}
     yield {
@@ -58,7 +58,7 @@ def entries_of(step: "Step", number: int) -> Iterator[dict[str, Any]]:
         "kind": "event",
         "event": step.event,
         "controllable": step.is_controllable,
-        "data": told,
+        "data": values,
         "state": state_by_component(step.state),
         "decision_us": 0.0,
     }

@@ -121,7 +121,7 @@ class Run(ManualRun):
         """Location of each service and action, by its name."""
         return {name: self._system.location(name) for name in self._calls}
 
-    def hindrances(self) -> dict[str, tuple[str, ...]]:
+    def blocked(self) -> dict[str, tuple[str, ...]]:
         """Every event that cannot happen now, with the reasons why not, one sentence each."""
         blocked = self._requests.availability(self._system.state(), self.locations).blocked
         found = {item.event: item.why for item in blocked}

@@ -233,22 +233,22 @@ class SystemRun(ManualRun):
         ]
         if len(found) == 1:
             return found[0]
-        told = self._alternatives(found or states)
+        offered = self._alternatives(found or states)
         if not found:
             asked = ", ".join(f"{name} = {value_text(part)}" for name, part in wanted.items())
             with_what = f" with {asked}" if asked else ""
-            raise ChoiceError(f"{what} cannot {verb} a state{with_what}; it can {verb}: {told or 'none'}")
+            raise ChoiceError(f"{what} cannot {verb} a state{with_what}; it can {verb}: {offered or 'none'}")
         example = {self._subjects[place]: found[0][place] for place in _varying(found)}
-        raise ChoiceError(f"{what} can {verb} {len(found)} states: {told}", example, keyword)
+        raise ChoiceError(f"{what} can {verb} {len(found)} states: {offered}", example, keyword)
 
     def _alternatives(self, states: Sequence[State]) -> str:
         """States by what tells them apart; of very many the first."""
         places = _varying(states) if len(states) > 1 else range(len(self._subjects))
-        told = [
+        offered = [
             ", ".join(f"{self._subjects[place]} = {value_text(state[place])}" for place in places)
             for state in states[:_MAXIMUM_WAYS]
         ]
-        return "; ".join([*told, *(["..."] if len(states) > _MAXIMUM_WAYS else [])])
+        return "; ".join([*offered, *(["..."] if len(states) > _MAXIMUM_WAYS else [])])
 
     # Data
 

@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from robosc.verification import Limits, VerificationReport
 
 _MISCOUNT = "states"
-"""Fault of a supervisor that tells of more or fewer states than there are."""
+"""Fault of a supervisor that reports more or fewer states than there are."""
 
 _CHECKS = ("safe", "controllable", "nonblocking", "maximally_permissive")
 MAXIMUM_NAMES = 20
@@ -360,9 +360,9 @@ def verify_system(
     outcomes = {name: getattr(found, name) for name in _CHECKS}
     is_complete = verified.is_complete and not (is_strict and CheckOutcome.NOT_CHECKED in outcomes.values())
     # The figure in a file is not believed either; that of a wrong supervisor says nothing more.
-    told, counted = supervisor.states, found.states
-    is_miscounted = told > 0 and counted not in (None, told) and not found.failures
-    miscount = f"it tells of {told}, and there are {counted}" if is_miscounted else ""
+    stated, counted = supervisor.states, found.states
+    is_miscounted = stated > 0 and counted not in (None, stated) and not found.failures
+    miscount = f"it tells of {stated}, and there are {counted}" if is_miscounted else ""
     status = (
         VerificationStatus.FAILED
         if found.failures or miscount
@@ -397,9 +397,9 @@ def verify_system(
 def system_summary_text(supervisor: SystemSupervisor) -> str:
     """Return the supervisor of automata for people, as `robosc synth` prints it."""
     initial = supervisor.initial_condition
-    told = str(supervisor) if initial is None else f"{supervisor}\nit begins only where {initial}"
+    stated = str(supervisor) if initial is None else f"{supervisor}\nit begins only where {initial}"
     # Names of plain automata may be anything.
-    return "".join(f"{visible(line)}\n" for line in told.split("\n"))
+    return "".join(f"{visible(line)}\n" for line in stated.split("\n"))
 
 
 def system_verification_text(report: Mapping[str, Any]) -> str:

@@ -65,7 +65,7 @@ class Walker(ABC):
     def __init__(self, run: "ManualRun") -> None:
         self._run = run
         # Trouble that was found before.
-        self._told: set[tuple[TroubleKind, str, tuple[str, ...]]] = set()
+        self._reported: set[tuple[TroubleKind, str, tuple[str, ...]]] = set()
 
     # Parts that differ
 
@@ -91,7 +91,7 @@ class Walker(ABC):
 
     def forget(self) -> None:
         """Begin anew: all trouble is news again."""
-        self._told.clear()
+        self._reported.clear()
 
     def walk(self, steps: int, seed: int) -> "tuple[Step, ...]":
         """Take events by chance; parameters as of `Run.walk`."""
@@ -156,8 +156,8 @@ class Walker(ABC):
         if found is None or found.kind not in kinds:
             return False
         key = (found.kind, found.event, found.why)
-        is_news = key not in self._told
-        self._told.add(key)
+        is_news = key not in self._reported
+        self._reported.add(key)
         return is_news
 
 

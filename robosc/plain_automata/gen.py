@@ -116,7 +116,7 @@ class _Reader:
         self._names = set[str]()
         self.drafts: list[Draft] = []
         self.types: list[str] = []
-        self.told: list[dict[str, bool]] = []
+        self.stated: list[dict[str, bool]] = []
         """For each generator the events of which its alphabet says whether they are controllable."""
 
     def read(self) -> None:
@@ -151,7 +151,7 @@ class _Reader:
         self._names.add(unique)
         draft = Draft(Named(unique, name.at))
         self.drafts.append(draft)
-        self.told.append({})
+        self.stated.append({})
         self.types.append(token.attributes.get("ftype", "Generator"))
         sections = {
             "States": lambda: self._states(draft.states, "States"),
@@ -226,7 +226,7 @@ class _Reader:
             fix = "Let it be observable: supervisors see all events here."
             self._findings.error("automata-unsupported", message, option.at, fix)
         if "c" in letters.lower():
-            self.told[-1][event.text] = "C" in letters
+            self.stated[-1][event.text] = "C" in letters
 
     def _transitions(self, draft: Draft) -> None:
         found: list[_Token] = []
@@ -247,7 +247,7 @@ def read_gen(file: SourceFile, findings: Findings) -> tuple[System, SystemPlaces
     """The system of a file; of use only if no error is found.
 
     A generator of the type `System` is a plant, every other one a requirement. Where no generator has that type, plants
-    are those whose alphabet tells of a controllable event. An event of a plant is uncontrollable unless its alphabet
+    are those whose alphabet has a controllable event. An event of a plant is uncontrollable unless its alphabet
     says otherwise; alphabets of requirements need not say it.
 
     Raises:
@@ -259,8 +259,8 @@ def read_gen(file: SourceFile, findings: Findings) -> tuple[System, SystemPlaces
     if not reader.drafts:
         _fail("automata-syntax", "there is no generator in it", at, "Write <Generator>, or <Generator name=...>.")
     has_types = "System" in reader.types
-    for draft, type_, told in zip(reader.drafts, reader.types, reader.told, strict=True):
-        is_plant = type_ == "System" if has_types else any(told.values())
+    for draft, type_, stated in zip(reader.drafts, reader.types, reader.stated, strict=True):
+        is_plant = type_ == "System" if has_types else any(stated.values())
         draft.role = Role.PLANT if is_plant else Role.REQUIREMENT
     if all(draft.role is Role.REQUIREMENT for draft in reader.drafts):
         fix = 'Write ftype="System" at the plants, or +C+ behind their controllable events.'
@@ -271,11 +271,11 @@ def read_gen(file: SourceFile, findings: Findings) -> tuple[System, SystemPlaces
 def _events(reader: _Reader, findings: Findings) -> dict[str, bool]:
     """The events, and whether each is controllable, on which all alphabets that say it must agree."""
     found: dict[str, bool] = {}
-    for draft, told in zip(reader.drafts, reader.told, strict=True):
+    for draft, stated in zip(reader.drafts, reader.stated, strict=True):
         for item in draft.events:
-            if item.text not in told and draft.role is Role.REQUIREMENT:
+            if item.text not in stated and draft.role is Role.REQUIREMENT:
                 continue
-            is_controllable = told.get(item.text, False)
+            is_controllable = stated.get(item.text, False)
             if found.setdefault(item.text, is_controllable) is not is_controllable:
                 message = f"the event '{item.text}' is controllable in one alphabet and not in another"
                 findings.error("automata-name", message, item.at, "Say the same in all of them.")

@@ -33,7 +33,7 @@ class Starter:
     Attributes:
         robot: Its name.
         stem: The name of its model's file without the ending; also a fitting name for its folder.
-        files: Texts by file name: the model first, its library, the page that tells what to do next.
+        files: Texts by file name: the model first, its library, the page that says what to do next.
     """
 
     robot: str

@@ -52,14 +52,14 @@ class Chaining:
         if not self._steps:
             return states
         work = _Work(len(self._steps))
-        taken = told = 0
+        taken = reported = 0
         while True:
             number = work.next()
             if number is None:
                 # What states have to keep to may read more than a step does, so each has the last word.
                 number = next((n for n, step in enumerate(self._steps) if self._grown(step, states) != states), None)
                 if number is None:
-                    self._monitor.tell(phase, told + 1, states)
+                    self._monitor.report(phase, reported + 1, states)
                     return states
             grown = self._grown(self._steps[number], states)
             taken += 1
@@ -67,13 +67,13 @@ class Chaining:
                 states = grown
                 work.add(self._after[number])
                 if is_enough(states, until):
-                    self._monitor.tell(phase, told + 1, states)
+                    self._monitor.report(phase, reported + 1, states)
                     return states
                 grown = self._grown(self._steps[number], states)
                 taken += 1
-            if taken >= (told + 1) * len(self._steps):
-                told += 1
-                self._monitor.tell(phase, told, states)
+            if taken >= (reported + 1) * len(self._steps):
+                reported += 1
+                self._monitor.report(phase, reported, states)
 
     def _grown(self, step: Step, states: Any) -> Any:
         self._monitor.check_stop()

@@ -117,7 +117,7 @@ class Kernel:
         groups: tuple[Any, ...],
         until: Any,
         pause: Callable[[int], None],
-        tell: Callable[[int, int], None],
+        report: Callable[[int, int], None],
     ) -> Any:
         """Return a set of states closed under some steps.
 
@@ -127,10 +127,10 @@ class Kernel:
             groups: Steps as `saturation` has them for the kernel.
             until: States once all of which are found the rest is not; or None.
             pause: Called again and again with the number of steps since the last call; what it raises ends the work.
-            tell: Called with the number of the round and the address of the states that are found then.
+            report: Called with the number of the round and the address of the states that are found then.
         """
         begin, inside, enough = self.address(states), self.address(within), self.address(until)
-        return self._returned(self._module.closure(self._manager, begin, inside, groups, enough, pause, tell))
+        return self._returned(self._module.closure(self._manager, begin, inside, groups, enough, pause, report))
 
     def _returned(self, address: int) -> Any:
         found = self.predicate(address)

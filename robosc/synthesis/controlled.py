@@ -15,7 +15,7 @@ from robosc.synthesis.runs import ShortestRuns, SystemRun
 from robosc.synthesis.transitions import Steps
 
 MAXIMUM_TOGETHER = 100
-"""Pairs of rivals that are told: a hundred requests on one identifier make thousands, which would tell nothing new."""
+"""Pairs of rivals that are reported: a hundred requests on one identifier make thousands that say nothing new."""
 
 MAXIMUM_EFFORT = 300_000
 """Nodes of the searches for loops together, counted once for each event: a third of a second with the faster engine."""
@@ -173,7 +173,7 @@ class ControlledSystem:
     ) -> Iterator[Unprompted]:
         """Those of some events that can happen again and again while no prompt does.
 
-        A loop that was told already tells of the events that are in it. Beyond `MAXIMUM_EFFORT` none is told any more.
+        A loop that was reported names the events that are in it. Beyond `MAXIMUM_EFFORT` none is reported any more.
 
         Args:
             events: The events, none of them silent.
@@ -185,15 +185,15 @@ class ControlledSystem:
         executed = self._executed(silent)
         inside = [steps for steps in self._problem.steps if steps.event.name not in prompts]
         runs = self._runs_from(self._start, self._problem.steps, executed)
-        told: set[str] = set()
+        reported: set[str] = set()
         for event in events:
             steps = self._steps[event]
-            states = self._again(steps, inside, executed) if event not in told else self._manager.false
+            states = self._again(steps, inside, executed) if event not in reported else self._manager.false
             run = runs.run_to(states) if states != self._manager.false else None
             if run is None:
                 continue
             state, loop = self._loop(steps, inside, executed, states, run)
-            told.update(loop)
+            reported.update(loop)
             yield Unprompted(event, runs.trace_to(state), loop)
 
     def _executed(self, silent: Sequence[str]) -> dict[str, Any]:

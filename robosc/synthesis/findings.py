@@ -13,9 +13,9 @@
 - `unreachable-state`: a state that its component never is in, whether or not its behaviour alone has a way there.
 - `unprompted-request`: a service or action that an executor, which takes resets and silent steps first, can request
   again and again while nothing happens but requests, their replies and silent steps: no message of the robot, by which
-  somebody or something would ask for it. It is a note, since a patrol is meant to go on for ever. A loop is told once,
-  for the request in it that is declared first. Only for the controller: in a layer the existing controller asks. In a
-  large system the search is given up.
+  somebody or something would ask for it. It is a note, since a patrol is meant to go on for ever. A loop is reported
+  once, for the request in it that is declared first. Only for the controller: in a layer the existing controller
+  asks. In a large system the search is given up.
 - `competing-requests`: two communications of one kind (topics, services and actions have name spaces of their own)
   with one identifier that can be requested in one state, with a shortest run to such a state. Only for the
   controller: in a layer it is the existing controller that chooses.

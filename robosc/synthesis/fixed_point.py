@@ -173,7 +173,7 @@ class FixedPoint:
                 reason = "uncontrollable events can lead from the initial state into states to be avoided"
                 return GoodStates(good, rounds, reason)
             rounds += 1
-            self._monitor.tell("fixed point", rounds, good)
+            self._monitor.report("fixed point", rounds, good)
             if good == before or (is_closed and good == nonblocking):
                 return GoodStates(good, rounds)
 

@@ -16,7 +16,7 @@ class ProgressMonitor:
         check_nodes: Asked before each step, too: raises an error where there are too many.
 
     Attributes:
-        peak_nodes: Most nodes that a predicate took that progress was told of.
+        peak_nodes: Most nodes of a predicate of which progress was reported.
     """
 
     def __init__(
@@ -44,7 +44,7 @@ class ProgressMonitor:
             raise SynthesisCancelled("synthesis was stopped")
         self._check_nodes()
 
-    def tell(self, phase: str, rounds: int, states: Any) -> None:
+    def report(self, phase: str, rounds: int, states: Any) -> None:
         """After each round: its phase and number, and the predicate that was found."""
         nodes = states.dag_size
         self.peak_nodes = max(self.peak_nodes, nodes)
@@ -100,9 +100,9 @@ class BoundedMonitor(ProgressMonitor):
         if self.limit is not None and self.steps > self.limit:
             raise EffortSpentError(self)
 
-    def tell(self, phase: str, rounds: int, states: Any) -> None:
+    def report(self, phase: str, rounds: int, states: Any) -> None:
         """Pass on progress."""
-        self._monitor.tell(phase, rounds, states)
+        self._monitor.report(phase, rounds, states)
 
     def result_of[T](self, work: Callable[[], T]) -> T | None:
         """Return the result of some work that asks this monitor, or None if its limit has ended the work."""

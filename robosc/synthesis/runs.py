@@ -162,7 +162,7 @@ class ShortestRuns:
         if self.reached == before:
             return False
         self._rounds += 1
-        self._monitor.tell("shortest runs", self._rounds, self.reached)
+        self._monitor.report("shortest runs", self._rounds, self.reached)
         return True
 
     def _add_ring(self) -> None:

@@ -72,7 +72,7 @@ class Saturation:
         allow_depth(len(levels) + len(self._groups), _FRAMES_PER_LEVEL)
         self._known: dict[tuple[int, int, int], tuple[Any, Any, Any]] = {}
         self._phase = ""
-        self._taken = self._told = 0
+        self._taken = self._reports = 0
 
     def of(self, states: Any, phase: str, until: Any = None) -> Any:
         """Return `states` and all that steps from them add.
@@ -85,10 +85,10 @@ class Saturation:
         """
         if not self._groups:
             return states
-        self._taken = self._told = 0
+        self._taken = self._reports = 0
         self._phase = phase
         states = self._of_whole(states, until)
-        self._tell(states)
+        self._report(states)
         self._known.clear()
         return states
 
@@ -141,13 +141,13 @@ class Saturation:
     def _grown(self, states: Any, within: Any, step: Step, new: Any) -> Any:
         self._monitor.check_stop()
         self._taken += 1
-        if self._taken >= (self._told + 1) * self._count:
-            self._tell(states)
+        if self._taken >= (self._reports + 1) * self._count:
+            self._report(states)
         return states if new == self._false else step.grown(states, within, new)
 
-    def _tell(self, states: Any) -> None:
-        self._told += 1
-        self._monitor.tell(self._phase, self._told, states)
+    def _report(self, states: Any) -> None:
+        self._reports += 1
+        self._monitor.report(self._phase, self._reports, states)
 
 
 def _split(predicate: Any, level: int) -> tuple[Any, Any]:
@@ -196,13 +196,13 @@ class CompiledSaturation:
             return states
         rounds = 0
 
-        def tell(number: int, address: int) -> None:
+        def report(number: int, address: int) -> None:
             nonlocal rounds
             rounds = number
-            self._monitor.tell(phase, number, self._kernel.predicate(address))
+            self._monitor.report(phase, number, self._kernel.predicate(address))
 
-        states = self._kernel.closure(states, self._within, self._groups, until, self._monitor.check_stop, tell)
-        self._monitor.tell(phase, rounds + 1, states)
+        states = self._kernel.closure(states, self._within, self._groups, until, self._monitor.check_stop, report)
+        self._monitor.report(phase, rounds + 1, states)
         return states
 
     def _passed(self, step: Step, image: Image) -> tuple[object, ...]:

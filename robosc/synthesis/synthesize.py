@@ -76,7 +76,7 @@ class _Synthesis:
         for event in self._encoding.system.events:
             self._monitor.check_stop()
             found.append(Steps(self._encoding, transition_of(self._encoding, event)))
-            self._monitor.tell("encoding", len(found), found[-1].plant)
+            self._monitor.report("encoding", len(found), found[-1].plant)
         return tuple(found)
 
     def result(self, questions: Questions) -> SynthesisResult:

@@ -41,7 +41,7 @@ class Effort:
         self._what = what
 
     def check(self, handled: int) -> None:
-        """Ask whether to stop, and tell of progress.
+        """Ask whether to stop, and report progress.
 
         Raises:
             SynthesisCancelled: The work is to end.

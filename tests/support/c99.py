@@ -334,10 +334,10 @@ class Reference:
     def _back(self, now: int, event: str) -> None:
         name, _, kind = event.rpartition(".")
         is_service = self.model.communication(name).kind is CommunicationKind.SERVICE
-        number = self._some(self.calls if is_service else self.goals, name)
+        number = self._waiting(self.calls if is_service else self.goals, name)
         type_ = event_data(self.model, event)
         datum = None if type_ is None else self._datum(self.layout.source(type_))
-        words: list[object] = ["b", now, events_back(self.layout).index(event), number]
+        words: list[object] = ["b", now, events_back(self.layout).index(event), number, *self._token_words(datum)]
         if type_ is not None:
             words += data_words(self.layout, type_, datum, is_root=True)
         if is_service:
@@ -347,6 +347,14 @@ class Reference:
         else:
             self.executor.on_goal_ended(number, "succeeded", datum)
         self._told(words)
+
+    def _waiting(self, ids: dict[int, str], name: str) -> int:
+        """A number that something comes back with."""
+        return self._some(ids, name)
+
+    def _token_words(self, datum: Any) -> list[object]:
+        """Words by which the program finds a message again."""
+        return []
 
     def _goal(self, now: int) -> None:
         number = self._some(self.goals)

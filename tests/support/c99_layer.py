@@ -23,7 +23,7 @@ from robosc.expressions import DoubleType, Type
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
 from robosc.targets.code.c.layer import request_parameters
-from robosc.targets.code.c.layout import Layout, event_data
+from robosc.targets.code.c.layout import Layout
 from support.c99 import Reference, _hex, built, compare, data_words, microseconds
 from support.c99_layer_main import CALLBACKS, TOKENS, layer_program
 from support.c99_main import batch_types, events_back
@@ -338,25 +338,12 @@ class LayerReference(Reference):
         fitting = [event for event in events if event.rpartition(".")[0] in self._open()]
         self._back(now, self.dice.choice(fitting if self.dice.random() < 0.9 and fitting else events))
 
-    def _back(self, now: int, event: str) -> None:
-        name, _, kind = event.rpartition(".")
-        is_service = self.model.communication(name).kind is CommunicationKind.SERVICE
-        ids = self.calls if is_service else self.goals
-        # C has a function for each of them: what another one waits for cannot be told to it.
-        number = self._some({key: item for key, item in ids.items() if item == name})
-        type_ = event_data(self.model, event)
-        datum = None if type_ is None else self._datum(self.layout.source(type_))
-        token = self.remember(datum)
-        words: list[object] = ["b", now, events_back(self.layout).index(event), number, token]
-        if type_ is not None:
-            words += data_words(self.layout, type_, datum, is_root=True)
-        if is_service:
-            self.executor.on_reply(number, datum)
-        elif kind == "feedback":
-            self.executor.on_feedback(number, datum)
-        else:
-            self.executor.on_goal_ended(number, "succeeded", datum)
-        self._told(words)
+    def _waiting(self, ids: dict[int, str], name: str) -> int:
+        # C has a function for each of them: it cannot take what another one waits for.
+        return self._some({number: item for number, item in ids.items() if item == name})
+
+    def _token_words(self, datum: Any) -> list[object]:
+        return [self.remember(datum)]
 
     def _goal(self, now: int) -> None:
         open_ = [goal.number for goal in self.executor._goals.open_goals()]

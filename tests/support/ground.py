@@ -148,7 +148,7 @@ class PlayedDaemon:
     def write(self, **entry: Any) -> None:
         """Write an entry into the event log."""
         told: Entry = entry
-        self.feed.tell(told)
+        self.feed.append(told)
 
 
 class Station:

@@ -134,7 +134,7 @@ class LiveRobot:
         data = self._dice.randint(0, 3)
         is_told = event.endswith((".response", ".feedback"))
         self.system.step(event, self.system.read(event, data) if is_told else None)
-        self.feed.tell(
+        self.feed.append(
             {
                 "time": time.time(),
                 "kind": "event",

@@ -399,7 +399,7 @@ def every_mistake(seed: int = 1) -> tuple[Mistake, ...]:
 
 
 def report(mistakes: Iterable[Mistake], *, is_long: bool) -> Iterator[str]:
-    """Yield the lines of a table of shares; before it, where asked for, those that are not told well."""
+    """Yield the lines of a table of shares; before it, where asked for, those without a good message."""
     counts: dict[str, tuple[int, int]] = {}
     for mistake in mistakes:
         verdict = judge(mistake)
@@ -418,9 +418,9 @@ def report(mistakes: Iterable[Mistake], *, is_long: bool) -> Iterator[str]:
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser(description="Print how many mistakes are told well, by category.")
+    parser = argparse.ArgumentParser(description="Print how many mistakes get a good message, by category.")
     parser.add_argument("--seed", type=int, default=1, help="seed of the slips that are drawn (default: 1)")
-    parser.add_argument("--long", action="store_true", help="also print each mistake that is not told well")
+    parser.add_argument("--long", action="store_true", help="also print each mistake without a good message")
     arguments = parser.parse_args()
     for row in report(every_mistake(arguments.seed), is_long=arguments.long):
         print(row)

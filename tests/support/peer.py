@@ -11,6 +11,7 @@ from collections.abc import Callable, Iterable
 from types import TracebackType
 from typing import Self
 
+from robosc_simulated.closing import Closing
 from robosc_simulated.virtual_host import VirtualHost
 
 Answers = Iterable[bytes | float]
@@ -78,7 +79,7 @@ class VirtualPeer:
         self.time.close()
 
 
-class Peer:
+class Peer(Closing):
     """The far end of a real line, served by a thread until it is closed.
 
     Args:
@@ -120,14 +121,6 @@ class Peer:
         self._thread.join()
         for file in (self._master, self._slave, self._woken, self._waker):
             os.close(file)
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 def crc(data: bytes) -> int:

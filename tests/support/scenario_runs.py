@@ -141,7 +141,7 @@ class Companion:
 
     def say(self, item: FromProgram) -> None:
         """Tell the bridge something."""
-        self._run.machine.operations.tell(item)
+        self._run.machine.operations.post(item)
 
     def _work(self) -> None:
         last: Ranges | None = None

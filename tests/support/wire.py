@@ -1,12 +1,12 @@
 """The host's end of a simulated serial line, with pyserial or virtual ports and nothing of the drivers."""
 
-from types import TracebackType
-from typing import Any, Self
+from typing import Any
 
 import serial
 from dynamixel_sdk import PortHandler
 
 from robosc_simulated import SimulatedLine
+from robosc_simulated.closing import Closing
 from robosc_simulated.virtual_host import VirtualHost
 from support.waiting import PATIENCE_S, wait_until
 
@@ -56,7 +56,7 @@ class VirtualSerial:
         self._port.close()
 
 
-class Host:
+class Host(Closing):
     """An open port.
 
     Args:
@@ -98,14 +98,6 @@ class Host:
 
     def close(self) -> None:
         self.port.close()
-
-    def __enter__(self) -> Self:
-        return self
-
-    def __exit__(
-        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
-    ) -> None:
-        self.close()
 
 
 class SdkPort(PortHandler):  # type: ignore[misc]

@@ -333,10 +333,10 @@ class _Vehicle(_Player):
                 continue
             for message in decoder.feed(record.data):
                 before, state = state, state.after(message, self.time_s, own)
-                yield from self._told(message, before, state)
-                told = estimate(state)
-                if told is not None and told.content is not odometry.last:
-                    odometry = odometry.advanced(told.content)
+                yield from self._reported(message, before, state)
+                report = estimate(state)
+                if report is not None and report.content is not odometry.last:
+                    odometry = odometry.advanced(report.content)
                     battery = state.battery or state.pack
                     yield self.item(
                         "reading",
@@ -345,7 +345,7 @@ class _Vehicle(_Player):
                     )
         self.summary.count(decoder.counts)
 
-    def _told(self, message: Message, before: VehicleState, state: VehicleState) -> Iterator[Item]:
+    def _reported(self, message: Message, before: VehicleState, state: VehicleState) -> Iterator[Item]:
         match message.content:
             case Heartbeat() as heartbeat:
                 last = None if before.heartbeat is None else before.heartbeat.content
@@ -358,8 +358,8 @@ class _Vehicle(_Player):
                 sectors = ring_sectors(ring, heading_rad)
                 if sectors is not None:
                     yield self.item("scan", **_ranges(nearest_in_sectors(sectors)))
-            case SectorDistance() as told:
-                sector = sensor_sector(told)
+            case SectorDistance() as report:
+                sector = sensor_sector(report)
                 if sector is not None:
                     yield self.item("scan", **_ranges(nearest_in_sectors((sector,))))
         if state.restarts != before.restarts:

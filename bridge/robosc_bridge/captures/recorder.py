@@ -63,7 +63,7 @@ class Recorder:
         self._part_bytes = limit_bytes // PARTS
         self._waiting: queue.SimpleQueue[Record | None] = queue.SimpleQueue()
         self._is_over = False
-        self._told = 0
+        self._reported_lost = 0
         self._written = 0
         if file.exists() and not _is_capture(file):
             raise CaptureError(f"{file}: this file is no capture, and is not overwritten; choose another name")
@@ -132,8 +132,8 @@ class Recorder:
             _rotate(self._file)
             self._stream = self._file.open("xb")
             self._writer = self._begin()
-        if self.lost > self._told:
-            self._told, data = self.lost, event("lost", records=self.lost - self._told)
+        if self.lost > self._reported_lost:
+            self._reported_lost, data = self.lost, event("lost", records=self.lost - self._reported_lost)
             for info in self._lines.values():
                 self._writer.write(Record(record.time_ns, info.name, Kind.EVENTS, data))
             _log.warning("the recording %s has lost %d records: its disk is too slow", self._file, self.lost)

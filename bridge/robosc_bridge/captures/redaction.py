@@ -3,13 +3,13 @@
 | what | what becomes of it |
 |---|---|
 | time of day | the capture begins in 1970; times between records stay |
-| ports and addresses | removed; `/dev/serial/by-id` holds serial numbers, an address tells a network |
+| ports and addresses | removed; `/dev/serial/by-id` holds serial numbers, an address reveals a network |
 | options that name files, such as `signing_key` | removed |
 | problems of lines in words | removed, as they name ports |
 | MAVLink: places on the earth, names, serial numbers | only messages that the drivers read or send stay |
-| MAVLink: texts | removed, as autopilots tell their serial numbers there |
+| MAVLink: texts | removed, as autopilots send their serial numbers there |
 | MAVLink: signatures | removed, and the packets are as if they had never been signed |
-| LiDARs: texts of six characters or more between frames | overwritten: some tell their serial number at the start |
+| LiDARs: texts of six characters or more between frames | overwritten: some send their serial number at the start |
 
 The ranges of a LiDAR show the shape of a room, and are kept; `without` leaves out the whole line.
 """
@@ -58,7 +58,7 @@ def redacted(capture: Capture, without: Collection[str] = ()) -> Capture:
         without: Names of lines that are left out.
 
     Raises:
-        CaptureError: It has no such line, or a line of a driver of which nobody knows what it tells.
+        CaptureError: It has no such line, or a line of a driver of which nobody knows what it reveals.
     """
     unknown = sorted(set(without) - set(capture.lines))
     if unknown:
@@ -103,9 +103,9 @@ def _event(record: Record) -> bytes:
 def _cleaned(info: LineInfo, pieces: list[bytes]) -> list[bytes]:
     """The bytes of one direction, piece by piece; servos and OpenCR tell nothing of an owner."""
     if info.driver == "mavlink-rover":
-        decoder = Decoder(Codec(1, 1), lambda told: told)
+        decoder = Decoder(Codec(1, 1), lambda message: message)
         return [
-            b"".join(_unsigned(told) for told in decoder.feed(piece) if told.get_msgId() in _KEPT_MESSAGES)
+            b"".join(_unsigned(message) for message in decoder.feed(piece) if message.get_msgId() in _KEPT_MESSAGES)
             for piece in pieces
         ]
     return _without_texts(_LIDARS[info.driver].make_decoder, pieces) if info.driver in _LIDARS else pieces
@@ -124,12 +124,12 @@ def _without_texts(make: Callable[[], FrameDecoder[Any]], pieces: list[bytes]) -
     return [bytes(data[end - len(piece) : end]) for end, piece in zip(ends, pieces, strict=True)]
 
 
-def _unsigned(told: Any) -> bytes:
+def _unsigned(message: Any) -> bytes:
     """The packet of a message of the library, as its sender would have sent it without signing."""
-    header = told.get_header()
+    header = message.get_header()
     codec: Any = dialect.MAVLink(None, srcSystem=header.srcSystem, srcComponent=header.srcComponent)
     codec.seq = header.seq
-    return bytes(told.pack(codec))
+    return bytes(message.pack(codec))
 
 
 def metadata_of(lines: Mapping[str, LineInfo]) -> list[str]:

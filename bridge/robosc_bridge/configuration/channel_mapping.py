@@ -215,15 +215,15 @@ class _MappingChecks:
     def _unknown_names(self) -> Iterator[tuple[Path, str]]:
         """Settings of the executor with names that the model does not have."""
         execution, items = self._configuration.execution, self._model.communications
-        told = CommunicationKind.OUTGOING_MESSAGE
-        requests = {item.name for item in items if item.kind is not told}
+        incoming = CommunicationKind.OUTGOING_MESSAGE
+        requests = {item.name for item in items if item.kind is not incoming}
         for place, name in enumerate(execution.priority):
             if name not in requests:
                 yield (
                     ("execution", "priority", place),
                     f"'{name}' is not a request of the model; {hint(name, requests)}",
                 )
-        received = {item.identifier for item in items if item.kind is told}
+        received = {item.identifier for item in items if item.kind is incoming}
         for name in execution.max_age_s:
             if name not in received:
                 yield (

@@ -87,14 +87,14 @@ def _options() -> Iterator[str]:
 def _data() -> Iterator[str]:
     for kind, info in CHANNELS.items():
         for communication, use in info.uses.items():
-            is_told = communication is CommunicationKind.OUTGOING_MESSAGE
-            yield f"| `{channel_name(kind)}`, {communication} | {_use(use, is_told)} |"
+            is_received = communication is CommunicationKind.OUTGOING_MESSAGE
+            yield f"| `{channel_name(kind)}`, {communication} | {_use(use, is_received)} |"
 
 
-def _use(use: Use, is_told: bool) -> str:
+def _use(use: Use, is_received: bool) -> str:
     if use.request is use.response is use.feedback:
         return f"`{shape_text(use.request)}`"
-    if is_told:
+    if is_received:
         return f"`{shape_text(use.response)}`"
     parts = {"": use.request, "response ": use.response, "feedback ": use.feedback}
     return ", ".join(f"{name}`{shape_text(shape)}`" for name, shape in parts.items() if shape is not Leaf.NOTHING)

@@ -51,7 +51,7 @@ class LivenessMonitor:
     def __init__(self, threads: Sequence[DeviceThread]) -> None:
         self._threads = tuple(threads)
         self._endpoints: tuple[Endpoint, ...] = ()
-        self._told: set[str] = set()
+        self._reported: set[str] = set()
 
     def watch(self, endpoint: Endpoint) -> None:
         """From now on this one, too: who cannot be reached cannot be told to stop."""
@@ -61,8 +61,8 @@ class LivenessMonitor:
         """Return True if none has ended; report each endpoint that has, once."""
         ended = [endpoint.name for endpoint in self._endpoints if not endpoint.is_alive]
         for name in ended:
-            if name not in self._told:
-                self._told.add(name)
+            if name not in self._reported:
+                self._reported.add(name)
                 _log.critical("the %s has ended unexpectedly: the robot stops, and the bridge must be restarted", name)
         return not ended and all(thread.is_alive for thread in self._threads)
 

@@ -132,7 +132,7 @@ class Feed:
         for subscription in self._subscriptions:
             subscription.put(None)
 
-    def tell(self, entry: Entry) -> None:
+    def append(self, entry: Entry) -> None:
         """Send a new entry, whose values nobody changes any more."""
         for subscription in self._subscriptions:
             subscription.put(entry)
@@ -180,7 +180,7 @@ class WatchedLog:
     def write(self, entry: Entry) -> None:
         """Write it and show it."""
         self._log.write(entry)
-        self._feed.tell(entry)
+        self._feed.append(entry)
 
     def close(self) -> None:
         """Finish what was written."""

@@ -22,12 +22,12 @@ class Keyboard:
     """Reader of keys, in a thread of its own while its context lasts; does nothing without a terminal.
 
     Args:
-        told: Function that takes each key, a single character or `space`; must not wait.
+        on_key: Function that takes each key, a single character or `space`; must not wait.
         number: File descriptor of the terminal.
     """
 
-    def __init__(self, told: Callable[[str], None], number: int | None = None) -> None:
-        self._told = told
+    def __init__(self, on_key: Callable[[str], None], number: int | None = None) -> None:
+        self._on_key = on_key
         self._number = sys.stdin.fileno() if number is None else number
         self._before: Any = None
         self._thread: threading.Thread | None = None
@@ -74,4 +74,4 @@ class Keyboard:
                 _log.warning("the terminal is gone: keys have no effect any more")
                 return
             for key in data.decode("utf-8", "replace"):
-                self._told(_NAMES.get(key, key))
+                self._on_key(_NAMES.get(key, key))

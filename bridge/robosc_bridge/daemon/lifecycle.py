@@ -165,7 +165,7 @@ class Lifecycle:
                 self._order_reset(order)
             case OperatorCommand.QUIT:
                 if self.state is State.FAULT:
-                    # It was told when it came; whoever wanted the end gets an orderly one.
+                    # It was reported when it came; whoever wanted the end gets an orderly one.
                     self.problem = ""
                 self._orders.wait(Until.RESTING, order)
                 if self.state is not State.STOPPING:

@@ -82,8 +82,8 @@ class Operations:
         self._post(Order(command, by, answer.set_result))
         return answer
 
-    def tell(self, item: FromProgram) -> None:
-        """Tell the loop what a program says."""
+    def post(self, item: FromProgram) -> None:
+        """Pass an item of a program on to the loop."""
         self._post(item)
 
     def operator_seen(self) -> None:

@@ -72,7 +72,7 @@ class Snapshots:
     def note(self, kind: str, what: str) -> None:
         """Note an event of the bridge itself; it is in no log file, whose readers know nothing of it."""
         if self._feed.is_watched:
-            self._feed.tell({"time": self._clock.wall(), "kind": kind, "what": what})
+            self._feed.append({"time": self._clock.wall(), "kind": kind, "what": what})
 
     def poll(self, state: State, problem: str, notice: SafetyNotice) -> None:
         """Show what is so at the end of a cycle, if it is news or measurements have not been shown for a while."""

@@ -118,26 +118,26 @@ def _path(text: str | None) -> Path | None:
     return None if text is None else Path(text)
 
 
-def obtain(source: Source, tell: Callable[[str], None] = lambda text: None) -> Supervisor:
+def obtain(source: Source, report: Callable[[str], None] = lambda text: None) -> Supervisor:
     """Return the supervisor, verified or signed.
 
     Args:
         source: Source of the supervisor.
-        tell: Function that takes messages about where the work is and what is worth knowing, one line each.
+        report: Function that takes messages about where the work is and what is worth knowing, one line each.
 
     Raises:
         NoSupervisorError: There is none that can be trusted, or its silent steps never end.
     """
     if source.file.suffix == SUPERVISOR_SUFFIX:
-        return _read(source, tell)
+        return _read(source, report)
     if source.file.suffix != MODEL_SUFFIX:
         raise NoSupervisorError(
             f"{source.file}: neither a model ({MODEL_SUFFIX}) nor a supervisor ({SUPERVISOR_SUFFIX})"
         )
     bundle = _bundle(source.file)
     if source.server is None:
-        return _made(bundle, source, tell)
-    return _served(bundle, source.server, source, tell)
+        return _made(bundle, source, report)
+    return _served(bundle, source.server, source, report)
 
 
 def deployment_of(file: Path) -> Deployment:
@@ -156,22 +156,22 @@ def deployment_of(file: Path) -> Deployment:
         raise NoSupervisorError(f"{file}: {error}") from error
 
 
-def _read(source: Source, tell: Callable[[str], None]) -> Supervisor:
+def _read(source: Source, report: Callable[[str], None]) -> Supervisor:
     """The supervisor of a file, by its signature or by its model."""
     file, data = source.file, _bytes(source.file)
     model = file.with_suffix(MODEL_SUFFIX)
     bundle = _bundle(model) if model.is_file() else None
-    key = _signer(file, data, source.trusted, tell)
+    key = _signer(file, data, source.trusted, report)
     if key is not None:
-        tell(f"{file}: signed by {key}")
-        return _signed(file, data, bundle, source, tell)
+        report(f"{file}: signed by {key}")
+        return _signed(file, data, bundle, source, report)
     if bundle is None:
         reason = "is not signed by a trusted key, and the" if source.trusted else "the"
         raise NoSupervisorError(f"{file}: {reason} model that it is checked against is missing: no {model}")
-    return _checked(data, str(file), bundle, source, tell)
+    return _checked(data, str(file), bundle, source, report)
 
 
-def _signer(file: Path, data: bytes, trusted: tuple[PublicKey, ...], tell: Callable[[str], None]) -> PublicKey | None:
+def _signer(file: Path, data: bytes, trusted: tuple[PublicKey, ...], report: Callable[[str], None]) -> PublicKey | None:
     """The trusted key that has signed a file; None: none has, so that the verifier decides.
 
     Raises:
@@ -183,13 +183,15 @@ def _signer(file: Path, data: bytes, trusted: tuple[PublicKey, ...], tell: Calla
     try:
         return signer(data, _bytes(place, MAXIMUM_SIGNATURE_BYTES, "a signature"), trusted)
     except UnknownSignerError as error:
-        tell(f"{file}: {error}: it is verified instead")
+        report(f"{file}: {error}: it is verified instead")
         return None
     except RoboscError as error:
         raise NoSupervisorError(f"{place}: {error}") from error
 
 
-def _signed(file: Path, data: bytes, bundle: Bundle | None, source: Source, tell: Callable[[str], None]) -> Supervisor:
+def _signed(
+    file: Path, data: bytes, bundle: Bundle | None, source: Source, report: Callable[[str], None]
+) -> Supervisor:
     """A supervisor that somebody vouches for: what it is for, and what was found out about it, stands in it."""
     try:
         supervisor = decode(data)
@@ -200,7 +202,7 @@ def _signed(file: Path, data: bytes, bundle: Bundle | None, source: Source, tell
         raise NoSupervisorError(f"{file}: it is signed, but was made of other texts than {bundle.main.name} beside it")
     claimed = supervisor.certificate.controller
     outcome = _response(supervisor, str(file)) if claimed is None else claimed.finite_response
-    _require_response(outcome, str(file), source, tell)
+    _require_response(outcome, str(file), source, report)
     return supervisor
 
 
@@ -236,14 +238,14 @@ def _response(supervisor: Supervisor, place: str) -> PropertyResult:
     return found.finite_response
 
 
-def _require_response(outcome: PropertyResult, place: str, source: Source, tell: Callable[[str], None]) -> None:
+def _require_response(outcome: PropertyResult, place: str, source: Source, report: Callable[[str], None]) -> None:
     """Silent steps that never end stop the executor with a fault in the middle of its work."""
     if outcome == "failed":
         if not source.allow_livelock:
             raise NoSupervisorError(
                 f"{place}: not executed, because its silent steps never end (--allow-livelock overrides this)"
             )
-        tell(f"{place}: its silent steps may go on for ever; it stops with a fault then")
+        report(f"{place}: its silent steps may go on for ever; it stops with a fault then")
 
 
 def _bundle(model: Path) -> Bundle:
@@ -266,8 +268,8 @@ def _bytes(file: Path, most: int = MAXIMUM_BYTES, what: str = "a supervisor") ->
     return data
 
 
-def _made(bundle: Bundle, source: Source, tell: Callable[[str], None]) -> Supervisor:
-    tell(f"{bundle.main.name}: synthesis")
+def _made(bundle: Bundle, source: Source, report: Callable[[str], None]) -> Supervisor:
+    report(f"{bundle.main.name}: synthesis")
     try:
         made = make_supervisor(bundle, deployment=source.deployment, allow_livelock=source.allow_livelock)
     except RoboscError as error:
@@ -276,13 +278,13 @@ def _made(bundle: Bundle, source: Source, tell: Callable[[str], None]) -> Superv
         raise NoSupervisorError(made.reason or str(made.diagnostics[0]))
     found = made.supervisor.certificate.controller
     if found is not None:
-        _require_response(found.finite_response, bundle.main.name, source, tell)
+        _require_response(found.finite_response, bundle.main.name, source, report)
     return made.supervisor
 
 
-def _checked(data: bytes, place: str, bundle: Bundle, source: Source, tell: Callable[[str], None]) -> Supervisor:
+def _checked(data: bytes, place: str, bundle: Bundle, source: Source, report: Callable[[str], None]) -> Supervisor:
     """A foreign supervisor, if it is right."""
-    tell(f"{place}: verification against {bundle.main.name}")
+    report(f"{place}: verification against {bundle.main.name}")
     try:
         supervisor = decode(data)
         _require_deployment(supervisor, source.deployment, place)
@@ -299,16 +301,16 @@ def _checked(data: bytes, place: str, bundle: Bundle, source: Source, tell: Call
     if outcome == "not checked":
         # What it says, the verifier has judged; a file that says nothing of it must not get past.
         outcome = _response(supervisor, place)
-    _require_response(outcome, place, source, tell)
+    _require_response(outcome, place, source, report)
     return supervisor
 
 
-def _served(bundle: Bundle, server: str, source: Source, tell: Callable[[str], None]) -> Supervisor:
+def _served(bundle: Bundle, server: str, source: Source, report: Callable[[str], None]) -> Supervisor:
     """Return the supervisor that the server makes, or else the one that it made last."""
     from robosc_client import Client, ClientError, ServerUnavailableError, SynthesisOptions, SynthesisStatus
 
     cache = source.cache / f"{bundle.digest}-{source.deployment}{SUPERVISOR_SUFFIX}" if source.cache else None
-    tell(f"{bundle.main.name}: synthesis at {server}")
+    report(f"{bundle.main.name}: synthesis at {server}")
     try:
         with Client(server, source.credentials) as client:
             options = SynthesisOptions(deployment=source.deployment, allow_livelock=source.allow_livelock)
@@ -316,13 +318,13 @@ def _served(bundle: Bundle, server: str, source: Source, tell: Callable[[str], N
     except (ServerUnavailableError, TimeoutError) as error:
         if cache is None or not is_cached(cache):
             raise NoSupervisorError(f"{error}, and none is kept of an earlier start") from error
-        tell(f"{error}: what it made last is taken")
-        return _checked(_bytes(cache), str(cache), bundle, source, tell)
+        report(f"{error}: what it made last is taken")
+        return _checked(_bytes(cache), str(cache), bundle, source, report)
     except ClientError as error:
         raise NoSupervisorError(str(error)) from error
     if answer.status is not SynthesisStatus.SUPERVISOR:
         raise NoSupervisorError(f"{server}: {answer.reason or answer.diagnostics[0]}")
-    supervisor = _checked(answer.supervisor, server, bundle, source, tell)
+    supervisor = _checked(answer.supervisor, server, bundle, source, report)
     if cache is not None:
         store(cache, answer.supervisor)
     return supervisor

@@ -210,8 +210,10 @@ class ProcessCamera(_StreamCamera):
         with contextlib.suppress(BlockingIOError):
             text = os.read(problems, _LONGEST_PROBLEM)
         lines = text.decode("utf-8", "replace").split("\n")
-        told = [line.strip() for line in lines if line.strip()]
-        return told[-1] if told else f"the camera's process has ended with status {process.poll()}"
+        lines_with_text = [line.strip() for line in lines if line.strip()]
+        return (
+            lines_with_text[-1] if lines_with_text else f"the camera's process has ended with status {process.poll()}"
+        )
 
     def close(self) -> None:
         """Close the camera."""

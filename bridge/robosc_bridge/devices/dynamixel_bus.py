@@ -283,8 +283,8 @@ class DynamixelBus:
                 return True
         return False
 
-    def tell(self, device: int, address: int, data: bytes) -> None:
-        """Write to an address of a device that may hear though it is not heard: no answer is waited for.
+    def write_unanswered(self, device: int, address: int, data: bytes) -> None:
+        """Write to an address of a device without waiting for an answer, as where the device hears and is not heard.
 
         Raises:
             LineError: The line is gone.

@@ -67,7 +67,7 @@ class MavlinkObstacles:
         self._is_requested = False
         self._ring_s = -math.inf
         self._sensors: dict[int, Timestamped[Sector]] = {}
-        self._told: set[int] = set()
+        self._reported: set[int] = set()
 
     def open(self) -> None:
         """Open the line, unless a drive base has it open already; waits for nothing.
@@ -80,7 +80,7 @@ class MavlinkObstacles:
         self._is_requested = False
         self._ring_s = -math.inf
         self._sensors.clear()
-        self._told.clear()
+        self._reported.clear()
 
     def receive(self, limit_s: float) -> Scan | None:
         """The next ring, or the next round of single sensors; when several have come, the newest.
@@ -94,8 +94,8 @@ class MavlinkObstacles:
             self._keep_on(link)
             left_s = end_s - self._host.monotonic()
             scan = None
-            for told in link.take_obstacles(min(left_s, _SLICE_S), self._woken.is_set):
-                scan = self._after(told, link.state) or scan
+            for obstacle in link.take_obstacles(min(left_s, _SLICE_S), self._woken.is_set):
+                scan = self._after(obstacle, link.state) or scan
             self._count(link)
             is_woken = self._woken.is_set()
             if scan or is_woken or left_s <= 0:
@@ -143,17 +143,17 @@ class MavlinkObstacles:
         self.counters.bad_frames = counts.bad_frames
         self.counters.skipped_bytes = counts.skipped_bytes
 
-    def _after(self, told: Timestamped[Obstacle], state: VehicleState) -> Scan | None:
+    def _after(self, obstacle: Timestamped[Obstacle], state: VehicleState) -> Scan | None:
         """The scan that this completes."""
-        if isinstance(told.content, ObstacleRing):
+        if isinstance(obstacle.content, ObstacleRing):
             attitude = state.attitude
-            is_known = attitude is not None and abs(told.time_s - attitude.time_s) <= STALE_AFTER_S
-            sectors = ring_sectors(told.content, attitude.content.heading_rad if attitude and is_known else None)
+            is_known = attitude is not None and abs(obstacle.time_s - attitude.time_s) <= STALE_AFTER_S
+            sectors = ring_sectors(obstacle.content, attitude.content.heading_rad if attitude and is_known else None)
             if sectors is None:
                 return None
-            self._ring_s = told.time_s
-            return self._scan(sectors, told.time_s)
-        return self._after_sensor(told.content, told.time_s)
+            self._ring_s = obstacle.time_s
+            return self._scan(sectors, obstacle.time_s)
+        return self._after_sensor(obstacle.content, obstacle.time_s)
 
     def _after_sensor(self, content: SectorDistance, time_s: float) -> Scan | None:
         """A round of them is complete when the first one tells again."""
@@ -161,13 +161,13 @@ class MavlinkObstacles:
         if sector is None or time_s - self._ring_s <= STALE_AFTER_S:
             return None
         self._sensors[content.orientation] = Timestamped(time_s, sector)
-        is_full = content.orientation in self._told
+        is_full = content.orientation in self._reported
         if is_full:
-            self._told.clear()
-        self._told.add(content.orientation)
+            self._reported.clear()
+        self._reported.add(content.orientation)
         if not is_full:
             return None
-        fresh = [told.content for told in self._sensors.values() if time_s - told.time_s <= STALE_AFTER_S]
+        fresh = [obstacle.content for obstacle in self._sensors.values() if time_s - obstacle.time_s <= STALE_AFTER_S]
         return self._scan(tuple(fresh), time_s)
 
     def _scan(self, sectors: tuple[Sector, ...], time_s: float) -> Scan:

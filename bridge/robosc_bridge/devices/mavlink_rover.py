@@ -257,11 +257,11 @@ class MavlinkRover:
             self._is_torque_wanted = False
             raise DeviceError(f"{self._path}: the rover has restarted; it must be opened again")
         is_obeying = heartbeat.is_armed and heartbeat.mode == Mode.GUIDED
-        told = self._fresh(state)
+        report = self._fresh(state)
         if self._is_torque_wanted:
             self._is_torque_lost = self._is_torque_lost or not is_obeying
             # Nor is one driven that no longer tells what it does.
-            is_driven = not self._is_torque_lost and told is not None
+            is_driven = not self._is_torque_lost and report is not None
             target = velocity if is_driven else STANDSTILL
             target = within_limits(target, self.limits, self._robot.wheel_separation_m)
             if self._host.monotonic() > velocity.until_s:
@@ -270,11 +270,11 @@ class MavlinkRover:
                 self._send_target(target)
             if is_driven and target == self._target:
                 self._source.written()
-        if told is None:
+        if report is None:
             raise DeviceSilentError(
                 f"{self._path}: the rover has not reported its motion for {self._motion_limit_s:g} s"
             )
-        return self._reading(state, told, is_obeying)
+        return self._reading(state, report, is_obeying)
 
     def reset(self) -> None:
         """See whether the vehicle arms in GUIDED again, and disarm it.
@@ -337,15 +337,15 @@ class MavlinkRover:
         Raises:
             DeviceSilentError: It was too long ago.
         """
-        told = state.heartbeat
-        if told is None or self._host.monotonic() - told.time_s > HEARTBEAT_LIMIT_S:
+        report = state.heartbeat
+        if report is None or self._host.monotonic() - report.time_s > HEARTBEAT_LIMIT_S:
             raise DeviceSilentError(f"{self._path}: no heartbeat of the rover for {HEARTBEAT_LIMIT_S:g} s")
-        return told.content
+        return report.content
 
     def _fresh(self, state: VehicleState) -> Timestamped[MotionEstimate] | None:
-        told = estimate(state)
-        is_fresh = told is not None and self._host.monotonic() - told.time_s <= self._motion_limit_s
-        return told if is_fresh else None
+        report = estimate(state)
+        is_fresh = report is not None and self._host.monotonic() - report.time_s <= self._motion_limit_s
+        return report if is_fresh else None
 
     def _is_another_s(self, heartbeat: Heartbeat) -> bool:
         return heartbeat.is_armed and heartbeat.mode != Mode.GUIDED
@@ -374,9 +374,9 @@ class MavlinkRover:
     def _comes_to_rest(self) -> bool:
         def is_at_rest(state: VehicleState) -> bool:
             # Where it tells nothing, there is nothing to wait for.
-            told = self._fresh(state)
-            return told is None or (
-                abs(told.content.linear_m_s) < _REST_M_S and abs(told.content.angular_rad_s) < _REST_RAD_S
+            report = self._fresh(state)
+            return report is None or (
+                abs(report.content.linear_m_s) < _REST_M_S and abs(report.content.angular_rad_s) < _REST_RAD_S
             )
 
         return self._waits(is_at_rest, _REST_LIMIT_S)
@@ -398,8 +398,8 @@ class MavlinkRover:
             link.send(command(state.system, state.component, number, confirmation, *parameters))
 
             def is_answered(now: VehicleState) -> bool:
-                told = now.answers.get(number)
-                return told is not None and told.time_s >= began_s and told.content.result != Result.IN_PROGRESS
+                report = now.answers.get(number)
+                return report is not None and report.time_s >= began_s and report.content.result != Result.IN_PROGRESS
 
             if self._waits(is_answered, _ANSWER_LIMIT_S):
                 self._check_answer(link.state, number, began_s, action)
@@ -415,9 +415,9 @@ class MavlinkRover:
         name = Result(result).name.lower().replace("_", " ") if result in Result else f"result {result}"
         # The reason comes as text, before the answer.
         reasons = [
-            told.content.text
-            for told in state.texts
-            if told.time_s >= began_s and told.content.severity <= _WARNING and told.content.data
+            report.content.text
+            for report in state.texts
+            if report.time_s >= began_s and report.content.severity <= _WARNING and report.content.data
         ]
         reason = "; ".join(dict.fromkeys(reasons)) or "it gives no reason"
         raise DeviceFaultError(f"{self._path}: the rover does not {action} ({name}): {reason}")
@@ -463,22 +463,22 @@ class MavlinkRover:
         boot_ms = int((self._target_s - self._began_s) * 1000) % 2**32
         link.send(velocity_target(state.system, state.component, boot_ms, target.linear_m_s, target.angular_rad_s))
 
-    def _reading(self, state: VehicleState, told: Timestamped[MotionEstimate], is_obeying: bool) -> DriveReading:
-        if told.content is not self._odometry.last:
-            self._odometry = self._odometry.advanced(told.content)
+    def _reading(self, state: VehicleState, report: Timestamped[MotionEstimate], is_obeying: bool) -> DriveReading:
+        if report.content is not self._odometry.last:
+            self._odometry = self._odometry.advanced(report.content)
         velocity = self._odometry.velocity
         wheels_m_s = wheel_speeds(velocity, self._robot.wheel_separation_m)
         faults = {MotorFault.TORQUE_LOST} if self._is_torque_lost else set()
         is_on = self._is_torque_wanted and is_obeying and not self._is_torque_lost
         if is_on:
             goals = [round(speed * _MM) for speed in wheel_speeds(self._target, self._robot.wheel_separation_m)]
-            if self._following.is_blocked(goals, [round(speed * _MM) for speed in wheels_m_s], told.time_s):
+            if self._following.is_blocked(goals, [round(speed * _MM) for speed in wheels_m_s], report.time_s):
                 faults.add(MotorFault.BLOCKED)
         else:
             self._following.forget()
         main, pack = state.battery, state.pack
         return DriveReading(
-            time_s=told.time_s,
+            time_s=report.time_s,
             pose=self._odometry.pose,
             velocity=velocity,
             wheels_m_s=wheels_m_s,

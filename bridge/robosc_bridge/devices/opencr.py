@@ -260,9 +260,9 @@ class OpenCrBase:
 
         Raises:
             LineError: The line is gone.
-            DeviceSilentError: The board did not answer, also when asked again; it has been told to stop.
-            DeviceFaultError: It is slow, as when a motor does not answer it; it has been told to stop.
-            DeviceError: The board has started anew, or the computer stood still; the board has been told to stop.
+            DeviceSilentError: The board did not answer, also when asked again; it has been commanded to stop.
+            DeviceFaultError: It is slow, as when a motor does not answer it; it has been commanded to stop.
+            DeviceError: The board has started anew, or the computer stood still; the board has been commanded to stop.
         """
         bus = self._used_bus
         if self._silent == 0:
@@ -272,7 +272,7 @@ class OpenCrBase:
         except DeviceSilentError:
             if self._is_torque_wanted:
                 # It may hear though it is not heard: its own time limit is half a second.
-                bus.tell(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
+                bus.write_unanswered(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
             self._silent += 1
             if self._silent >= _SILENT_LIMIT:
                 self._check_late(bus, self._late, self._asked_s + _SLOW_LIMIT_S - self._host.monotonic())
@@ -358,8 +358,8 @@ class OpenCrBase:
             self._is_torque_wanted = False
             with contextlib.suppress(BridgeError):
                 # Nothing is waited for: the wheels have stopped when the board comes to the second one.
-                self._bus.tell(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
-                self._bus.tell(opencr.DEVICE, opencr.TORQUE, b"\0")
+                self._bus.write_unanswered(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
+                self._bus.write_unanswered(opencr.DEVICE, opencr.TORQUE, b"\0")
         elif self._bus is not None:
             self._is_torque_wanted = False
             with contextlib.suppress(BridgeError):
@@ -506,7 +506,7 @@ class OpenCrBase:
     def _give_up(self, problem: str) -> NoReturn:
         # The board switches torque on by itself when it starts, and its motors count anew.
         self._is_torque_wanted = False
-        self._used_bus.tell(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
+        self._used_bus.write_unanswered(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
         raise DeviceError(f"{self._path}: {problem}; it must be opened again")
 
     def _wheels_raw(self, words: tuple[int, int]) -> tuple[int, int]:

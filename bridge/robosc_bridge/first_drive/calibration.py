@@ -35,7 +35,7 @@ class CalibrationError(BridgeError):
 
 
 @dataclass(frozen=True)
-class Way:
+class RolledMotion:
     """A motion as measured by the wheels alone, without an inertial sensor.
 
     Attributes:
@@ -68,7 +68,7 @@ def read_wheels(base: DriveBase, host: Host) -> tuple[float, float]:
         return reading.wheels_m
 
 
-def follow(base: DriveBase, host: Host, is_over: Callable[[], bool], separation_m: float) -> Way:
+def follow(base: DriveBase, host: Host, is_over: Callable[[], bool], separation_m: float) -> RolledMotion:
     """Return the way on which a robot is moved by hand until something is over; its torque is off.
 
     Args:
@@ -86,15 +86,15 @@ def follow(base: DriveBase, host: Host, is_over: Callable[[], bool], separation_
         begin = begin or wheels_m
         if is_over():
             left_m, right_m = (now_m - before_m for now_m, before_m in zip(wheels_m, begin, strict=True))
-            return Way((left_m + right_m) / 2, (right_m - left_m) / separation_m)
+            return RolledMotion((left_m + right_m) / 2, (right_m - left_m) / separation_m)
         host.sleep(_PERIOD_S)
 
 
-def wheel_radius_m(way: Way, measured_m: float, radius_m: float) -> float:
+def wheel_radius_m(way: RolledMotion, measured_m: float, radius_m: float) -> float:
     """Return the radius of the wheels.
 
     Args:
-        way: Way as the wheels have rolled it, with the radius below.
+        way: Motion as the wheels have rolled it, with the radius below.
         measured_m: The same as it was measured.
         radius_m: Radius that the odometry went by.
 
@@ -109,11 +109,11 @@ def wheel_radius_m(way: Way, measured_m: float, radius_m: float) -> float:
     return _plausible(radius_m * measured_m / abs(way.forward_m), radius_m, "wheel radius")
 
 
-def wheel_separation_m(way: Way, revolutions: int, separation_m: float, radius_factor: float = 1.0) -> float:
+def wheel_separation_m(way: RolledMotion, revolutions: int, separation_m: float, radius_factor: float = 1.0) -> float:
     """Return the distance between the wheels.
 
     Args:
-        way: Way as the wheels have rolled it.
+        way: Motion as the wheels have rolled it.
         revolutions: Number of revolutions that it was turned by, back to the mark.
         separation_m: Distance that the odometry went by.
         radius_factor: Measured radius of the wheels by the one that the odometry went by.

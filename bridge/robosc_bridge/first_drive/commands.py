@@ -23,7 +23,7 @@ from robosc_bridge.first_drive import calibration
 from robosc_bridge.first_drive.calibration import CalibrationError
 from robosc_bridge.first_drive.ports import serial_ports, stable_name
 from robosc_bridge.first_drive.servo_bus import BAUD_NUMBERS, BAUDS
-from robosc_bridge.first_drive.servo_setup import MOST_ID, Change, ServoSetup, Wish
+from robosc_bridge.first_drive.servo_setup import MOST_ID, Change, RequestedSettings, ServoSetup
 from robosc_bridge.host import Host
 from robosc_bridge.transport.network_line import is_network_address
 from robosc_bridge.transport.system_host import SYSTEM_HOST
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 WELL, NOT_WELL, WRONG_USE = 0, 1, 2
 
 _EPILOG = "exit status: 0 all is well; 1 something is wrong or missing, or was declined; 2 wrong use or files"
-_WHEELS = {"left": Wish(1, BAUDS[0], False), "right": Wish(2, BAUDS[0], True)}
+_WHEELS = {"left": RequestedSettings(1, BAUDS[0], False), "right": RequestedSettings(2, BAUDS[0], True)}
 
 type Ask = Callable[[str], str]
 """Asks a person something, and returns the answer."""
@@ -143,8 +143,8 @@ def _port_lines(probed: "ProbedPort") -> list[str]:
     if probed.problem:
         lines.append(f"  ! {probed.problem}")
     for device in probed.devices:
-        told = ", ".join(f"{name.replace('_', ' ')} {_word(value)}" for name, value in device.facts.items())
-        lines.append(f"  {device.name}: {told}")
+        text = ", ".join(f"{name.replace('_', ' ')} {_word(value)}" for name, value in device.facts.items())
+        lines.append(f"  {device.name}: {text}")
         lines += [f"    ! {problem}" for problem in device.problems]
     return lines
 
@@ -159,9 +159,9 @@ def _word(value: Any) -> str:
 
 
 def _setup(arguments: argparse.Namespace, host: Host = SYSTEM_HOST, ask: Ask = _ask) -> int:
-    usual = Wish() if arguments.wheel is None else _WHEELS[arguments.wheel]
+    usual = RequestedSettings() if arguments.wheel is None else _WHEELS[arguments.wheel]
     direction = None if arguments.direction is None else arguments.direction == "reverse"
-    wish = Wish(
+    wish = RequestedSettings(
         usual.device if arguments.new_id is None else arguments.new_id,
         arguments.new_baud or usual.baud,
         usual.is_reversed if direction is None else direction,
@@ -218,7 +218,7 @@ def _calibrate(arguments: argparse.Namespace, host: Host = SYSTEM_HOST, ask: Ask
     return WELL
 
 
-def _by_hand(configuration: Configuration, host: Host, ask: Ask, begin: str, end: str) -> calibration.Way:
+def _by_hand(configuration: Configuration, host: Host, ask: Ask, begin: str, end: str) -> calibration.RolledMotion:
     """The way on which a person moves the robot between two answers."""
     _, separation_m = _wheels(configuration)
     base = drive_base(configuration, host)

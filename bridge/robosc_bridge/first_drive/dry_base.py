@@ -29,7 +29,7 @@ class DryBase:
         self._clock = clock
         self._is_torque_wanted = False
         self._velocity = STANDSTILL
-        self._told: Velocity | None = None
+        self._reported: Velocity | None = None
         self._pose = Pose()
         self._moved_s = clock()
 
@@ -46,7 +46,7 @@ class DryBase:
     def open(self) -> None:
         """Open the real one; it is left with torque off."""
         self._is_torque_wanted = False
-        self._velocity, self._told = STANDSTILL, None
+        self._velocity, self._reported = STANDSTILL, None
         self._base.open()
         self._moved_s = self._clock()
 
@@ -62,8 +62,8 @@ class DryBase:
         self._move(reading.time_s)
         self._velocity = velocity if self._is_torque_wanted else STANDSTILL
         shown = Velocity(round(self._velocity.linear_m_s, 2), round(self._velocity.angular_rad_s, 2))
-        if shown != self._told:
-            self._told = shown
+        if shown != self._reported:
+            self._reported = shown
             _log.info("dry run: it would drive at %.2f m/s, %.2f rad/s", shown.linear_m_s, shown.angular_rad_s)
         half_m_s = self._velocity.angular_rad_s * self._separation_m / 2
         return replace(

@@ -24,7 +24,7 @@ _VELOCITY = 128
 
 
 @dataclass(frozen=True)
-class Wish:
+class RequestedSettings:
     """Wanted settings of a servo; None: left as it is.
 
     Attributes:
@@ -104,7 +104,7 @@ class ServoSetup:
         which = "no servo" if device is None else f"no servo {device}"
         raise DeviceSilentError(f"{self._path}: {which} answers at {', '.join(map(str, self._bauds))} baud")
 
-    def plan(self, wish: Wish) -> list[Change]:
+    def plan(self, wish: RequestedSettings) -> list[Change]:
         """Return what is to be written, in this order; empty: it is as it is wanted.
 
         Raises:
@@ -115,7 +115,7 @@ class ServoSetup:
             raise WrongDeviceError(f"{self._path}: another servo on this line has the id {wish.device} already")
         return [change for change in self._wanted(wish) if change.before != change.after]
 
-    def _wanted(self, wish: Wish) -> Iterator[Change]:
+    def _wanted(self, wish: RequestedSettings) -> Iterator[Change]:
         drive_mode = self._number(servo.DRIVE_MODE)
         is_reversed = bool(drive_mode & servo.REVERSE) if wish.is_reversed is None else wish.is_reversed
         yield Change("drive mode", servo.DRIVE_MODE, drive_mode, servo.REVERSE if is_reversed else 0)

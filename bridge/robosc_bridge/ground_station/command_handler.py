@@ -166,9 +166,9 @@ class CommandHandler:
 
     def _again(self, received: ReceivedCommand, change: Change, now_s: float) -> Result | None:
         """Return the answer to a repetition that is not done; None: it is done, since its first sending was lost."""
-        result, told_s = self._remembered.get(received.key, (None, -math.inf))
-        if result is not None and now_s - told_s <= REPEATED_S:
-            is_shown = now_s - told_s > _SHOWN_S
+        result, answered_s = self._remembered.get(received.key, (None, -math.inf))
+        if result is not None and now_s - answered_s <= REPEATED_S:
+            is_shown = now_s - answered_s > _SHOWN_S
             if result is not Result.ACCEPTED or not is_shown or self._still_holds(change.command):
                 return result
         elif now_s - self._last_stop_s > REPEATED_S:
@@ -244,7 +244,7 @@ class CommandHandler:
             return Result.TEMPORARILY_REJECTED
         found = [text for severity, text in blocking_notices(snapshot) if severity <= Severity.WARNING]
         for text in found:
-            # Each of them is to be told, and there are not more than there are.
+            # Each of them is to be reported, and there are not more than there are.
             self._say(Severity.WARNING, text, None)
         return Result.TEMPORARILY_REJECTED if found else Result.ACCEPTED
 

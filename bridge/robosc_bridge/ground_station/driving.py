@@ -30,21 +30,21 @@ class Unusable(Exception):
     """A set-point cannot be followed; says why."""
 
 
-def from_position_target(told: Any) -> Velocity:
+def from_position_target(raw: Any) -> Velocity:
     """The velocity that SET_POSITION_TARGET_LOCAL_NED asks for.
 
     Raises:
         Unusable: It asks for anything else than a speed ahead and a yaw rate.
     """
-    mask = told.type_mask
-    if told.coordinate_frame not in _BODY_FRAMES:
+    mask = raw.type_mask
+    if raw.coordinate_frame not in _BODY_FRAMES:
         raise Unusable("Set-points must be in the robot's own frame (8 BODY_NED, 9 or 12).")
     must_ignore = _POSITION | _ACCELERATION | _YAW
     if mask & must_ignore != must_ignore or mask & _FORCE or mask & (_VX | _YAW_RATE) == _VX | _YAW_RATE:
         raise Unusable("Set-points may hold a velocity and a yaw rate only, such as type mask 1511.")
-    speed_m_s = 0.0 if mask & _VX else told.vx
-    aside_m_s = 0.0 if mask & _VY else told.vy
-    yaw_rate_rad_s = 0.0 if mask & _YAW_RATE else told.yaw_rate
+    speed_m_s = 0.0 if mask & _VX else raw.vx
+    aside_m_s = 0.0 if mask & _VY else raw.vy
+    yaw_rate_rad_s = 0.0 if mask & _YAW_RATE else raw.yaw_rate
     if not all(map(math.isfinite, (speed_m_s, aside_m_s, yaw_rate_rad_s))):
         raise Unusable("A set-point is not a number.")
     if aside_m_s != 0.0:
@@ -52,21 +52,21 @@ def from_position_target(told: Any) -> Velocity:
     return Velocity(speed_m_s, -yaw_rate_rad_s + 0.0)
 
 
-def from_manual_control(told: Any, fastest: Velocity) -> Velocity:
+def from_manual_control(raw: Any, fastest: Velocity) -> Velocity:
     """Return the velocity of a stick: x ahead, r to the right, as ground stations send it.
 
     The axes y and z and the buttons are ignored.
 
     Args:
-        told: MANUAL_CONTROL.
+        raw: MANUAL_CONTROL.
         fastest: Velocity of a full stick.
 
     Raises:
         Unusable: An axis that is needed is not there.
     """
-    if abs(told.x) > _FULL or abs(told.r) > _FULL:
+    if abs(raw.x) > _FULL or abs(raw.r) > _FULL:
         raise Unusable("A stick has no x or no r axis.")
-    return Velocity(told.x / _FULL * fastest.linear_m_s, -told.r / _FULL * fastest.angular_rad_s + 0.0)
+    return Velocity(raw.x / _FULL * fastest.linear_m_s, -raw.r / _FULL * fastest.angular_rad_s + 0.0)
 
 
 def drive_message(mapping: ChannelMapping) -> Communication | None:
@@ -102,7 +102,7 @@ class Driving:
     Args:
         model: Model that the layer is for.
         message: Its message that is mapped to the drive.
-        tell: The daemon's inbox.
+        post: The daemon's inbox.
         notify: Function that takes the reports of the layer; from the loop's thread, neither waits nor raises.
     """
 
@@ -110,12 +110,12 @@ class Driving:
         self,
         model: Model,
         message: Communication,
-        tell: Callable[[FromProgram], None],
+        post: Callable[[FromProgram], None],
         notify: Callable[[ToProgram], None],
     ) -> None:
         self._model = model
         self._message = message
-        self._tell = tell
+        self._post = post
         self._notify = notify
         self._drive: _Drive | None = None
 
@@ -123,7 +123,7 @@ class Driving:
         """A set-point came."""
         if self._drive is None:
             self._drive = _Drive(Program("MAVLink", self._notify, may_request=True), now_s, velocity)
-            self._tell(Attached(self._drive.program))
+            self._post(Attached(self._drive.program))
         self._drive.last_s, self._drive.velocity = now_s, velocity
         self._request(self._drive, velocity)
 
@@ -142,9 +142,9 @@ class Driving:
         was_moving = drive.velocity != STANDSTILL
         if was_moving:
             self._request(drive, STANDSTILL)
-        self._tell(Detached(drive.program))
+        self._post(Detached(drive.program))
         return was_moving
 
     def _request(self, drive: _Drive, velocity: Velocity) -> None:
         data = drive_data(self._model, self._message, velocity)
-        self._tell(MessageRequested(drive.program, self._message.identifier, data))
+        self._post(MessageRequested(drive.program, self._message.identifier, data))

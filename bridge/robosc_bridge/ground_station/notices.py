@@ -23,7 +23,7 @@ _STATES = {
 
 
 def happened(before: Snapshot | None, after: Snapshot) -> Iterator[Notice]:
-    """Yield the notices of differences between two snapshots that are told once."""
+    """Yield the notices of differences between two snapshots that are reported once."""
     if before is None or before.state is not after.state:
         severity = Severity.ERROR if after.state is State.FAULT else Severity.NOTICE
         yield severity, _STATES[after.state]

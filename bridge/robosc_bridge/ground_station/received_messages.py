@@ -23,41 +23,45 @@ class ReceivedMessage:
     Attributes:
         sender: System and component.
         number: Number of the message.
-        told: The library's message.
+        message: The library's message.
         is_signed: True if it has a valid signature.
         is_old: True if it came as MAVLink 1.
     """
 
     sender: tuple[int, int]
     number: int
-    told: Any
+    message: Any
     is_signed: bool
     is_old: bool
 
     def is_for(self, settings: GroundSettings) -> bool:
         """Return True if the message is for the bridge, or for everybody."""
-        system, component = getattr(self.told, "target_system", 0), getattr(self.told, "target_component", 0)
+        system, component = getattr(self.message, "target_system", 0), getattr(self.message, "target_component", 0)
         return system in (0, settings.system) and component in (0, settings.component)
 
 
-def received_from(told: Any) -> ReceivedMessage:
+def received_from(message: Any) -> ReceivedMessage:
     """Return the message as it was heard, from a message of the library."""
-    sender = (told.get_srcSystem(), told.get_srcComponent())
-    return ReceivedMessage(sender, told.get_msgId(), told, is_signed(told), is_old(told))
+    sender = (message.get_srcSystem(), message.get_srcComponent())
+    return ReceivedMessage(sender, message.get_msgId(), message, is_signed(message), is_old(message))
 
 
 def command_in(received: ReceivedMessage, settings: GroundSettings) -> ReceivedCommand | None:
     """The command that a message is, if it is one and for us."""
-    told = received.told
+    message = received.message
     if received.number not in STOPPING or not received.is_for(settings):
         return None
     if received.number == Incoming.SET_MODE:
-        return ReceivedCommand(received.sender, Incoming.SET_MODE, (told.base_mode, told.custom_mode, 0, 0, 0, 0, 0))
-    first = (told.param1, told.param2, told.param3, told.param4)
+        return ReceivedCommand(
+            received.sender, Incoming.SET_MODE, (message.base_mode, message.custom_mode, 0, 0, 0, 0, 0)
+        )
+    first = (message.param1, message.param2, message.param3, message.param4)
     if received.number == Incoming.COMMAND_INT:
-        return ReceivedCommand(received.sender, told.command, (*first, float(told.x), float(told.y), told.z))
-    last = (told.param5, told.param6, told.param7)
-    return ReceivedCommand(received.sender, told.command, (*first, *last), told.confirmation > 0)
+        return ReceivedCommand(
+            received.sender, message.command, (*first, float(message.x), float(message.y), message.z)
+        )
+    last = (message.param5, message.param6, message.param7)
+    return ReceivedCommand(received.sender, message.command, (*first, *last), message.confirmation > 0)
 
 
 def meaning_of(command: ReceivedCommand) -> Meaning:

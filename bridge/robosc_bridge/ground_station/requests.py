@@ -19,34 +19,34 @@ _NAK, _UNKNOWN_COMMAND = 129, 7
 _FILE_PAYLOAD = 251
 
 
-def answers(number: int, told: Any, sender: tuple[int, int], settings: GroundSettings, now_s: float) -> list[Make]:
+def answers(number: int, message: Any, sender: tuple[int, int], settings: GroundSettings, now_s: float) -> list[Make]:
     """Return the answers to a request; empty: it is none.
 
     Args:
         number: Number of the message.
-        told: The library's message, addressed to us.
+        message: The library's message, addressed to us.
         sender: Sender of the message.
         settings: Settings of the link.
         now_s: The time.
     """
     match number:
-        case Incoming.PING if told.target_system == 0 and told.target_component == 0:
-            return [lambda codec: codec.ping_encode(told.time_usec, told.seq, *sender)]
+        case Incoming.PING if message.target_system == 0 and message.target_component == 0:
+            return [lambda codec: codec.ping_encode(message.time_usec, message.seq, *sender)]
         case Incoming.PARAM_REQUEST_READ:
-            place = told.param_index if told.param_index >= 0 else _place(told.param_id)
+            place = message.param_index if message.param_index >= 0 else _place(message.param_id)
             return [_parameter(place, settings)] if place in range(len(PARAMETERS)) else []
         case Incoming.PARAM_REQUEST_LIST:
             return [_parameter(place, settings) for place in range(len(PARAMETERS))]
         case Incoming.PARAM_SET:
             # That it is as it was says that it cannot be changed.
-            place = _place(told.param_id)
+            place = _place(message.param_id)
             return [_parameter(place, settings)] if place >= 0 else []
         case Incoming.MISSION_REQUEST_LIST:
-            return [lambda codec: codec.mission_count_encode(*sender, 0, told.mission_type)]
+            return [lambda codec: codec.mission_count_encode(*sender, 0, message.mission_type)]
         case Incoming.FILE_TRANSFER:
-            return [_no_files(told, sender)]
-        case Incoming.TIMESYNC if told.tc1 == 0:
-            return [lambda codec: codec.timesync_encode(int(now_s * 1e9), told.ts1)]
+            return [_no_files(message, sender)]
+        case Incoming.TIMESYNC if message.tc1 == 0:
+            return [lambda codec: codec.timesync_encode(int(now_s * 1e9), message.ts1)]
     return []
 
 
@@ -60,8 +60,8 @@ def _parameter(place: int, settings: GroundSettings) -> Make:
     return lambda codec: codec.param_value_encode(name.encode("ascii"), value, _REAL32, len(PARAMETERS), place)
 
 
-def _no_files(told: Any, sender: tuple[int, int]) -> Make:
-    asked = bytes(told.payload)
+def _no_files(message: Any, sender: tuple[int, int]) -> Make:
+    asked = bytes(message.payload)
     sequence, session, operation = struct.unpack_from("<HBB", asked)
     head = struct.pack("<HBBBBBB", (sequence + 1) % 65536, session, _NAK, 1, operation, 0, 0)
     payload = (head + asked[8:12] + bytes((_UNKNOWN_COMMAND,))).ljust(_FILE_PAYLOAD, b"\0")

@@ -89,8 +89,8 @@ class StationSession:
         self._stream = Stream(operations, settings, now_s)
         self._asking = CommandHandler(operations, self._stream, self._answer_in_words)
         message = drive_message(operations.mapping) if operations.is_layer else None
-        self._told: deque[ToProgram] = deque(maxlen=16)
-        self._driving = Driving(operations.model, message, operations.tell, self._told.append) if message else None
+        self._answers: deque[ToProgram] = deque(maxlen=16)
+        self._driving = Driving(operations.model, message, operations.post, self._answers.append) if message else None
         self._knows_old = False
         self._bytes = Bucket(settings.bytes_per_s, settings.bytes_per_s)
         self._heeded = Bucket(MESSAGES_PER_S, MOST_MESSAGES)
@@ -150,7 +150,7 @@ class StationSession:
         replies: list[Make] = []
         for received in self._decoder.take_datagram(data):
             if received.is_old and not self._is_own(received):
-                self._tell_old(received)
+                self._report_replay(received)
             command = None if self._is_own(received) else command_in(received, self._settings)
             if command is not None and isinstance(wanted := meaning_of(command), Stop):
                 replies += self._asking.take(command, wanted, now_s)
@@ -212,10 +212,10 @@ class StationSession:
         elif self._stream.snapshot is not None:
             holding += blocking_notices(self._stream.snapshot)
         self._texts.repeat(now_s, holding)
-        while self._told:
-            told = self._told.popleft()
-            if isinstance(told, Refused):
-                self._texts.say(now_s, Severity.WARNING, told.why)
+        while self._answers:
+            item = self._answers.popleft()
+            if isinstance(item, Refused):
+                self._texts.say(now_s, Severity.WARNING, item.why)
         if self._driving is not None:
             self._end_driving(self._driving.poll(now_s))
         if self._station_s is not None and now_s - self._station_s > STATION_LIMIT_S:
@@ -242,7 +242,7 @@ class StationSession:
             return
         self.accepted += 1
         # What another vehicle with the same key has sent must not choose whoever sends it on.
-        is_station = received.number == Incoming.HEARTBEAT and received.told.type in GROUND_STATIONS
+        is_station = received.number == Incoming.HEARTBEAT and received.message.type in GROUND_STATIONS
         self.claims += is_station or command_in(received, self._settings) is not None
 
     def _is_trusted(self, received: ReceivedMessage) -> bool:
@@ -256,7 +256,7 @@ class StationSession:
         if self._is_own(received):
             return []
         if received.is_old:
-            self._tell_old(received)
+            self._report_replay(received)
         command = command_in(received, self._settings)
         if command is not None and isinstance(wanted := meaning_of(command), Stop):
             return self._asking.take(command, wanted, self._now_s)
@@ -268,17 +268,17 @@ class StationSession:
         if not self._is_trusted(received):
             return []
         match received.number:
-            case Incoming.HEARTBEAT if received.told.type in GROUND_STATIONS:
+            case Incoming.HEARTBEAT if received.message.type in GROUND_STATIONS:
                 self._station(received)
-            case Incoming.MANUAL_CONTROL if received.told.target == self._settings.system:
-                self._drive(received, lambda: from_manual_control(received.told, self._settings.fastest))
+            case Incoming.MANUAL_CONTROL if received.message.target == self._settings.system:
+                self._drive(received, lambda: from_manual_control(received.message, self._settings.fastest))
             case Incoming.SET_POSITION_TARGET if received.is_for(self._settings):
-                self._drive(received, lambda: from_position_target(received.told))
+                self._drive(received, lambda: from_position_target(received.message))
             case _ if received.is_for(self._settings):
-                return requests.answers(received.number, received.told, received.sender, self._settings, self._now_s)
+                return requests.answers(received.number, received.message, received.sender, self._settings, self._now_s)
         return []
 
-    def _tell_old(self, received: ReceivedMessage) -> None:
+    def _report_replay(self, received: ReceivedMessage) -> None:
         if not self._knows_old:
             self._knows_old = True
             _log.warning("the ground station %d/%d speaks MAVLink 1, and is answered in MAVLink 2", *received.sender)

@@ -27,7 +27,7 @@ BURST = 12.0
 """Messages at once."""
 
 REPEAT_S = 20.0
-"""Time after which a text that still holds is told again, in seconds; the same news is not told again sooner."""
+"""Time after which a text that still holds is reported again, in seconds; the same text is not sent again sooner."""
 
 FLAPPING_S = 2.0
 """Shortest time between two reports of something that comes and goes, in seconds.
@@ -107,12 +107,12 @@ class _Waiting:
 
     @property
     def rank(self) -> tuple[bool, int]:
-        """The smaller, the sooner it is told."""
+        """The smaller, the sooner it is reported."""
         return self.asked_by is not None, self.severity
 
 
 class StatusTexts:
-    """Texts that are to be told, and their times."""
+    """Texts that are to be reported, and their times."""
 
     def __init__(self) -> None:
         self._waiting: list[_Waiting] = []
@@ -136,14 +136,14 @@ class StatusTexts:
 
         Args:
             now_s: The time.
-            severity: The graver, the sooner it is told.
+            severity: The graver, the sooner it is reported.
             text: Of any length.
             again_s: Seconds.
             asked_by: Asker that it answers, system and component; None: it is news of the robot, which goes first.
         """
         text = plain_text(text)
-        told_s = self._recent.get(text)
-        if told_s is not None and now_s - told_s < again_s:
+        sent_s = self._recent.get(text)
+        if sent_s is not None and now_s - sent_s < again_s:
             return
         if asked_by is not None:
             self._waiting = [item for item in self._waiting if item.asked_by != asked_by]

@@ -20,7 +20,7 @@ HEARTBEAT, VERSION = 0, 148
 HEARTBEAT_S = 1.0
 
 STALE_S = 2.0
-"""After so long without a new snapshot the loop is taken for hung: nothing old is told as if it were new."""
+"""After so long without a new snapshot the loop is taken for hung: nothing old is reported as if it were new."""
 
 GONE_S = 5.0
 """After so long the heartbeat ends, too: the station shows that the link is lost."""
@@ -74,7 +74,7 @@ class Stream:
         self._is_layer = operations.is_layer
         self._settings = settings
         self._began_s = self._fresh_s = self._pulse_s = now_s
-        self._told: dict[str, tuple[values.Number, float]] = {}
+        self._sent: dict[str, tuple[values.Number, float]] = {}
 
     def poll(self, snapshot: Snapshot | None, now_s: float) -> bool:
         """See the latest snapshot; whether it is a new one."""
@@ -171,13 +171,13 @@ class Stream:
         for name, number in self._numbers():
             kind = Telemetry.NAMED_VALUE_FLOAT if isinstance(number, float) else Telemetry.NAMED_VALUE_INT
             interval_s = self.schedule.interval_s(kind)
-            told, told_s = self._told.get(name, (None, -math.inf))
-            wait_s = interval_s if told == number else min(interval_s, CHANGE_S)
-            if not math.isinf(interval_s) and now_s - told_s >= wait_s:
-                found.append((told_s, name, number))
+            sent, sent_s = self._sent.get(name, (None, -math.inf))
+            wait_s = interval_s if sent == number else min(interval_s, CHANGE_S)
+            if not math.isinf(interval_s) and now_s - sent_s >= wait_s:
+                found.append((sent_s, name, number))
         for _, name, number in sorted(found):
             yield values.named_value(name, number, self._boot_ms(now_s))
-            self._told[name] = (number, now_s)
+            self._sent[name] = (number, now_s)
 
     def _boot_ms(self, now_s: float) -> int:
         return int((now_s - self._began_s) * 1000) % 2**32

@@ -54,7 +54,7 @@ class NamedValue:
     is_float: bool = False
 
     def number(self, components: Mapping[str, Mapping[str, Any]]) -> Number | None:
-        """Its value; None: there is none now, or none that can be told."""
+        """Its value; None: there is none now, or none that can be reported."""
         component = components.get(self.component)
         if component is None:
             return None
@@ -77,7 +77,7 @@ def named_values(model: Model) -> tuple[NamedValue, ...]:
     """All named values of a model, in its order."""
     taken = {SUPERVISOR_STATE, BLOCKED}
     found: list[NamedValue] = []
-    for meaning, component, variable, words, is_float in _told(model):
+    for meaning, component, variable, words, is_float in _published(model):
         if len(found) == MOST_VALUES:
             break
         name = _short(meaning, taken)
@@ -86,7 +86,7 @@ def named_values(model: Model) -> tuple[NamedValue, ...]:
     return tuple(found)
 
 
-def _told(model: Model) -> Iterator[tuple[str, str, str | None, tuple[str, ...], bool]]:
+def _published(model: Model) -> Iterator[tuple[str, str, str | None, tuple[str, ...], bool]]:
     for component in model.components:
         behaviour = component.behaviour
         if behaviour is None:
@@ -94,12 +94,12 @@ def _told(model: Model) -> Iterator[tuple[str, str, str | None, tuple[str, ...],
         yield component.name, component.name, None, tuple(state.name for state in behaviour.states), False
         for variable in behaviour.variables:
             meaning = f"{component.name}.{variable.name}"
-            if _is_told(variable.type):
+            if _is_published(variable.type):
                 words = variable.type.values if isinstance(variable.type, EnumType) else ()
                 yield meaning, component.name, variable.name, words, isinstance(variable.type, DoubleType)
 
 
-def _is_told(type_: Type) -> bool:
+def _is_published(type_: Type) -> bool:
     return isinstance(type_, BooleanType | IntegerType | DoubleType | EnumType)
 
 

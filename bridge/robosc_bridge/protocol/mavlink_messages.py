@@ -311,68 +311,68 @@ def _finite(*values: float) -> tuple[float, ...]:
     return values
 
 
-def _heartbeat(told: Any) -> Heartbeat:
-    return Heartbeat(told.type, told.autopilot, bool(told.base_mode & ARMED), told.custom_mode)
+def _heartbeat(raw: Any) -> Heartbeat:
+    return Heartbeat(raw.type, raw.autopilot, bool(raw.base_mode & ARMED), raw.custom_mode)
 
 
-def _attitude(told: Any) -> Attitude:
-    yaw_rad, rate_rad_s = _finite(told.yaw, told.yawspeed)
-    return Attitude(told.time_boot_ms / 1000, -yaw_rad, -rate_rad_s)
+def _attitude(raw: Any) -> Attitude:
+    yaw_rad, rate_rad_s = _finite(raw.yaw, raw.yawspeed)
+    return Attitude(raw.time_boot_ms / 1000, -yaw_rad, -rate_rad_s)
 
 
-def _local_position(told: Any) -> LocalPosition:
-    north_m, east_m, north_m_s, east_m_s = _finite(told.x, told.y, told.vx, told.vy)
-    return LocalPosition(told.time_boot_ms / 1000, north_m, -east_m, north_m_s, -east_m_s)
+def _local_position(raw: Any) -> LocalPosition:
+    north_m, east_m, north_m_s, east_m_s = _finite(raw.x, raw.y, raw.vx, raw.vy)
+    return LocalPosition(raw.time_boot_ms / 1000, north_m, -east_m, north_m_s, -east_m_s)
 
 
-def _odometry(told: Any) -> MotionEstimate | None:
-    if told.frame_id not in (LOCAL_NED, LOCAL_FRD) or told.child_frame_id != BODY_FRD:
+def _odometry(raw: Any) -> MotionEstimate | None:
+    if raw.frame_id not in (LOCAL_NED, LOCAL_FRD) or raw.child_frame_id != BODY_FRD:
         return None
-    w, x, y, z, *_ = _finite(*told.q, told.x, told.y, told.vx, told.yawspeed)
+    w, x, y, z, *_ = _finite(*raw.q, raw.x, raw.y, raw.vx, raw.yawspeed)
     yaw_rad = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return MotionEstimate(told.x, -told.y, -yaw_rad, told.vx, -told.yawspeed, told.reset_counter)
+    return MotionEstimate(raw.x, -raw.y, -yaw_rad, raw.vx, -raw.yawspeed, raw.reset_counter)
 
 
 def _share(percent: int) -> float | None:
     return None if percent < 0 else min(percent, 100) / 100
 
 
-def _sys_status(told: Any) -> BatteryState:
-    voltage_v = None if told.voltage_battery in (0, UNKNOWN) else told.voltage_battery / 1000
-    return BatteryState(True, voltage_v, _share(told.battery_remaining))
+def _sys_status(raw: Any) -> BatteryState:
+    voltage_v = None if raw.voltage_battery in (0, UNKNOWN) else raw.voltage_battery / 1000
+    return BatteryState(True, voltage_v, _share(raw.battery_remaining))
 
 
-def _battery_status(told: Any) -> BatteryState | None:
-    if told.id != 0:
+def _battery_status(raw: Any) -> BatteryState | None:
+    if raw.id != 0:
         return None
-    cells_mv = [cell_mv for cell_mv in told.voltages if cell_mv != UNKNOWN]
+    cells_mv = [cell_mv for cell_mv in raw.voltages if cell_mv != UNKNOWN]
     voltage_v = sum(cells_mv) / 1000 if any(cells_mv) else None
-    return BatteryState(False, voltage_v, _share(told.battery_remaining), told.charge_state)
+    return BatteryState(False, voltage_v, _share(raw.battery_remaining), raw.charge_state)
 
 
-def _text(told: Any) -> Text:
+def _text(raw: Any) -> Text:
     # The library's own `text` is ASCII: one character for each byte that is none, of a length of its own.
-    return Text(told.severity, bytes(told._text_raw).partition(b"\0")[0], told.id, told.chunk_seq)
+    return Text(raw.severity, bytes(raw._text_raw).partition(b"\0")[0], raw.id, raw.chunk_seq)
 
 
-def _answer(told: Any) -> Answer:
-    return Answer(told.command, told.result, told.target_system, told.target_component)
+def _answer(raw: Any) -> Answer:
+    return Answer(raw.command, raw.result, raw.target_system, raw.target_component)
 
 
-def _obstacle_ring(told: Any) -> ObstacleRing:
-    fine_deg, offset_deg = _finite(told.increment_f, told.angle_offset)
-    increment_deg = fine_deg or float(told.increment)
+def _obstacle_ring(raw: Any) -> ObstacleRing:
+    fine_deg, offset_deg = _finite(raw.increment_f, raw.angle_offset)
+    increment_deg = fine_deg or float(raw.increment)
     if not 0.01 <= abs(increment_deg) <= 180.0 or abs(offset_deg) > 720.0:
         raise ValueError("no such angle")
-    is_body_fixed = told.frame == BODY_FRD
-    distances_cm = tuple(told.distances)
-    return ObstacleRing(distances_cm, increment_deg, offset_deg, told.min_distance, told.max_distance, is_body_fixed)
+    is_body_fixed = raw.frame == BODY_FRD
+    distances_cm = tuple(raw.distances)
+    return ObstacleRing(distances_cm, increment_deg, offset_deg, raw.min_distance, raw.max_distance, is_body_fixed)
 
 
-def _distance(told: Any) -> SectorDistance:
-    (width_rad,) = _finite(told.horizontal_fov)
+def _distance(raw: Any) -> SectorDistance:
+    (width_rad,) = _finite(raw.horizontal_fov)
     width_deg = min(max(math.degrees(width_rad), 0.0), 360.0)
-    return SectorDistance(told.orientation, told.current_distance, told.min_distance, told.max_distance, width_deg)
+    return SectorDistance(raw.orientation, raw.current_distance, raw.min_distance, raw.max_distance, width_deg)
 
 
 READERS: Mapping[int, Callable[[Any], Content]] = {
@@ -442,11 +442,11 @@ def velocity_target(
     )  # fmt: skip
 
 
-def vehicle_message(told: Any) -> Message:
+def vehicle_message(raw: Any) -> Message:
     """Return the content of a vehicle's message of the library.
 
     Raises:
         ValueError: It says what cannot be.
     """
-    number = told.get_msgId()
-    return Message(told.get_srcSystem(), told.get_srcComponent(), READERS[number](told) if number in READERS else None)
+    number = raw.get_msgId()
+    return Message(raw.get_srcSystem(), raw.get_srcComponent(), READERS[number](raw) if number in READERS else None)

@@ -46,7 +46,7 @@ def ring_sectors(ring: ObstacleRing, heading_rad: float | None) -> tuple[Sector,
     """The sectors of a ring, without those that go around a second time.
 
     Args:
-        ring: As it was told.
+        ring: As it was reported.
         heading_rad: Of the vehicle, counter-clockwise from north; None: unknown.
 
     Returns:
@@ -72,14 +72,14 @@ def ring_sectors(ring: ObstacleRing, heading_rad: float | None) -> tuple[Sector,
     )
 
 
-def sensor_sector(told: SectorDistance) -> Sector | None:
+def sensor_sector(distance: SectorDistance) -> Sector | None:
     """The sector of a single sensor; None: it does not look around."""
-    if told.orientation >= _EIGHTHS:
+    if distance.orientation >= _EIGHTHS:
         return None
-    range_m = _range_m(told.distance_cm, told.least_cm, told.most_cm)
-    middle_deg = wrapped_deg(-told.orientation * _EIGHTH_DEG)
-    width_deg = told.width_deg or _EIGHTH_DEG
-    return Sector(middle_deg, width_deg, range_m, told.least_cm / 100, told.most_cm / 100)
+    range_m = _range_m(distance.distance_cm, distance.least_cm, distance.most_cm)
+    middle_deg = wrapped_deg(-distance.orientation * _EIGHTH_DEG)
+    width_deg = distance.width_deg or _EIGHTH_DEG
+    return Sector(middle_deg, width_deg, range_m, distance.least_cm / 100, distance.most_cm / 100)
 
 
 def nearest_in_sectors(sectors: Iterable[Sector]) -> tuple[float, ...]:
@@ -100,7 +100,7 @@ def ring_distances_cm(ranges_m: Sequence[float], least_cm: int, most_cm: int) ->
 
     Args:
         ranges_m: `BINS` bins, counter-clockwise from the front; NaN: nothing valid was measured.
-        least_cm: Shortest that is told: what is nearer is told as this.
+        least_cm: Shortest that is reported: what is nearer is reported as this.
         most_cm: Longest.
 
     Returns:

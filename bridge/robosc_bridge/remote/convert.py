@@ -249,13 +249,13 @@ def event_of(entry: Entry) -> Struct:
     return struct_of(plain(entry))
 
 
-def program_of(hello: pb.Hello, name: str, tell: Callable[[programs.ToProgram], None], operations: Operations) -> Any:
+def program_of(hello: pb.Hello, name: str, send: Callable[[programs.ToProgram], None], operations: Operations) -> Any:
     """Return the program that says who it is.
 
     Args:
         hello: Message in which it says who it is.
         name: Name for the log.
-        tell: Function that tells it something.
+        send: Function that tells it something.
         operations: The daemon.
 
     Raises:
@@ -274,7 +274,7 @@ def program_of(hello: pb.Hello, name: str, tell: Callable[[programs.ToProgram], 
             shown = wanted[:40] if wanted.isprintable() else "?"
             raise RequestError(f"'{shown}' is not a service or action of the model that is mapped to 'grpc'")
     may_request = hello.is_operator and operations.is_layer
-    return programs.Program(name, tell, frozenset(hello.serves), may_request)
+    return programs.Program(name, send, frozenset(hello.serves), may_request)
 
 
 def item_of(request: pb.AttachRequest, program: programs.Program) -> programs.FromProgram | None:
@@ -326,7 +326,7 @@ _READERS: dict[str, Callable[[programs.Program, Any], programs.FromProgram]] = {
 
 
 def welcome(operator_timeout_s: float | None) -> pb.AttachResponse:
-    """The first thing a program is told."""
+    """The first item that a program receives."""
     return pb.AttachResponse(welcome=pb.Welcome(operator_timeout_s=operator_timeout_s or 0.0))
 
 

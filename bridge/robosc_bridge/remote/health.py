@@ -1,7 +1,7 @@
 """The standard health check of gRPC: true while the loop runs without a fault.
 
-Not `grpc_health`'s own servicer: that one tells what it was told last, and keeps a stream and a name for whoever asks
-to be told of changes, without a token and without a limit.
+Not the servicer of `grpc_health`: that one returns the last value set, and keeps a stream and a name for whoever
+asks to be notified of changes, without a token and without a limit.
 """
 
 import time

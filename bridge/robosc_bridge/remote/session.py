@@ -33,7 +33,7 @@ _LOOK_S = 0.005
 
 
 class TooSlowError(Exception):
-    """The program does not read what it is told."""
+    """The program does not read what it is sent."""
 
 
 class ProgramSession:
@@ -66,9 +66,9 @@ class ProgramSession:
         self._is_called = False
         self._is_full = False
         self._is_over = False
-        self._told = self._told_bytes = 0
+        self._taken = self._taken_bytes = 0
         self._seen_number = -1
-        self._program: Program = convert.program_of(hello, name, self._tell, operations)
+        self._program: Program = convert.program_of(hello, name, self._send, operations)
 
     async def run(
         self, requests: AsyncIterator[convert.AttachRequest], write: Callable[[convert.AttachResponse], Awaitable[None]]
@@ -76,10 +76,10 @@ class ProgramSession:
         """Until the program has no more to say.
 
         Raises:
-            TooSlowError: It does not read what it is told.
+            TooSlowError: It does not read what it is sent.
             FloodError: It is an operator, and sends far more than it can mean.
         """
-        self._operations.tell(Attached(self._program))
+        self._operations.post(Attached(self._program))
         _log.info("%s is attached", self._program.name)
         tasks: list[asyncio.Future[None]] = []
         try:
@@ -95,7 +95,7 @@ class ProgramSession:
         finally:
             self._is_over = True
             # Told before anything is awaited: whatever becomes of this task, the loop knows.
-            self._operations.tell(Detached(self._program))
+            self._operations.post(Detached(self._program))
             _log.info("%s is gone", self._program.name)
             for task in tasks:
                 task.cancel()
@@ -113,8 +113,8 @@ class ProgramSession:
                 self._put(str(error))
                 continue
             if item is not None:
-                self._told_bytes += request.ByteSize()
-                self._operations.tell(item)
+                self._taken_bytes += request.ByteSize()
+                self._operations.post(item)
 
     async def _turn(self) -> None:
         """Wait while the loop has not handled what came before; meanwhile gRPC holds the program back."""
@@ -122,9 +122,9 @@ class ProgramSession:
             snapshot = self._operations.feed.snapshot
             number = -1 if snapshot is None else snapshot.number
             if number != self._seen_number:
-                self._seen_number, self._told, self._told_bytes = number, 0, 0
-            if self._told < MESSAGES_PER_CYCLE and self._told_bytes < BYTES_PER_CYCLE:
-                self._told += 1
+                self._seen_number, self._taken, self._taken_bytes = number, 0, 0
+            if self._taken < MESSAGES_PER_CYCLE and self._taken_bytes < BYTES_PER_CYCLE:
+                self._taken += 1
                 return
             await asyncio.sleep(_LOOK_S)
 
@@ -143,7 +143,7 @@ class ProgramSession:
         megabytes = MAXIMUM_WAITING_BYTES // 1_000_000
         raise TooSlowError(f"more than {MAXIMUM_WAITING} messages or {megabytes} MB wait for this program to read them")
 
-    def _tell(self, item: ToProgram) -> None:
+    def _send(self, item: ToProgram) -> None:
         """From the loop's thread."""
         self._put(item)
 

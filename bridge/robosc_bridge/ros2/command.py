@@ -24,7 +24,7 @@ RATE_HZ, LEAST_RATE_HZ, MOST_RATE_HZ = 30.0, 1.0, 100.0
 """Looks a second, by default and within bounds; the bridge shows up to 20 readings a second, and every scan."""
 
 REPORT_S = 1.0
-"""Time between two messages of diagnostics; a change is told at once."""
+"""Time between two messages of diagnostics; a change is reported at once."""
 
 RETRY_S = 1.0
 """Time until a bridge that does not answer is asked again."""
@@ -111,7 +111,7 @@ _rate.__name__ = _metres.__name__ = "number"
 
 
 def _run(arguments: argparse.Namespace) -> int:
-    # gRPC and rclpy are imported where they are needed: help and wrong use are told at once.
+    # gRPC and rclpy are imported where they are needed: help and wrong use are reported at once.
     from robosc_bridge.ros2.node import BridgeNode, MissingRosError, NodeError
     from robosc_bridge.ros2.relay import Relay
     from robosc_bridge.terminal.client import BridgeClient, UnreachableError
@@ -127,7 +127,7 @@ def _run(arguments: argparse.Namespace) -> int:
     # Threads that are started from here on leave signals to this one, which waits for them.
     before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
     try:
-        # Files that cannot be used are told before anything is tried again and again.
+        # Files that cannot be used are reported before anything is tried again and again.
         BridgeClient(arguments.address, credentials_of(arguments)).close()
         with BridgeNode(
             frames,
@@ -178,7 +178,7 @@ class _Follower:
         self._over = threading.Event()
         self._news = threading.Event()
         self._client: Any = None
-        self._told = ""
+        self._reported = ""
         self._was_there = False
         self._thread = threading.Thread(target=self._run, name="ros2 follows", daemon=True)
 
@@ -226,7 +226,7 @@ class _Follower:
                 return
             if not self._over.is_set():
                 self._relay.lose(why)
-                self._tell(why)
+                self._report(why)
                 self._over.wait(RETRY_S)
 
     def _follow(self) -> None:
@@ -238,16 +238,16 @@ class _Follower:
             definition = client.definition()
             self._relay.connect(definition)
             self._was_there = True
-            self._tell(f"publishes what the bridge of {definition.robot} at {self._address} measures")
+            self._report(f"publishes what the bridge of {definition.robot} at {self._address} measures")
             for response in client.watch(with_scans=True, with_events=False, rate_hz=self._rate_hz):
                 if self._over.is_set():
                     return
                 self._relay.take(response)
 
-    def _tell(self, text: str) -> None:
+    def _report(self, text: str) -> None:
         # A bridge that is away is asked each second, and told once.
-        if text != self._told:
-            self._told = text
+        if text != self._reported:
+            self._reported = text
             _say(text)
         self._news.set()
 

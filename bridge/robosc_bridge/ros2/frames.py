@@ -92,7 +92,7 @@ def places_of(turtlebot: str, scan: Place | None, configured: tuple[float, float
 
     Args:
         turtlebot: TurtleBot3 as its bridge names it; empty: another robot.
-        scan: Place of its LiDAR, if that is told; None: as its configuration or the TurtleBot3 has it.
+        scan: Place of its LiDAR, if that is reported; None: as its configuration or the TurtleBot3 has it.
         configured: Place of its LiDAR as its configuration has it, forward and to the left, at the height that the
             TurtleBot3 has, or that of `base_link`; None: not there.
 

@@ -153,6 +153,6 @@ class BridgeNode:
         """Publish a revolution of the LiDAR."""
         self._to_scan.publish(self._messages.laser_scan(scan, stamp_ns, self._frames))
 
-    def put_diagnostics(self, told: tuple[Entry, ...], stamp_ns: int, robot: str) -> None:
+    def put_diagnostics(self, reported: tuple[Entry, ...], stamp_ns: int, robot: str) -> None:
         """Publish the present state."""
-        self._to_diagnostics.publish(self._messages.diagnostics(told, stamp_ns, robot))
+        self._to_diagnostics.publish(self._messages.diagnostics(reported, stamp_ns, robot))

@@ -7,7 +7,7 @@ from typing import Protocol
 
 from robosc_bridge.ros2.clock_offset import ClockOffset, LocalClocks
 from robosc_bridge.ros2.diagnostics import Entry, Link, entries
-from robosc_bridge.ros2.uncertainty import PlanarPose, PoseUncertainty, told_pose
+from robosc_bridge.ros2.uncertainty import PlanarPose, PoseUncertainty, reported_pose
 from robosc_bridge.terminal.client import Definition, DriveState, Scan, Snapshot, WatchResponse
 
 STALE_S = 0.5
@@ -41,7 +41,7 @@ class Outlet(Protocol):
     def put_scan(self, scan: Scan, stamp_ns: int) -> None:
         """Another revolution of the LiDAR."""
 
-    def put_diagnostics(self, told: tuple[Entry, ...], stamp_ns: int, robot: str) -> None:
+    def put_diagnostics(self, reported: tuple[Entry, ...], stamp_ns: int, robot: str) -> None:
         """Present state."""
 
 
@@ -91,7 +91,7 @@ class Relay:
         """Pass on what is new in what a bridge tells.
 
         Raises:
-            EarlierBridgeError: It does not tell its times.
+            EarlierBridgeError: It does not send its times.
         """
         with self._lock:
             if response.sent_s <= 0.0:
@@ -121,7 +121,7 @@ class Relay:
         stamp_ns = self._fresh("drive", drive.time_s)
         if stamp_ns is None:
             return
-        covariance = told_pose(drive.pose_covariance) or self._uncertainty.covariance()
+        covariance = reported_pose(drive.pose_covariance) or self._uncertainty.covariance()
         self._outlet.put_drive(drive, stamp_ns, covariance)
         if drive.time_s - self._battery_s >= BATTERY_S:
             self._battery_s = drive.time_s
@@ -141,8 +141,8 @@ class Relay:
         if self._clocks.monotonic() - local_s > STALE_S:
             return None
         stamp_ns = self._clocks.stamp_ns(local_s)
-        # The offset gets better, so that a time may turn out to be earlier than one that was told before it. If it is
-        # much earlier, somebody has set the clock.
+        # The offset gets better, so that a time may turn out to be earlier than one that was reported before.
+        # If it is much earlier, somebody has set the clock.
         if 0 <= self._stamps_ns.get(what, -_CLOCK_SET_NS) - stamp_ns < _CLOCK_SET_NS:
             return None
         self._stamps_ns[what] = stamp_ns
@@ -157,5 +157,5 @@ class Relay:
                 link = replace(link, problem=f"Nothing has come from the bridge for {silence_s:.1f} s.")
             if self._snapshot is not None:
                 age_s = self._snapshot.age_s + silence_s
-            told = entries(link, self._snapshot, age_s)
-            self._outlet.put_diagnostics(told, self._clocks.wall_ns(), link.robot)
+            reported = entries(link, self._snapshot, age_s)
+            self._outlet.put_diagnostics(reported, self._clocks.wall_ns(), link.robot)

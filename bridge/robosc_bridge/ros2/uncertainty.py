@@ -33,7 +33,7 @@ LINEAR_M2_S2, ANGULAR_RAD2_S2 = 1e-4, 1e-3
 
 ANGULAR_VELOCITY_RAD2_S2, LINEAR_ACCELERATION_M2_S4, ORIENTATION_RAD2 = 0.02, 0.04, 0.0025
 """Variances of the inertial sensor, as ROBOTIS-GIT/OpenCR has them, `turtlebot3/turtlebot3_sensor.cpp` for ROS 1; its
-node for ROS 2 tells none."""
+node for ROS 2 sends none."""
 
 UNKNOWN = (-1.0, *[0.0] * 8)
 """Covariance of sensor_msgs/Imu for what is not measured."""
@@ -92,14 +92,14 @@ class PoseUncertainty:
         return _spatial(self._covariance)
 
 
-def told_pose(planar: Sequence[float]) -> tuple[float, ...] | None:
+def reported_pose(planar: Sequence[float]) -> tuple[float, ...] | None:
     """Return the covariance of x, y, z and rotations about them, row by row, as a bridge tells it.
 
     Args:
         planar: Covariance of x, y and heading, row by row, from zero where the odometry began.
 
     Returns:
-        None: it tells none.
+        None: it sends none.
     """
     if len(planar) != 9 or not all(map(math.isfinite, planar)):
         return None

@@ -13,7 +13,7 @@ from robosc_bridge.safety.reasons import LATCHING, TORQUE_OFF, Caution, Reason
 
 # The supply's bit alone does not switch a motor off; how much is left in the battery has a rule of its own.
 _HARMLESS = frozenset({MotorFault.VOLTAGE})
-# A driver that knows what it told its motors sees a motion that is none of it also while the robot drives.
+# A driver that knows its own commands to the motors sees a motion that is none of it also while the robot drives.
 _UNBIDDEN = frozenset({MotorFault.UNCOMMANDED})
 
 
@@ -79,7 +79,7 @@ class SafetyLayer:
         self._is_noisy = False
         self._battery = BatteryMonitor(limits)
         self._wheels = WheelMonitor(limits)
-        # When torque began to be wanted, None: it is not; whether the motors told since then that they hold.
+        # When torque began to be wanted, None: it is not; whether the motors have reported since then that they hold.
         self._torque_since_s: float | None = None
         self._is_torque_seen = False
         # Since when torque is to go off; when the last reading was taken, if the wheels stood still in it.
@@ -197,7 +197,7 @@ class SafetyLayer:
 
         Returns:
             The reasons that forbid it; nothing was forgotten then. Each must have been put out once, torque must be off
-            where a reason wants it off, the motors must tell of no fault, and the battery must not be empty. No reason:
+            where a reason wants it off, the motors must report no fault, and the battery must not be empty. No reason:
             it is done.
         """
         with self._lock:
@@ -253,8 +253,8 @@ class SafetyLayer:
     def _find_pause(self, now_s: float) -> None:
         """Find out whether nothing of the bridge was at work for too long; what was known before is no longer so.
 
-        One of the two threads may wait for long, for a device or for a supervisor, but not both. A scan tells nothing
-        here: its time is not that of who reports it, and one that came first after a pause would hide it.
+        One of the two threads may wait for long, for a device or for a supervisor, but not both. A scan does not
+        count here: its time is not that of who reports it, and one that came first after a pause would hide it.
         """
         if not math.isfinite(now_s):
             return

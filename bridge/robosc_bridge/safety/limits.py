@@ -12,7 +12,7 @@ REVOLUTIONS = 3
 """Revolutions of a scanner without a full scan after which it counts as silent."""
 
 SCAN_TIMEOUT_S = 0.6
-"""Time after which a scanner counts as silent whose driver does not tell how long a revolution takes, in seconds."""
+"""Time after which a scanner counts as silent whose driver does not state the time of a revolution, in seconds."""
 
 SCAN_TIMEOUTS_S: Mapping[str, float] = MappingProxyType({"lds01": 0.6, "lds02": 0.5, "lds03": 0.3})
 """Time after which a scanner counts as silent, by its driver's name: three revolutions, in seconds."""
@@ -94,7 +94,7 @@ class SafetyLimits:
         motor_timeout_s: Longest time without a reading of the drive base, and for which an output holds.
         motor_failures: Number of failed exchanges in a row that count as silence, too.
         loop_timeout_s: Longest time between two cycles of the supervisor's loop.
-        pause_s: Longest time in which neither the drive base's thread nor the loop turns while the motors hold.
+        pause_s: Longest time in which neither the drive base's thread nor the loop runs while the motors hold.
         operator_timeout_s: Longest time without a sign of life of an operator; None: none is needed.
         battery_warn_v: Mean voltage at and below which the safety layer warns; None: only the drive base's own
             judgement of its battery counts.

@@ -94,7 +94,7 @@ class BatteryMonitor:
         self._begin_s = 0.0
 
     def update(self, voltage_v: float | None, time_s: float, level: BatteryLevel | None = None) -> None:
-        """A voltage was measured, and the drive base judged; None and what is not finite tell nothing."""
+        """A voltage was measured, and the drive base judged; None and a voltage that is not finite are ignored."""
         self._level = level or self._level
         if voltage_v is None or not math.isfinite(voltage_v) or not math.isfinite(time_s):
             return

@@ -160,14 +160,14 @@ class BridgeClient:
             finally:
                 call.cancel()
 
-    def operate(self, name: str, told: Callable[[str, str], None]) -> "Operator":
+    def operate(self, name: str, on_refusal: Callable[[str, str], None]) -> "Operator":
         """Be the operator.
 
         Args:
             name: Name of the operator, for the bridge's log.
-            told: Function called from another thread with `blocked` and an identifier, or `refused` and why.
+            on_refusal: Function called from another thread with `blocked` and an identifier, or `refused` and why.
         """
-        return Operator(self._stub, name, told, self._error)
+        return Operator(self._stub, name, on_refusal, self._error)
 
     @contextmanager
     def _translated(self) -> Iterator[None]:
@@ -194,11 +194,11 @@ class Operator:
     """An operator's stream to a supervision layer; its messages go out in the order in which they are given."""
 
     def __init__(
-        self, stub: Any, name: str, told: Callable[[str, str], None], translate: Callable[[Any], Exception]
+        self, stub: Any, name: str, on_refusal: Callable[[str, str], None], translate: Callable[[Any], Exception]
     ) -> None:
         self._requests: queue.SimpleQueue[pb.AttachRequest | None] = queue.SimpleQueue()
         self._requests.put(pb.AttachRequest(hello=pb.Hello(name=name, is_operator=True)))
-        self._told = told
+        self._on_refusal = on_refusal
         self._translate = translate
         self._failure: Exception | None = None
         self._call = stub.Attach(iter(self._requests.get, None))
@@ -239,9 +239,9 @@ class Operator:
             for response in self._call:
                 match response.WhichOneof("message"):
                     case "blocked":
-                        self._told("blocked", response.blocked.identifier)
+                        self._on_refusal("blocked", response.blocked.identifier)
                     case "refused":
-                        self._told("refused", response.refused.why)
+                        self._on_refusal("refused", response.refused.why)
             self._failure = UnreachableError("the bridge has ended the stream")
         except grpc.RpcError as error:
             self._failure = self._translate(error)

@@ -101,7 +101,7 @@ def _address(text: str) -> str:
 
 
 def _connected(arguments: argparse.Namespace, work: Callable[[Any, argparse.Namespace], int]) -> int:
-    # gRPC is imported where it is needed: help and wrong use are told at once.
+    # gRPC is imported where it is needed: help and wrong use are reported at once.
     from robosc_bridge.terminal.client import BridgeClient, RefusedError, UnreachableError
 
     try:

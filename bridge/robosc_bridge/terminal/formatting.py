@@ -37,8 +37,8 @@ def status_lines(snapshot: Snapshot) -> Iterator[str]:
             figures = "p50 {:.1f} ms, p99 {:.1f} ms, at most {:.1f} ms".format(*milliseconds)
             yield printable(f"  {latency.name.replace('_', ' ')}: {figures}")
     for line in snapshot.lines:
-        told = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in sorted(line.counts.items()))
-        yield printable(f"  line of the {line.device}: {told}")
+        words = ", ".join(f"{name.replace('_', ' ')} {count}" for name, count in sorted(line.counts.items()))
+        yield printable(f"  line of the {line.device}: {words}")
     width = max((len(item.name) for item in snapshot.components), default=0)
     for item in snapshot.components:
         variables = " ".join(f"{name}={_word(value)}" for name, value in sorted(item.variables.items()))
@@ -95,12 +95,12 @@ class Lines:
 def event_line(entry: Mapping[str, Any]) -> str:
     """An entry of the event log as a line: time, a mark for what was held back or failed, kind, what it is about."""
     kind = str(entry.get("kind"))
-    told = [_word(entry[name]) for name in ("event", "identifier", "what") if name in entry]
+    words = [_word(entry[name]) for name in ("event", "identifier", "what") if name in entry]
     rest = {name: value for name, value in entry.items() if name not in (*_SHOWN_APART, "event", "identifier", "what")}
-    told += [f"{name}={_word(value)}" for name, value in sorted(rest.items()) if value not in (None, {}, [])]
+    words += [f"{name}={_word(value)}" for name, value in sorted(rest.items()) if value not in (None, {}, [])]
     time_s = entry.get("time")
     at = _clock(time_s if isinstance(time_s, float) else 0.0)
-    return printable(f"{at} {'!' if kind in _MARKED else ' '} {kind:10} {' '.join(told)}".rstrip())
+    return printable(f"{at} {'!' if kind in _MARKED else ' '} {kind:10} {' '.join(words)}".rstrip())
 
 
 def _clock(time_s: float) -> str:

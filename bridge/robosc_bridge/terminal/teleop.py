@@ -157,7 +157,7 @@ def teleop(client: BridgeClient) -> int:
 def drive(terminal: Terminal, client: BridgeClient, topic: DriveTopic) -> None:
     """Drive from a terminal until `q`; raises as `teleop`."""
     status_line = _StatusLine(terminal)
-    operator = client.operate(f"teleop of {os.environ.get('USER', 'somebody')}"[:100], status_line.told)
+    operator = client.operate(f"teleop of {os.environ.get('USER', 'somebody')}"[:100], status_line.on_refusal)
     try:
         terminal.write(f"{HELP}\r\n")
         _drive(terminal, client, operator, topic, status_line)
@@ -269,7 +269,7 @@ class _StatusLine:
         self._lock = threading.Lock()
         self._blocked = ("", 0.0)
 
-    def told(self, what: str, text: str) -> None:
+    def on_refusal(self, what: str, text: str) -> None:
         """From the thread that listens: something was blocked or refused."""
         with self._lock:
             if what == "blocked":

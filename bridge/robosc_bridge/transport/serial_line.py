@@ -40,7 +40,7 @@ class SerialLine(PolledLine):
         except (*_FAILURES, ValueError, OverflowError) as error:
             raise _not_opened(path, error) from error
         # An FTDI adapter, such as the U2D2, keeps back what is less than a full packet for 16 ms otherwise, and for
-        # 1 ms then. Only a UART's driver knows this setting; others keep nothing back, or cannot be told.
+        # 1 ms then. Only a UART's driver knows this setting; others keep nothing back, or cannot be set.
         with contextlib.suppress(ValueError, NotImplementedError):
             self._port.set_low_latency_mode(True)
         os.set_blocking(self._port.fileno(), False)

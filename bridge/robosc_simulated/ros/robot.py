@@ -112,7 +112,7 @@ class RosRobot:
         self._limit_s = math.inf
         self._left_rad, self._right_rad = world.left.angle_rad, world.right.angle_rad
         self._x_m = self._y_m = self._heading_rad = 0.0
-        # In the order in which they are told; the clock first, so that who reads a stamp knows the time.
+        # In the order in which they are reported; the clock first, so that who reads a stamp knows the time.
         self._periods: list[tuple[float, Callable[[float], Reading]]] = [
             # No faster than a hundred times a second on the computer's clock.
             (max(1.0, self._time.factor) / CLOCK_HZ, Clock),

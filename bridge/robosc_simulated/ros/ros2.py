@@ -50,6 +50,7 @@ class Ros2Node:
     def __init__(
         self, robot: RosRobot, pacer: Pacer, *, is_stamped: bool = False, arguments: Sequence[str] = ()
     ) -> None:
+        # As in `robosc_bridge.ros2.node`, which no simulator may import: the imports differ, and the message is short.
         try:
             import rclpy
             from geometry_msgs.msg import TransformStamped, Twist, TwistStamped

@@ -136,7 +136,7 @@ def serve(options: argparse.Namespace, make_face: MakeNode) -> int:
             stack.enter_context(errors)
             robot, pacer = make_robot(options)
             if options.motion is not None:
-                stream = stack.enter_context(contextlib.closing(Output(options.motion, errors.tell)))
+                stream = stack.enter_context(contextlib.closing(Output(options.motion, errors.report)))
                 stack.enter_context(contextlib.closing(MotionRecorder(robot.world, stream)))
             node = stack.enter_context(make_face(robot, pacer, ended))
             print(READY, flush=True)

@@ -215,7 +215,7 @@ export function startPlay(send, token) {
     paint() {
       const { run } = received;
       if (run === null) return;
-      for (const item of events) item.paint(under(run.hindered, item.event), run.choice);
+      for (const item of events) item.paint(under(run.blocked, item.event), run.choice);
       if (run.beginning !== begun) beginning.selectedIndex = run.beginning;
       begun = run.beginning;
       for (const type of ["undo", "redo"]) {

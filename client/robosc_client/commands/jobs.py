@@ -551,8 +551,8 @@ def result_json(found: TaskResult) -> dict[str, Any]:
             return {"text": found.text, **diagnostics_json(found.diagnostics)}
         case Explained():
             explanation = None if isinstance(found.explanation, NoSupervisor) else document(found.explanation)
-            told = {"status": str(found.status), "reason": found.reason, "explanation": explanation}
-            return {**told, **diagnostics_json(found.diagnostics)}
+            summary = {"status": str(found.status), "reason": found.reason, "explanation": explanation}
+            return {**summary, **diagnostics_json(found.diagnostics)}
     result = {"status": str(found.status), **reasons_json(found), **diagnostics_json(found.diagnostics)}
     match found:
         case Synthesis():

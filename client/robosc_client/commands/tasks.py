@@ -40,7 +40,7 @@ from robosc.cli.output import (
     print_json,
     require_other_file,
 )
-from robosc.cli.sign import read_supervisor, signer_of
+from robosc.cli.sign import read_supervisor, report_malformed, report_signer, signer_of
 from robosc.cli.synth import add_output_argument, report_written
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.json_documents import diagnostics_json
@@ -298,10 +298,10 @@ def _verify_supervisor(arguments: argparse.Namespace, client: Client) -> int:
     bundle = read_bundle(arguments)
     try:
         if arguments.signed_by:
-            verify_here.tell_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
+            report_signer(arguments, signer_of(arguments.supervisor, content, arguments.signed_by))
         supervisor = decode(content)
     except (InvalidSupervisorError, SignatureError) as error:
-        return verify_here.report_malformed(arguments, error)
+        return report_malformed(arguments, error)
     found = _verified(arguments, client, verify_task(arguments, bundle, content))
     if "properties" in found.report or found.status is VerificationStatus.PROPERTY_ERRORS:
         return _report_verdicts(arguments, found, bundle, supervisor.deployment)

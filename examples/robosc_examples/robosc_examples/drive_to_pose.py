@@ -97,7 +97,7 @@ class DriveToPose(Wheels):
         assert self._goal is not None  # noqa: S101  # only called while busy
         _, target = self._goal
         distance_m = math.hypot(target.x_m - pose.x_m, target.y_m - pose.y_m)
-        self._tell(pose, distance_m)
+        self._publish_feedback(pose, distance_m)
         if distance_m > self._tolerance_m:
             aside_rad = wrapped(math.atan2(target.y_m - pose.y_m, target.x_m - pose.x_m) - pose.yaw_rad)
             speed = steered(distance_m, aside_rad, self._ahead_limit_m_s, self._turn_limit_rad_s)
@@ -124,7 +124,7 @@ class DriveToPose(Wheels):
         self._wait_until_s = now_s + self._patience_s
         return True
 
-    def _tell(self, pose: Pose, distance_m: float) -> None:
+    def _publish_feedback(self, pose: Pose, distance_m: float) -> None:
         assert self._goal is not None  # noqa: S101  # only called while busy
         feedback = NavigateToPose.Feedback(distance_remaining=distance_m, number_of_recoveries=self._count)
         feedback.current_pose = PoseStamped()

@@ -45,26 +45,26 @@ class PersonDetector(HelperNode):
         scan = Scan(message.ranges, message.angle_min, message.angle_increment, message.range_min, message.range_max)
         if is_blind(scan):
             self.get_logger().warning("a scan is left out: most of it is unknown", throttle_duration_sec=5.0)
-            self._tell(Point(), 0.0)
+            self._publish(Point(), 0.0)
             return
         self._seen_s = self.now_s()
         person = find_person(scan, self._settings)
         if person is None:
-            self._tell(Point(), scan.farthest_m)
+            self._publish(Point(), scan.farthest_m)
         else:
-            self._tell(Point(x=person.ahead_m, y=person.left_m, z=person.confidence), person.distance_m)
+            self._publish(Point(x=person.ahead_m, y=person.left_m, z=person.confidence), person.distance_m)
 
-    def _tell(self, place: Point, distance_m: float) -> None:
+    def _publish(self, place: Point, distance_m: float) -> None:
         self._person.publish(place)
         self._distance.publish(Float32(data=distance_m))
 
     def _watch(self) -> None:
         if self.now_s() - self._seen_s > self._timeout_s:
-            self._tell(Point(), 0.0)
+            self._publish(Point(), 0.0)
 
     def stop(self) -> None:
         """Publish a distance of 0, since somebody might stand there."""
-        self._tell(Point(), 0.0)
+        self._publish(Point(), 0.0)
 
 
 def main(args: Sequence[str] | None = None) -> int:

@@ -29,7 +29,7 @@ class Wheels(HelperNode):
         self._pose: Pose | None = None
         self._seen_s = -math.inf
         self._is_moving = False
-        self._is_told = False
+        self._is_reported = False
         self._commands = self.create_publisher(Twist, "/cmd_vel", 10)
         # Takes it from reliable drivers and from others.
         self.create_subscription(Odometry, "/odom", self._read, qos_profile_sensor_data)
@@ -71,7 +71,7 @@ class Wheels(HelperNode):
                 "odometry that is not finite, or that looks nowhere, is left out", throttle_duration_sec=5.0
             )
             return
-        self._pose, self._seen_s, self._is_told = pose, self.now_s(), False
+        self._pose, self._seen_s, self._is_reported = pose, self.now_s(), False
         if self.is_busy:
             self.advance(pose)
 
@@ -79,7 +79,7 @@ class Wheels(HelperNode):
         if not self.is_busy or self.pose is not None:
             return
         self.stop()
-        if not self._is_told:
+        if not self._is_reported:
             self.get_logger().error(f"standing still: no odometry for {self._timeout_s:g} s")
-            self._is_told = True
+            self._is_reported = True
         self.without_odometry()

@@ -106,7 +106,7 @@ class AsyncController:
     ) -> None:
         self._clock: Clock = SystemClock() if clock is None else clock
         self._sleep = sleep
-        self._work = _Work(robot, self._told)
+        self._work = _Work(robot, self._report)
         self.executor = Executor(system, self._work, settings, self._clock, log)
         self._news: Optional[asyncio.Event] = None
         self._is_ended = False
@@ -123,13 +123,13 @@ class AsyncController:
             self._early.append((identifier, data))
             return
         self.executor.receive(identifier, data)
-        self._tell()
+        self._wake()
 
     def stop(self, reason: str, is_fault: bool = False) -> None:
         """Bring the robot to rest now, and end `run`: as a fault, if something is wrong."""
         self.executor.stop(reason, is_fault)
         self._is_ended = True
-        self._tell()
+        self._wake()
 
     async def run(self) -> None:
         """
@@ -137,8 +137,8 @@ class AsyncController:
 
         After `stop`, a fault, or this task's cancel.
 
-        :raises RuntimeError: It runs already or ran before, or ends because of a fault, which it
-            tells.
+        :raises RuntimeError: It runs already or ran before, or ends because of a fault, which the
+            message names.
         """
         if self._news is not None:
             raise RuntimeError('a controller runs once')
@@ -209,12 +209,12 @@ class AsyncController:
             self.executor.watch()
         self._work.leave()
 
-    def _told(self, tell: Callable[[Executor], None]) -> None:
+    def _report(self, report: Callable[[Executor], None]) -> None:
         """Note that a coroutine of the robot has something for the executor."""
-        tell(self.executor)
-        self._tell()
+        report(self.executor)
+        self._wake()
 
-    def _tell(self) -> None:
+    def _wake(self) -> None:
         """Wake `run` up, where what just happened ends it."""
         if self._news is not None and (self._is_over() or self.executor.reasons):
             self._news.set()
@@ -225,14 +225,14 @@ class _Work:
     The robot's coroutines as the middleware of an executor.
 
     :param robot: The robot.
-    :param told: Called, never from within the executor, with what it is to be told.
+    :param report: Called, never from within the executor, with the report.
     """
 
     def __init__(
-        self, robot: AsyncRobot, told: Callable[[Callable[[Executor], None]], None]
+        self, robot: AsyncRobot, report: Callable[[Callable[[Executor], None]], None]
     ) -> None:
         self._robot = robot
-        self._told = told
+        self._report = report
         self._goals: Dict[int, asyncio.Future[None]] = {}
         self._tasks: Set[asyncio.Future[None]] = set()
 
@@ -285,12 +285,12 @@ class _Work:
         try:
             reply = await self._robot.call(service, data)
         except asyncio.CancelledError:
-            self._told(lambda executor: executor.on_call_failed(request_id, 'cancelled'))
+            self._report(lambda executor: executor.on_call_failed(request_id, 'cancelled'))
         except Exception as error:
             why = describe_error(error)
-            self._told(lambda executor: executor.on_call_failed(request_id, why))
+            self._report(lambda executor: executor.on_call_failed(request_id, why))
         else:
-            self._told(lambda executor: executor.on_reply(request_id, reply))
+            self._report(lambda executor: executor.on_reply(request_id, reply))
 
     async def _execute(self, action: str, goal_id: int, data: Any) -> None:
         outcome, result = 'aborted', None
@@ -298,9 +298,9 @@ class _Work:
             work = self._robot.execute(
                 action,
                 data,
-                lambda news: self._told(lambda executor: executor.on_feedback(goal_id, news)),
+                lambda news: self._report(lambda executor: executor.on_feedback(goal_id, news)),
             )
-            self._told(lambda executor: executor.on_goal_accepted(goal_id))
+            self._report(lambda executor: executor.on_goal_accepted(goal_id))
             outcome, result = 'succeeded', await work
         except asyncio.CancelledError:
             outcome = 'cancelled'
@@ -309,7 +309,7 @@ class _Work:
         except Exception:
             outcome = 'aborted'
         self._goals.pop(goal_id, None)
-        self._told(lambda executor: executor.on_goal_ended(goal_id, outcome, result))
+        self._report(lambda executor: executor.on_goal_ended(goal_id, outcome, result))
 
 
 def _is_default(data: Any) -> bool:

@@ -25,7 +25,7 @@ class SystemClock:
 
 class ManualClock:
     """
-    A clock that moves only when it is told to.
+    A clock that moves only on request.
 
     :param now_s: Its first reading.
     :param epoch_s: Number of seconds added to a reading for the wall clock.

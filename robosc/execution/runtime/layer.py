@@ -120,7 +120,7 @@ class Layer(Runner):
             why = self._let_call_through(request, call_id, message)
         finally:
             if why is not None:
-                self._tell(self._caller.answer_default, service, call_id)
+                self._notify(self._caller.answer_default, service, call_id)
                 self._hold_back(request.identifier, why)
 
     @guarded
@@ -141,7 +141,7 @@ class Layer(Runner):
             why = self._let_goal_through(request, goal_id, message)
         finally:
             if why is not None:
-                self._tell(self._caller.reject_goal, action, goal_id)
+                self._notify(self._caller.reject_goal, action, goal_id)
                 self._hold_back(request.identifier, why)
 
     @guarded
@@ -191,7 +191,7 @@ class Layer(Runner):
         super().receive(identifier, data)
         self._finish()
         if self._is_started and identifier in self._batches:
-            self._tell(self._caller.pass_on, identifier, data)
+            self._notify(self._caller.pass_on, identifier, data)
 
     def tick(self) -> None:
         """Let a period pass: nothing is decided in a layer, so this is `watch`."""
@@ -222,7 +222,7 @@ class Layer(Runner):
             super()._take_reply(request_id, data)
         finally:
             if waiting is not None:
-                self._tell(self._caller.answer, waiting.service, waiting.call_id, data)
+                self._notify(self._caller.answer, waiting.service, waiting.call_id, data)
 
     def _take_feedback(self, goal_id: int, data: Any) -> None:
         waiting = self._callers.goal(goal_id)
@@ -230,7 +230,7 @@ class Layer(Runner):
             super()._take_feedback(goal_id, data)
         finally:
             if waiting is not None:
-                self._tell(self._caller.pass_feedback, waiting.action, waiting.goal_id, data)
+                self._notify(self._caller.pass_feedback, waiting.action, waiting.goal_id, data)
 
     def _take_end(self, goal_id: int, outcome: str, data: Any) -> None:
         try:
@@ -240,14 +240,14 @@ class Layer(Runner):
             waiting = None if self._goals.find(goal_id) else self._callers.close_goal(goal_id)
             if waiting is not None:
                 end = waiting.outcome(outcome)
-                self._tell(self._caller.end_goal, waiting.action, waiting.goal_id, end, data)
+                self._notify(self._caller.end_goal, waiting.action, waiting.goal_id, end, data)
 
     def _finish(self) -> None:
         """Tell the caller what has failed, or turned against its requirements. Never raises."""
         for call in self._callers.close_failed_calls():
-            self._tell(self._caller.answer_default, call.service, call.call_id)
+            self._notify(self._caller.answer_default, call.service, call.call_id)
         for goal in self._callers.close_failed_goals():
-            self._tell(self._caller.end_goal, goal.action, goal.goal_id, 'aborted', None)
+            self._notify(self._caller.end_goal, goal.action, goal.goal_id, 'aborted', None)
 
     # Requests: why each is held back, or None if it went through.
 
@@ -335,9 +335,9 @@ class Layer(Runner):
 
     def _hold_back(self, identifier: str, why: str) -> None:
         self._recorder.blocked(identifier, why)
-        self._tell(self._caller.blocked, identifier)
+        self._notify(self._caller.blocked, identifier)
 
-    def _tell(self, method: Callable[..., None], *arguments: Any) -> None:
+    def _notify(self, method: Callable[..., None], *arguments: Any) -> None:
         """Tell the caller something; what fails is a fault. Never raises."""
         try:
             method(*arguments)

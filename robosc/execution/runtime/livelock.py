@@ -38,7 +38,7 @@ class LivelockDetector:
         """
         Look at the state after one more step, taken by `event`.
 
-        :param signature: Gives a value that tells the state from others; a short run needs none.
+        :param signature: Gives a value that identifies the state; a short run needs none.
         :param event: The step's event.
         :raises LivelockError: The state is one that the run was in before, or the bound is passed.
         """

@@ -80,7 +80,7 @@ def _required_fields(message: Any) -> Iterable[Any]:
 
 
 def _field_names(message: Any) -> Iterable[str]:
-    """Names of the fields of a message: as ROS tells them, else its attributes."""
+    """Names of the fields of a message: as ROS lists them, else its attributes."""
     kind = type(message)
     if hasattr(kind, 'get_fields_and_field_types'):
         return tuple(kind.get_fields_and_field_types())

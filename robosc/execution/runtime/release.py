@@ -65,7 +65,7 @@ class Releases:
         """
         Return the identifiers to release now, in this stable state.
 
-        The caller does it and tells `released`.
+        The caller does it and reports it to `released`.
 
         :param issuing: Communication whose request brought the system here and whose message is
             about to go out: what it makes false does not release its own earlier message.

@@ -15,11 +15,11 @@ class Replies:
     """
     Matches replies to requests and takes their events.
 
-    Methods that take one tell whether they did.
+    Methods that take one return whether they did.
 
     :param steps: Takes the events.
     :param middleware: Cancels goals.
-    :param recorder: Is told what matches nothing.
+    :param recorder: Receives what matches nothing.
     :param calls: Service calls under way.
     :param goals: Goals under way.
     """

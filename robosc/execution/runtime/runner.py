@@ -172,7 +172,7 @@ class Runner:
         """Return counts of what went wrong so far."""
         return self._recorder.counters()
 
-    # What an adapter tells.
+    # Reports of an adapter.
 
     @guarded
     def start(self) -> None:

@@ -95,7 +95,7 @@ class Steps:
         """
         reading = self._system.read(event, data)
         if reading.unknown:
-            # A part that is read alone and with its array is told once.
+            # A part that is read alone and with its array is reported once.
             unknown = tuple(dict.fromkeys(reading.unknown))
             self._recorder.unknown(event, unknown)
             if reading.enum_unknown:

@@ -19,6 +19,7 @@ from robosc.expressions import (
     children,
 )
 from robosc.recursion import allow_depth
+from robosc.targets.cif.expression_words import expression_words
 from robosc.targets.cif.numbers import Number, Term, combined, comparison, fits, number_text, scaled
 from robosc.targets.cif.subjects import Place, Reader
 from robosc.targets.cif.tables import Table, TableTooLargeError, tabulate
@@ -35,7 +36,6 @@ from robosc.targets.cif.text import (
     implied,
     negated,
 )
-from robosc.targets.cif.words import expression_words
 from robosc.targets.code.predicates import Logic, Predicate, PredicateWriter
 
 MAXIMUM_REPEATED = 5_000

@@ -8,6 +8,7 @@ from robosc.errors import UnsupportedModelError
 from robosc.expressions import Expression, Unary
 from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
+from robosc.targets.cif.expression_words import expression_words
 from robosc.targets.cif.expressions import Translator
 from robosc.targets.cif.names import Names
 from robosc.targets.cif.plants import Plants
@@ -15,7 +16,6 @@ from robosc.targets.cif.subjects import Place, Reader
 from robosc.targets.cif.supervisor import supervisor_lines
 from robosc.targets.cif.table import table_lines
 from robosc.targets.cif.text import Text, all_of, comment
-from robosc.targets.cif.words import expression_words
 from robosc.targets.code.predicates import Predicate
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions

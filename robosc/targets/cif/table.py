@@ -6,9 +6,9 @@ from robosc.automata import System
 from robosc.automata.structure import Automaton
 from robosc.expressions import PathStep, Type
 from robosc.model.structure import Model, Provide
+from robosc.targets.cif.expression_words import data_words, expression_words
 from robosc.targets.cif.names import Names, data_plant, declared_events, shift
 from robosc.targets.cif.text import comment, escaped
-from robosc.targets.cif.words import data_words, expression_words
 
 
 def table_lines(model: Model, system: System, names: Names) -> Iterator[str]:

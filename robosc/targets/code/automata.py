@@ -200,7 +200,7 @@ class AutomataWriter(ABC):
         return [*found, Return(TRUE_CODE)]
 
     def may_begin(self) -> Block:
-        """The statements that tell whether the system may begin in a state."""
+        """The statements that say whether the system may begin in a state."""
         found: list[Statement] = []
         for condition in self._automata.initial_conditions:
             found += self._required(expression_text(condition), self._before.truth(condition))
@@ -209,7 +209,7 @@ class AutomataWriter(ABC):
         return [*found, Return(TRUE_CODE)]
 
     def is_marked(self) -> Block:
-        """The statements that tell whether a state is marked."""
+        """The statements that say whether a state is marked."""
         found: list[Statement] = []
         for automaton in self._system.automata:
             marked = tuple(item for item in automaton.locations if item in automaton.marked)

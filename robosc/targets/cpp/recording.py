@@ -134,7 +134,7 @@ class _Recorder:
         self._world = _World()
         settings = Settings(period_s=PERIOD_S, every="event")
         self._executor: Any = Executor(self._system, self._world, settings, self._clock, self._log)
-        self._texts = (*_TEXTS, *_texts_of(self._model))
+        self._texts = (*_TEXTS, *texts_of(self._model))
         self._topics = dict(self._topic_shapes())
 
     def run(self) -> Recording:
@@ -283,7 +283,7 @@ class _MixedError(Exception):
     """A topic whose messages are read in ways that no structure of the test has."""
 
 
-def _texts_of(model: Model) -> list[str]:
+def texts_of(model: Model) -> list[str]:
     """The texts that rules of enums ask for."""
     rules = [rule.condition for enum in model.enums for rule in enum.rules]
     return [

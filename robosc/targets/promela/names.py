@@ -15,7 +15,7 @@ class Names:
     Attributes:
         new: Gives a name that nothing else has, as close as possible to what is asked for.
         places: Name of what holds each place of a state; locations of automata that have only one are missing.
-        locations: Predicates that tell whether an automaton is in a location.
+        locations: Predicates that say whether an automaton is in a location.
         values: Names for the values of enums, by enum and value.
         numbers: Number that stands for a value of an enum, by its name here.
     """

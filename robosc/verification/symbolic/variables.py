@@ -168,7 +168,7 @@ class Variables:
             found.setdefault(written.get(key, order[-1]), []).append(digits)
         return found
 
-    # Predicates
+    # Predicates. Synthesis has `any_of` and `all_of`, too: verification shares no code with it, on purpose.
 
     def any_of(self, predicates: Iterable[Any]) -> Any:
         """Return the predicate that one of the predicates is true."""

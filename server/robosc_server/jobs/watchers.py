@@ -130,7 +130,7 @@ class Watchers:
             audience.notify(record)
 
     def notify_gone(self, job_id: str) -> None:
-        """Tell the watchers of a job that it was deleted."""
+        """Notify the watchers of a job that it was deleted."""
         audience = self._by_job.get(job_id)
         if audience is not None:
             for watch in audience.watches:

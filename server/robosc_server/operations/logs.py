@@ -125,7 +125,7 @@ def log_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> str
     """Log an internal error and return its id, which is all that the caller gets.
 
     Args:
-        fault: It, or what another process tells of it, such as a traceback. Its words are logged at the level debug
+        fault: It, or another process's report of it, such as a traceback. Its words are logged at the level debug
             alone; see `worker_words`.
         reason: The reason that the caller receives, as in google.rpc.ErrorInfo.
     """

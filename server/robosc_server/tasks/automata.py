@@ -48,7 +48,7 @@ class Automata:
         self._on_report = on_report
 
     def synthesis(self, *, is_modular: bool) -> pb.SynthesisResult:
-        """The supervisor, with all that is told of it."""
+        """The supervisor, with all that is reported about it."""
         made = synthesize(self._model, self._options, is_modular=is_modular, on_progress=self._report)
         result = pb.SynthesisResult(**_result_fields(made))
         if made.statistics is not None:

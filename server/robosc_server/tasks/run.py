@@ -79,13 +79,13 @@ class ThrottledReports:
         self._on_report = on_report
         self._clock = clock
         self._stage = ""
-        self._told_s = 0.0
+        self._reported_s = 0.0
 
     def __call__(self, report: Report) -> None:
         """Pass a report on, or drop it."""
         now_s = self._clock()
-        if report.stage != self._stage or now_s - self._told_s >= PAUSE_S:
-            self._stage, self._told_s = report.stage, now_s
+        if report.stage != self._stage or now_s - self._reported_s >= PAUSE_S:
+            self._stage, self._reported_s = report.stage, now_s
             self._on_report(report)
 
 

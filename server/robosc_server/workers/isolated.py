@@ -95,10 +95,10 @@ def run_isolated(
     background = _background(task_function, must_be_confined)
     background.prepare()
 
-    async def tell(report: Report) -> None:
+    async def forward(report: Report) -> None:
         on_report(report)
 
-    work = background.start(background.workers.run(task, limits, tell, on_cpu_time))
+    work = background.start(background.workers.run(task, limits, forward, on_cpu_time))
     ended = threading.Event()
     work.add_done_callback(lambda _: ended.set())
     while not ended.wait(_ASK_S):

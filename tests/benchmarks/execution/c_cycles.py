@@ -10,6 +10,7 @@ from figures import micro
 from robosc.targets import generate
 from robosc_experiments.cycles.times import CYCLES, RUNS
 
+# The callbacks are those of `robosc_experiments/cycles/scripts/changing.c`, which is compiled as it is.
 _COMMON = """
 #define _POSIX_C_SOURCE 199309L
 #include "@p@.h"

@@ -377,3 +377,24 @@ def test_heading_is_within_half_a_turn(any_bench: Rig) -> None:
     seen = [any_bench.drive(Velocity(0.0, 2.5), 0.1).pose.heading_rad for _ in range(16)]
     assert all(-math.pi < heading <= math.pi for heading in seen)
     assert min(seen) < -1.0
+
+
+@pytest.mark.parametrize(
+    ("kind", "torque_on"),
+    [
+        ("opencr", "ff ff fd 00 c8 06 00 03 95 00 01 4c 2d"),
+        ("dynamixel", "ff ff fd 00 fe 0b 00 83 40 00 01 00 01 01 02 01 c7 64"),
+    ],
+)
+def test_torque_is_not_switched_on_while_the_wheels_turn(kind: str, torque_on: str) -> None:
+    with rig(kind) as bench:
+        bench.base.open()
+        # Somebody pushes it, whatever its motor does.
+        bench.robot.left._drive = lambda: None  # type: ignore[method-assign]
+        wheel = bench.robot.world.left
+        wheel.is_driven = True
+        wheel.goal_rad_s = 2.0
+        bench.until(lambda: bool(bench.robot.world.pose) and wheel.speed_rad_s == 2.0)
+        with pytest.raises(DeviceError, match=r"still rotates?"):
+            bench.base.set_torque(True)
+        assert torque_on not in bench.tap.packets

@@ -8,7 +8,7 @@ import pytest
 from robosc_bridge.devices.dynamixel import DynamixelBase
 from robosc_bridge.devices.interface import MotorFault, Velocity
 from robosc_bridge.devices.robots import BURGER
-from robosc_bridge.errors import DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
+from robosc_bridge.errors import DeviceFaultError, DeviceSilentError, WrongDeviceError
 from robosc_simulated.line import Sending
 from support.drive import PATIENT_S, Rig, rig
 
@@ -305,19 +305,6 @@ def test_a_restart_while_nothing_is_asked_is_noticed_before_the_wheels_are_comma
     bench.base.set_torque(True)
     assert bench.robot.left.table["led"] == 1
     assert bench.drive(FORWARD, 0.2).velocity.linear_m_s == pytest.approx(0.15, abs=0.001)
-
-
-def test_torque_is_not_switched_on_while_the_wheels_turn(bench: Rig) -> None:
-    bench.base.open()
-    # Somebody pushes it, whatever its motor does.
-    bench.robot.left._drive = lambda: None  # type: ignore[method-assign]
-    wheel = bench.robot.world.left
-    wheel.is_driven = True
-    wheel.goal_rad_s = 2.0
-    bench.until(lambda: bool(bench.robot.world.pose) and wheel.speed_rad_s == 2.0)
-    with pytest.raises(DeviceError, match="still rotates"):
-        bench.base.set_torque(True)
-    assert TORQUE_ON not in bench.tap.packets
 
 
 def test_a_silent_motor_does_not_keep_the_other_one_from_being_let_go(bench: Rig) -> None:

@@ -460,19 +460,6 @@ def test_answers_that_are_late_are_no_restart() -> None:
         assert bench.drive(Velocity(0.1), 0.2).velocity.linear_m_s == pytest.approx(0.1, abs=0.002)
 
 
-def test_torque_is_not_switched_on_while_the_wheels_turn(bench: Rig) -> None:
-    bench.base.open()
-    # Somebody pushes it, whatever its motor does.
-    bench.robot.left._drive = lambda: None  # type: ignore[method-assign]
-    wheel = bench.robot.world.left
-    wheel.is_driven = True
-    wheel.goal_rad_s = 2.0
-    bench.until(lambda: bool(bench.robot.world.pose) and wheel.speed_rad_s == 2.0)
-    with pytest.raises(DeviceError, match="the wheels still rotate"):
-        bench.base.set_torque(True)
-    assert TORQUE_ON not in bench.tap.packets
-
-
 def test_torque_that_is_gone_is_a_fault_that_stays_until_torque_is_switched_on_anew(bench: Rig) -> None:
     bench.start()
     bench.drive(Velocity(0.1), 0.2)

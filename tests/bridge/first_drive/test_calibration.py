@@ -14,7 +14,7 @@ from robosc_bridge.devices.interface import BINS
 from robosc_bridge.first_drive import commands
 from robosc_bridge.first_drive.calibration import (
     CalibrationError,
-    Way,
+    RolledMotion,
     wall_angle_rad,
     wheel_radius_m,
     wheel_separation_m,
@@ -139,12 +139,12 @@ def test_what_is_no_wall_is_refused() -> None:
 @pytest.mark.parametrize(
     ("way", "measured_m", "problem"),
     [
-        (Way(0.1, 0.0), 0.1, "too short"),
-        (Way(2.0, 0.5), 2.0, "turned by 29 degrees"),
-        (Way(2.0, 0.0), 1.0, "would be 0.0165 m"),
+        (RolledMotion(0.1, 0.0), 0.1, "too short"),
+        (RolledMotion(2.0, 0.5), 2.0, "turned by 29 degrees"),
+        (RolledMotion(2.0, 0.0), 1.0, "would be 0.0165 m"),
     ],
 )
-def test_a_way_that_says_nothing_of_the_wheels_is_refused(way: Way, measured_m: float, problem: str) -> None:
+def test_a_way_that_says_nothing_of_the_wheels_is_refused(way: RolledMotion, measured_m: float, problem: str) -> None:
     with pytest.raises(CalibrationError, match=problem):
         wheel_radius_m(way, measured_m, RADIUS_M)
 
@@ -152,12 +152,12 @@ def test_a_way_that_says_nothing_of_the_wheels_is_refused(way: Way, measured_m: 
 @pytest.mark.parametrize(
     ("way", "problem"),
     [
-        (Way(0.0, 1.0), "not turned by a whole revolution"),
-        (Way(5.0, 31.4), "moved away from its place"),
-        (Way(0.0, 31.4 * 2), "would be 0.3"),
+        (RolledMotion(0.0, 1.0), "not turned by a whole revolution"),
+        (RolledMotion(5.0, 31.4), "moved away from its place"),
+        (RolledMotion(0.0, 31.4 * 2), "would be 0.3"),
     ],
 )
-def test_a_rotation_that_says_nothing_of_the_wheels_is_refused(way: Way, problem: str) -> None:
+def test_a_rotation_that_says_nothing_of_the_wheels_is_refused(way: RolledMotion, problem: str) -> None:
     with pytest.raises(CalibrationError, match=problem):
         wheel_separation_m(way, 5, SEPARATION_M)
 

@@ -109,5 +109,5 @@ def test_what_a_layer_refuses_is_told() -> None:
     talk.say(_target(talk.station, 0.1))
     attached = talk.daemon.told[0]
     assert isinstance(attached, Attached)
-    attached.program.tell(Refused("somebody else drives"))
+    attached.program.send(Refused("somebody else drives"))
     assert "somebody else drives" in joined_texts(talk.live(0.2))

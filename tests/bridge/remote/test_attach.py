@@ -187,7 +187,7 @@ class TestTalk:
         self, item: Any, kind: str, fields: Any, data: Any, daemon: FakeDaemon, stub: Any
     ) -> None:
         program = attached(stub)
-        daemon.program().tell(item)
+        daemon.program().send(item)
         response = program.receive()
         assert response.WhichOneof("message") == kind
         part = getattr(response, kind)
@@ -202,7 +202,7 @@ class TestTalk:
         data = wait_until(lambda: daemon.of(programs.MessageRequested))[0].data
         assert math.isnan(data[0])
         assert data[1] == math.inf
-        daemon.program().tell(programs.PassedOn("/scan", [math.nan]))
+        daemon.program().send(programs.PassedOn("/scan", [math.nan]))
         assert math.isnan(program.receive().passed_on.data.list_value.values[0].number_value)
         program.end()
 
@@ -213,7 +213,7 @@ class TestTalk:
         wait_until(lambda: len(daemon.of(programs.MessageReceived)) == 500)
         assert [item.data for item in daemon.of(programs.MessageReceived)] == list(range(500))
         for number in range(500):
-            daemon.program().tell(programs.MessageSent("show", "/show", number))
+            daemon.program().send(programs.MessageSent("show", "/show", number))
         heard = [program.receive().message_sent.data.number_value for _ in range(500)]
         assert heard == list(range(500))
         program.end()
@@ -359,7 +359,7 @@ class TestHostilePrograms:
         # Its connection is closed, without a word.
         assert wait_until(lambda: daemon.of(programs.Detached))[0].program is daemon.program()
         # What the loop still tells it goes nowhere.
-        daemon.program().tell(programs.CallMade("open", 1, None))
+        daemon.program().send(programs.CallMade("open", 1, None))
 
     def test_a_program_that_hangs_with_its_whole_machine_is_taken_for_gone(
         self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch
@@ -411,7 +411,7 @@ class TestHostilePrograms:
         data = "x" * size
         end_s = time.monotonic() + PATIENCE_S
         while not daemon.of(programs.Detached):
-            known.tell(programs.PassedOn("/scan", data))
+            known.send(programs.PassedOn("/scan", data))
             assert time.monotonic() < end_s
         code, details = program.failure()
         assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
@@ -425,7 +425,7 @@ class TestHostilePrograms:
             made = session.ProgramSession(daemon.operations, pb.Hello(name="arm"), "arm", None)
             waiting.append(made)
             for _ in range(times):
-                made._tell(programs.PassedOn("/scan", list(data)))
+                made._send(programs.PassedOn("/scan", list(data)))
             return len(made._waiting)
 
         large = [float(number) for number in range(10_000)]
@@ -438,7 +438,7 @@ class TestHostilePrograms:
         program = attached(stub)
         large = [0.5] * 10_000
         for _ in range(3 * session.MAXIMUM_WAITING_BYTES // 320_056):
-            daemon.program().tell(programs.PassedOn("/scan", list(large)))
+            daemon.program().send(programs.PassedOn("/scan", list(large)))
             assert len(program.receive().passed_on.data.list_value.values) == 10_000
         program.end()
 

@@ -315,7 +315,7 @@ class TestStop:
             for call in calls:
                 next(call)  # It is there; from now on nobody reads.
             for _ in range(300):
-                daemon.feed.tell(entry)
+                daemon.feed.append(entry)
                 daemon.show()
             code, details = failure(stubs[0].Watch(pb.WatchRequest()))
             assert code is grpc.StatusCode.RESOURCE_EXHAUSTED
@@ -366,8 +366,8 @@ class TestWatch:
     def test_snapshots_and_events_come_as_they_happen(self, daemon: FakeDaemon, stub: Any) -> None:
         call = stub.Watch(pb.WatchRequest(maximum_rate_hz=100), timeout=PATIENCE_S)
         assert next(call).snapshot.state == pb.BRIDGE_STATE_RUNNING
-        daemon.feed.tell({"time": 2.5, "kind": "blocked", "identifier": "/cmd_vel", "data": {"x": math.nan}})
-        daemon.feed.tell({"time": 3.0, "kind": "event", "event": "order.response", "decision_us": 12})
+        daemon.feed.append({"time": 2.5, "kind": "blocked", "identifier": "/cmd_vel", "data": {"x": math.nan}})
+        daemon.feed.append({"time": 3.0, "kind": "event", "event": "order.response", "decision_us": 12})
         shown = daemon.show(state=State.STANDBY)
         events: list[Any] = []
         while len(events) < 2:
@@ -418,7 +418,7 @@ class TestWatch:
         call = stub.Watch(pb.WatchRequest(without_events=True, maximum_rate_hz=100), timeout=PATIENCE_S)
         next(call)
         for _ in range(MAXIMUM_EVENTS * 2):
-            daemon.feed.tell({"time": 1.0, "kind": "event"})
+            daemon.feed.append({"time": 1.0, "kind": "event"})
         number = daemon.show().number
         response = next(call)
         while response.snapshot.number < number:
@@ -463,7 +463,7 @@ class TestWatch:
         next(call)
         count = 3000
         for number in range(count):
-            daemon.feed.tell({"time": float(number), "kind": "event", "event": "x" * 20_000})
+            daemon.feed.append({"time": float(number), "kind": "event", "event": "x" * 20_000})
             if number % 100 == 0:
                 daemon.show()
                 time.sleep(0.005)

@@ -90,7 +90,7 @@ def test_a_velocity_is_told_by_what_wheels_measure() -> None:
 
 def test_a_covariance_that_is_told() -> None:
     planar = [0.1, 0.01, 0.02, 0.01, 0.2, 0.03, 0.02, 0.03, 0.3]
-    told = uncertainty.told_pose(planar)
+    told = uncertainty.reported_pose(planar)
     assert told is not None
     found = np.array(told).reshape(6, 6)
     assert np.array_equal(found, found.T)
@@ -100,4 +100,4 @@ def test_a_covariance_that_is_told() -> None:
 
 @pytest.mark.parametrize("planar", [[], [0.0] * 8, [0.0] * 36, [math.nan] + [0.0] * 8])
 def test_a_covariance_that_is_none(planar: list[float]) -> None:
-    assert uncertainty.told_pose(planar) is None
+    assert uncertainty.reported_pose(planar) is None

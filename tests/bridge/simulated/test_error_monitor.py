@@ -35,7 +35,7 @@ def test_a_file_on_a_full_disk_is_told_of_once_also_if_it_is_noticed_at_the_end(
 
 def test_what_was_written_is_there(tmp_path: Path) -> None:
     error_monitor = ErrorMonitor()
-    output = Output(tmp_path / "file", error_monitor.tell)
+    output = Output(tmp_path / "file", error_monitor.report)
     output.write("one\n")
     output.flush()
     assert (tmp_path / "file").read_text() == "one\n"

@@ -254,11 +254,11 @@ class TestWatch:
             assert process.stdout.readline().endswith(
                 "= running: The scanner has made no full revolution for too long.; An operator has stopped the robot.\n"
             )
-            daemon.feed.tell({"time": 1.5, "kind": "blocked", "identifier": "/cmd_vel", "what": "not allowed"})
+            daemon.feed.append({"time": 1.5, "kind": "blocked", "identifier": "/cmd_vel", "what": "not allowed"})
             line = process.stdout.readline()
             assert line.split(" ", 1)[1] == "! blocked    /cmd_vel not allowed\n"
             assert line.split(" ", 1)[0].endswith(":01.500")
-            daemon.feed.tell({"time": 2.0, "kind": "event", "event": "order.response", "data": {"value": 3}})
+            daemon.feed.append({"time": 2.0, "kind": "event", "event": "order.response", "data": {"value": 3}})
             assert process.stdout.readline().split(" ", 1)[1] == "  event      order.response data={'value': 3.0}\n"
             daemon.show(reasons=(Reason.STANDBY,), state=State.STANDBY)
             assert "= standby: The robot is in standby." in process.stdout.readline()

@@ -136,13 +136,13 @@ def test_events_happen_and_the_others_say_why_not(tmp_path: Path) -> None:
     async def run() -> None:
         async with serving(played(tmp_path / "tank.cif")) as url, opened(url) as page:
             told = await page.told("run")
-            assert told["hindered"] == {
+            assert told["blocked"] == {
                 "tank.u_drain": ["tank: tank.level > 1 does not hold (tank.level is 0)"],
                 "line.belt.c_turn": ["line.belt is in run, not in jam"],
             }
             told = await done(page, "event", line="tank.c_fill")
             assert (told["steps"], told["lines"]) == (1, ["tank.c_fill: order = b, tank.level = 1"])
-            assert told["hindered"]["tank.c_fill"] == [
+            assert told["blocked"]["tank.c_fill"] == [
                 "requirement order: sensor.value does not hold (sensor.value is false)"
             ]
             assert [item["component"] for item in page.entries()[-1]["transitions"]] == ["tank", "order"]
@@ -150,7 +150,7 @@ def test_events_happen_and_the_others_say_why_not(tmp_path: Path) -> None:
             assert told["lines"] == ["sensor (value = true): sensor.value = true"]
             for _ in range(2):
                 told = await done(page, "event", line="tank.c_fill")
-            assert told["hindered"]["tank.c_fill"] == [
+            assert told["blocked"]["tank.c_fill"] == [
                 "the supervisor forbids it, because of what can follow (tank.level is 3)"
             ]
             told = await done(page, "event", line="tank.c_fill")

@@ -159,7 +159,7 @@ def test_who_does_not_read_loses_entries_is_told_how_many_and_is_heard_all_the_s
             assert connection is not None and connection.transport is not None
             connection.transport.pause_reading()
             for number in range(count):
-                robot.feed.tell(note)
+                robot.feed.append(note)
                 if number % 200 == 0:
                     await asyncio.sleep(0.001)
             await page.send(type="stop")

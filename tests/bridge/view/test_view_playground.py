@@ -343,7 +343,7 @@ def test_events_happen_with_their_data_and_are_taken_back() -> None:
             assert field == {"path": [], "type": "Light", "choices": ["day", "night"], "is_boolean": False}
             first = await page.told("run")
             assert (first["steps"], first["undo"], first["redo"], first["is_marked"]) == (0, "", "", True)
-            assert first["hindered"]["shut.request"] == ["Gate is in closed, not in opened"]
+            assert first["blocked"]["shut.request"] == ["Gate is in closed, not in opened"]
             told = await done(page, "event", line="open")
             assert (told["kind"], told["steps"]) == ("wrong", 0)
             assert "open.request' is not allowed now: requirement open needs Sensor.light = day" in told["lines"][0]
@@ -353,7 +353,7 @@ def test_events_happen_with_their_data_and_are_taken_back() -> None:
             assert told["lines"][1] == "value is night by default: an earlier rule is unknown"
             told = await done(page, "event", line="light.response 512.0")
             assert (told["kind"], told["lines"]) == ("step", ["light.response (value = day): Sensor.light = day"])
-            assert "open.request" not in told["hindered"]
+            assert "open.request" not in told["blocked"]
             told = await done(page, "event", line="open.request")
             assert (told["undo"], told["is_marked"]) == ("open.request", False)
             assert [entry["number"] for entry in page.entries()] == [1, 2, 3, 4]

@@ -263,7 +263,7 @@ def test_the_last_transitions_are_those_of_a_run_from_the_beginning(seed: int, h
             robot.step()
         else:
             robot.system.restart()
-            robot.feed.tell({"time": BEGIN_S, "kind": "restart"})
+            robot.feed.append({"time": BEGIN_S, "kind": "restart"})
     documents = [{**entry, "time": BEGIN_S + number} for number, entry in enumerate(subscription.take().entries)]
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "log.jsonl"

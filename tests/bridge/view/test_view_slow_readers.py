@@ -100,7 +100,7 @@ def fill(endpoint: ViewEndpoint, robot: LiveRobot, pages: int, pass_by: Callable
     while sum(item.get_write_buffer_size() > 0 for item in tuple(endpoint._server._sockets.values())) < pages:
         assert time.monotonic() < end_s
         for _ in range(50):
-            robot.feed.tell(note)
+            robot.feed.append(note)
         pass_by(server_module.BATCH_S)
 
 

@@ -115,9 +115,9 @@ def test_types_and_fields_of_ros_are_put_right(right: str, wrong: str) -> None:
 def test_a_field_that_is_the_only_one_is_meant() -> None:
     text = """robot R {
     interface i use SetBool from std_srvs
-    datatype object Wish { data: boolean }
+    datatype object RequestedSettings { data: boolean }
     datatype object Answer { success: boolean }
-    component C { service lid with request: Wish, response: Answer links i }
+    component C { service lid with request: RequestedSettings, response: Answer links i }
 }
 """
     assert text in titles_and_texts(text.replace("data: boolean", "openn: boolean")).values()

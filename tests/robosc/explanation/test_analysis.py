@@ -9,7 +9,7 @@ import pytest
 from robosc.automata import Semantics, System
 from robosc.automata.compile import NO_DATA, State, compile_expression
 from robosc.automata.state import Subject, subject_domain, subjects
-from robosc.explanation.analysis import Analysis, Hindrance, HindranceKind
+from robosc.explanation.analysis import Analysis, BlockingCause, BlockingCauseKind
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, relaxable_constraints, without_ranges
 from robosc.explanation.problems import Problems
 from robosc.explanation.requirement_automata import as_conditions
@@ -64,19 +64,19 @@ class Twin:
 
     def check(self, state: State, event: str, met: Counter[str]) -> None:
         here = self.analysis.predicate(state)
-        found = self.analysis.hindrances(event, here)
+        found = self.analysis.blocking_causes(event, here)
         assert all(item.event == event and item.where == here for item in found)
         expected = [*self._behaviours(state, event)]
         if self.system.event(event).is_controllable:
             expected += [*self._ranges(state, event), *self._conditions(state, event)]
             if self.semantics.enabled(state, event) and self.semantics.condition(state, event):
                 is_lost = not self.supervisor.good.issuperset(self.semantics.targets(state, event))
-                expected += [(HindranceKind.SUPERVISOR, None)] if is_lost else []
+                expected += [(BlockingCauseKind.SUPERVISOR, None)] if is_lost else []
                 assert self.supervisor.allows(state, event) == (not is_lost)
         assert [(item.kind, _cause(item)) for item in found] == expected
         met.update(str(kind) for kind, _ in expected)
         met.update(name for _, cause in expected for name in WIDE if isinstance(cause, str) and cause.startswith(name))
-        met["several ranges"] += sum(kind is HindranceKind.RANGE for kind, _ in expected) > 1
+        met["several ranges"] += sum(kind is BlockingCauseKind.RANGE for kind, _ in expected) > 1
         # Whatever keeps it from happening is named, and nothing where it can happen.
         can_happen = here & self.analysis.possible(event) != self.false
         assert can_happen == (not expected)
@@ -123,7 +123,7 @@ class Twin:
         assert states & goal
         return True
 
-    def _behaviours(self, state: State, event: str) -> list[tuple[HindranceKind, object]]:
+    def _behaviours(self, state: State, event: str) -> list[tuple[BlockingCauseKind, object]]:
         found = [
             item.name
             for item in self.system.automata
@@ -145,37 +145,37 @@ class Twin:
         if not found and not self.wanted.enabled(state, event):
             assert self.system.plant_invariants
             found.append("impossible")
-        return [(HindranceKind.BEHAVIOUR, item) for item in found]
+        return [(BlockingCauseKind.BEHAVIOUR, item) for item in found]
 
-    def _ranges(self, state: State, event: str) -> list[tuple[HindranceKind, object]]:
+    def _ranges(self, state: State, event: str) -> list[tuple[BlockingCauseKind, object]]:
         """The ranges each of which alone, the others left out, keeps the event from happening."""
         if not self.wanted.enabled(state, event):
             return []
         return [
-            (HindranceKind.RANGE, item)
+            (BlockingCauseKind.RANGE, item)
             for item in self.ranges
             if not Semantics(without_ranges(self.unrestricted, [r for r in self.ranges if r != item])).enabled(
                 state, event
             )
         ]
 
-    def _conditions(self, state: State, event: str) -> list[tuple[HindranceKind, object]]:
+    def _conditions(self, state: State, event: str) -> list[tuple[BlockingCauseKind, object]]:
         if not self.wanted.enabled(state, event):
             return []
         return [
-            (HindranceKind.REQUIREMENT, place)
+            (BlockingCauseKind.REQUIREMENT, place)
             for place, item in enumerate(self.system.conditions)
             if item.event == event and compile_expression(item.condition, self.places)(state, NO_DATA) is not True
         ]
 
 
-def _cause(item: Hindrance) -> str | RelaxableConstraint | int | None:
+def _cause(item: BlockingCause) -> str | RelaxableConstraint | int | None:
     condition = "nobody's" if item.plant_condition is None else f"plant condition {item.plant_condition}"
     return {
-        HindranceKind.BEHAVIOUR: item.automaton or ("impossible" if item.is_impossible else condition),
-        HindranceKind.RANGE: item.range,
-        HindranceKind.REQUIREMENT: item.condition,
-        HindranceKind.SUPERVISOR: None,
+        BlockingCauseKind.BEHAVIOUR: item.automaton or ("impossible" if item.is_impossible else condition),
+        BlockingCauseKind.RANGE: item.range,
+        BlockingCauseKind.REQUIREMENT: item.condition,
+        BlockingCauseKind.SUPERVISOR: None,
     }[item.kind]
 
 
@@ -185,14 +185,14 @@ def system_of(seed: int) -> System:
 
 
 @pytest.mark.random
-def test_hindrances_in_reachable_states() -> None:
+def test_blocking_causes_in_reachable_states() -> None:
     met: Counter[str] = Counter()
     for seed in seeds(2 * EXAMPLES):
         twin = Twin(system_of(seed))
         for state in sorted(twin.supervisor.reachable)[:STATES]:
             for event in twin.system.events:
                 twin.check(state, event.name, met)
-    assert all(met[name] for name in (*map(str, HindranceKind), "can happen", *WIDE)), met
+    assert all(met[name] for name in (*map(str, BlockingCauseKind), "can happen", *WIDE)), met
 
 
 @pytest.mark.random
@@ -204,8 +204,8 @@ def test_what_would_follow_runs_into_trouble() -> None:
         for state in sorted(twin.supervisor.reachable)[:STATES]:
             here = twin.analysis.predicate(state)
             for event in twin.system.events:
-                kinds = {item.kind for item in twin.analysis.hindrances(event.name, here)}
-                if HindranceKind.SUPERVISOR in kinds:
+                kinds = {item.kind for item in twin.analysis.blocking_causes(event.name, here)}
+                if BlockingCauseKind.SUPERVISOR in kinds:
                     counterexample = twin.analysis.counterexample_after(
                         twin.analysis.bad_after(event.name, here, twin.analysis.good)
                     )

@@ -11,7 +11,7 @@ from robosc.automata import Semantics, System
 from robosc.automata.compile import NO_DATA, State, compile_expression
 from robosc.automata.state import subjects
 from robosc.errors import SynthesisCancelled
-from robosc.explanation.analysis import Analysis, Counterexample, HindranceKind
+from robosc.explanation.analysis import Analysis, BlockingCauseKind, Counterexample
 from robosc.explanation.blame import find_blame
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint, relaxable_constraints, without
 from robosc.explanation.problems import Problems
@@ -209,7 +209,7 @@ def test_trouble_is_real_and_the_run_is_shortest() -> None:
         if counterexample.is_blocking:
             _check_detour(system, search, counterexample, last, met)
     assert all(met[name] for name in ("forced", "not forced", "blocking", "bad", "long", "invariant", "range")), met
-    assert all(met[name] for name in ("condition", "no way", *map(str, HindranceKind))), met
+    assert all(met[name] for name in ("condition", "no way", *map(str, BlockingCauseKind))), met
 
 
 @pytest.mark.random
@@ -237,12 +237,12 @@ def test_trouble_without_some_obstacles_speaks_of_the_others_alone() -> None:
         assert all((name, after) in list(search.steps(before)) for name, (before, after) in steps)
         _check_run_of_the_robot(system, search, counterexample, met)
         named = {place for item in kept for place in item.conditions}
-        hindrances = () if counterexample.detour is None else counterexample.detour.hindrances
+        blocking_causes = () if counterexample.detour is None else counterexample.detour.blocking_causes
         assert {place for _, place in counterexample.forbidden} <= named
-        assert {item.condition for item in hindrances if item.condition is not None} <= named
+        assert {item.condition for item in blocking_causes if item.condition is not None} <= named
         assert set(counterexample.invariants) <= {place for item in kept for place in item.invariants}
         assert {item for _, item in counterexample.leaving} <= set(kept)
-        assert {item.range for item in hindrances if item.range is not None} <= set(kept)
+        assert {item.range for item in blocking_causes if item.range is not None} <= set(kept)
         assert set(counterexample.unmarked) <= {item.marking for item in kept}
         assert not counterexample.is_marker_missed or any(item.is_marker for item in kept)
         met["another story"] += counterexample.run != symbolic[0].counterexample().run
@@ -346,13 +346,13 @@ def _check_detour(
     assert here in states
     assert here in inside
     semantics = search.semantics
-    kinds = {item.kind for item in counterexample.detour.hindrances}
+    kinds = {item.kind for item in counterexample.detour.blocking_causes}
     met.update(map(str, kinds))
     if system.event(event).is_controllable:
-        assert (HindranceKind.REQUIREMENT in kinds) == (not semantics.condition(here, event))
-        assert (HindranceKind.RANGE in kinds) == (not semantics.enabled(here, event))
+        assert (BlockingCauseKind.REQUIREMENT in kinds) == (not semantics.condition(here, event))
+        assert (BlockingCauseKind.RANGE in kinds) == (not semantics.enabled(here, event))
         assert kinds
-    met[str(HindranceKind.BEHAVIOUR)] += HindranceKind.BEHAVIOUR not in kinds
+    met[str(BlockingCauseKind.BEHAVIOUR)] += BlockingCauseKind.BEHAVIOUR not in kinds
 
 
 def test_a_search_that_takes_too_long_tells_what_it_has() -> None:

@@ -10,7 +10,7 @@ from robosc.language.advice import fix_syntax
 from support.mistakes import GOOD, SLIPS, Mistake, Verdict, every_mistake, first_error, judge, obeyed
 
 WANTED = 0.975
-"""Share of all mistakes that is told well."""
+"""Share of all mistakes with a good message."""
 WANTED_OF_EACH = 0.9
 WANTED_OF_SOME = {
     # Nested parentheses over several lines do not tell which one lacks its end.

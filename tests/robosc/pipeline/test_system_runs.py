@@ -128,9 +128,9 @@ def _lead(
         assert run.is_marked is naive.is_marked(now)
         assert list(run.possible) == can
         assert list(run.enabled) == [event for event in can if drawn.event(event).is_controllable]
-        hindered = run.hindrances()
-        assert list(hindered) == [event for event in run.events if event not in can]
-        for event, why in hindered.items():
+        blocked = run.blocked()
+        assert list(blocked) == [event for event in run.events if event not in can]
+        for event, why in blocked.items():
             assert why
             assert why == run.reasons(event)
             with pytest.raises(robosc.EventNotPossibleError, match="now: "):
@@ -198,7 +198,7 @@ def test_walks_go_along_the_graph(seed: int) -> None:
     assert robosc.simulate(supervisor, initial=initial).walk(STEPS, seed) == steps
     # Nonblocking, so that trouble is only what is forbidden.
     trouble = run.walk_until_trouble(50, seed)
-    assert trouble is None or (trouble.kind is TroubleKind.BLOCKED and trouble.event in run.hindrances())
+    assert trouble is None or (trouble.kind is TroubleKind.BLOCKED and trouble.event in run.blocked())
 
 
 def test_a_line_by_hand() -> None:
@@ -214,7 +214,7 @@ def test_a_line_by_hand() -> None:
         "allowed are take",
     ]
     assert "Buffer = full" in run._repr_html_()
-    assert run.hindrances() == {
+    assert run.blocked() == {
         "start": ("the supervisor forbids it, because of what can follow (Buffer is full)",),
         "u_done": ("Machine is in idle, not in busy",),
     }
@@ -260,7 +260,7 @@ def test_every_cause_is_a_sentence() -> None:
     run = robosc.simulate(supervised(made))
     cannot_be = "it leads only to what the plants cannot be: there !A.{} does not hold"
     assert run.possible == ("partly", "u_free")
-    assert run.hindrances() == {
+    assert run.blocked() == {
         "alone": ("requirement left R has no edge for it",),
         "barred": ("it needs A.m, which does not hold (A is l)",),
         "broken": (cannot_be.format("k"), cannot_be.format("m")),

@@ -105,7 +105,7 @@ def test_there_is_a_reason_if_and_only_if_an_event_cannot_happen(seed: int) -> N
         return
     run = robosc.simulate(core)
     for number in range(STEPS):
-        assert run.hindrances() == {event: run.reasons(event) for event in run.events if event not in run.possible}
+        assert run.blocked() == {event: run.reasons(event) for event in run.events if event not in run.possible}
         for event in run.events:
             if replay.is_controllable(event):
                 can_happen = not replay.refusal(event)

@@ -257,7 +257,7 @@ def test_where_the_supervisor_does_not_let_it_begin(tmp_path: Path) -> None:
     assert supervisor is not None
     space: dict[str, Any] = {"__name__": "module"}
     exec(Path(in_python(supervisor, tmp_path)[-1]).read_text(), space)
-    assert space["Supervisor"]({"hot": False}).told() == {"hot": False}
+    assert space["Supervisor"]({"hot": False}).values() == {"hot": False}
     with pytest.raises(ValueError, match="may not begin so"):
         space["Supervisor"]({"hot": True})
     # The program in C begins with what is false.

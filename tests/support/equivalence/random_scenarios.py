@@ -9,7 +9,6 @@ from typing import Any
 from robosc.expressions import (
     ArrayType,
     BooleanType,
-    Constant,
     DoubleType,
     EnumType,
     IntegerType,
@@ -17,10 +16,10 @@ from robosc.expressions import (
     ObjectType,
     StringType,
     Type,
-    leaves,
 )
 from robosc.model.structure import CommunicationKind, Deployment, Model
 from robosc.supervisor import Supervisor
+from robosc.targets.cpp.recording import texts_of
 from support.equivalence.observation import Issued, Observation
 from support.equivalence.python_targets import PythonTarget, reference
 from support.equivalence.scenario import Action, Scenario
@@ -50,7 +49,7 @@ class Dice:
         self._is_hostile = is_hostile
         self._topics: dict[str, list[Type]] = {}
         self._asked: dict[str, list[Type]] = {}
-        self._texts = (*_TEXTS, *_texts_of(model))
+        self._texts = (*_TEXTS, *texts_of(model))
         for item in model.communications:
             if item.kind is CommunicationKind.OUTGOING_MESSAGE and item.response is not None:
                 self._topics.setdefault(item.identifier, []).append(item.response)
@@ -120,17 +119,6 @@ class Dice:
 
     def _source(self, type_: Type) -> Type:
         return self._model.enum(type_.name).source if isinstance(type_, EnumType) else type_
-
-
-def _texts_of(model: Model) -> list[str]:
-    """The texts that rules of enums ask for."""
-    rules = [rule.condition for enum in model.enums for rule in enum.rules]
-    return [
-        leaf.value
-        for rule in rules
-        for leaf in leaves(rule)
-        if isinstance(leaf, Constant) and isinstance(leaf.value, str)
-    ]
 
 
 def random_settings(supervisor: Supervisor, dice: Random) -> dict[str, Any]:

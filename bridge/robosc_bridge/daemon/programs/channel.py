@@ -40,14 +40,14 @@ Answer = Replied | CallFailed | GoalAccepted | FeedbackGiven | GoalEnded
 
 @dataclass
 class _Open:
-    """Call or goal that a program has been told of, and whose end the program has not reported.
+    """Call or goal that was sent to a program, and whose end the program has not reported.
 
     Attributes:
         program: Program that serves it.
         name: Name of the service or action.
         number: Number that the executor uses.
         is_goal: True if it is a goal.
-        is_cancelled: True if the program was told to end it.
+        is_cancelled: True if the program was asked to end it.
     """
 
     program: Program
@@ -85,7 +85,7 @@ class ProgramChannel:
 
     def send(self, communication: Communication, data: Any) -> None:
         """The model sends a message."""
-        self._clients.tell_all(MessageSent(communication.name, communication.identifier, data))
+        self._clients.send_all(MessageSent(communication.name, communication.identifier, data))
 
     def call(self, communication: Communication, number: int, data: Any) -> str:
         """The model calls a service; why nobody is asked."""
@@ -112,14 +112,14 @@ class ProgramChannel:
         self._open = {own: item for own, item in self._open.items() if item.name != name}
         own, self._next_number = self._next_number, self._next_number + 1
         self._open[own] = _Open(program, name, number, is_goal)
-        self._clients.tell(program, GoalMade(name, own, data) if is_goal else CallMade(name, own, data))
+        self._clients.send(program, GoalMade(name, own, data) if is_goal else CallMade(name, own, data))
         return ""
 
     def _cancel(self, own: int) -> None:
         item = self._open[own]
         if not item.is_cancelled:
             item.is_cancelled = True
-            self._clients.tell(item.program, CancelMade(item.name, own))
+            self._clients.send(item.program, CancelMade(item.name, own))
 
     # The programs' side.
 

@@ -152,13 +152,13 @@ class Program:
 
     Attributes:
         name: Name of the program, for the log.
-        tell: Function that the loop's thread calls with each item for the program; neither waits nor raises.
+        send: Function that the loop's thread calls with each item for the program; neither waits nor raises.
         serves: Names of the model's services and actions, mapped to `grpc`, that it answers.
         may_request: True if it may be the caller of a supervision layer.
     """
 
     name: str
-    tell: Callable[[ToProgram], None]
+    send: Callable[[ToProgram], None]
     serves: frozenset[str] = field(default_factory=frozenset)
     may_request: bool = False
 
@@ -308,21 +308,21 @@ class Clients:
         """Remove a program: it gets no messages any more."""
         self._programs.pop(program, None)
 
-    def tell(self, program: Program, item: ToProgram) -> None:
-        """Tell a program something, if it is still there; never raises."""
+    def send(self, program: Program, item: ToProgram) -> None:
+        """Send an item to a program, if it is still connected; never raises."""
         if program not in self._programs:
             return
         try:
-            program.tell(item)
+            program.send(item)
         except Exception:  # What a program's side does wrong must not stop the robot's loop.
             _log.exception("an item could not be sent to %s", program.name)
 
-    def tell_all(self, item: ToProgram) -> None:
-        """Tell every program something."""
+    def send_all(self, item: ToProgram) -> None:
+        """Send an item to every program."""
         for program in self._programs:
-            self.tell(program, item)
+            self.send(program, item)
 
     def refuse(self, program: Program, why: str) -> None:
-        """Tell a program that what it sent makes no sense."""
+        """Refuse an item that a program has sent."""
         _log.debug("%s: %s", program.name, why)
-        self.tell(program, Refused(why))
+        self.send(program, Refused(why))

@@ -86,9 +86,9 @@ class Requesters:
     def forget(self) -> None:
         """A run is over, or a new one begins: what is still awaited of the one before never comes."""
         for (program, call_id), _ in self._calls.items():
-            self._clients.tell(program, Answered(call_id, None, is_default=True))
+            self._clients.send(program, Answered(call_id, None, is_default=True))
         for (program, goal_id), _ in self._goals.items():
-            self._clients.tell(program, GoalOver(goal_id, "aborted", None))
+            self._clients.send(program, GoalOver(goal_id, "aborted", None))
         self._senders.clear()
         self._calls.clear()
         self._goals.clear()
@@ -163,13 +163,13 @@ class Requesters:
         """Hold a request back, since the bridge executes no supervisor now."""
         match item:
             case MessageRequested(program=program, identifier=identifier):
-                self._clients.tell(program, Blocked(identifier))
+                self._clients.send(program, Blocked(identifier))
             case CallRequested(program=program, service=service, call_id=call_id):
-                self._clients.tell(program, Answered(call_id, None, is_default=True))
-                self._clients.tell(program, Blocked(self._checker.identifier(CommunicationKind.SERVICE, service)))
+                self._clients.send(program, Answered(call_id, None, is_default=True))
+                self._clients.send(program, Blocked(self._checker.identifier(CommunicationKind.SERVICE, service)))
             case GoalRequested(program=program, action=action, goal_id=goal_id):
-                self._clients.tell(program, GoalRejected(goal_id))
-                self._clients.tell(program, Blocked(self._checker.identifier(CommunicationKind.ACTION, action)))
+                self._clients.send(program, GoalRejected(goal_id))
+                self._clients.send(program, Blocked(self._checker.identifier(CommunicationKind.ACTION, action)))
 
     def _why_refused(self, item: ProgramRequest) -> str:
         """Return the reason why a program's request makes no sense now, one sentence; empty: it does."""
@@ -186,38 +186,38 @@ class Requesters:
 
     def pass_on(self, identifier: str, message: Any) -> None:
         """A message of the robot, after the supervisor has seen it."""
-        self._clients.tell_all(PassedOn(identifier, message))
+        self._clients.send_all(PassedOn(identifier, message))
 
     def blocked(self, identifier: str) -> None:
         """A request on an identifier was held back."""
         self._was_blocked = True
         if self._asker is not None:
-            self._clients.tell(self._asker, Blocked(identifier))
+            self._clients.send(self._asker, Blocked(identifier))
 
     def answer(self, communication: str, call_id: _Id, data: Any) -> None:
         """The service's reply to a call."""
         self._calls.pop(call_id, None)
-        self._clients.tell(call_id[0], Answered(call_id[1], data, is_default=False))
+        self._clients.send(call_id[0], Answered(call_id[1], data, is_default=False))
 
     def answer_default(self, communication: str, call_id: _Id) -> None:
         """A default reply to a call that was held back or has failed."""
         self._calls.pop(call_id, None)
-        self._clients.tell(call_id[0], Answered(call_id[1], None, is_default=True))
+        self._clients.send(call_id[0], Answered(call_id[1], None, is_default=True))
 
     def accept_goal(self, communication: str, goal_id: _Id) -> None:
         """A goal is let through."""
-        self._clients.tell(goal_id[0], GoalTaken(goal_id[1]))
+        self._clients.send(goal_id[0], GoalTaken(goal_id[1]))
 
     def reject_goal(self, communication: str, goal_id: _Id) -> None:
         """A goal is held back."""
         self._goals.pop(goal_id, None)
-        self._clients.tell(goal_id[0], GoalRejected(goal_id[1]))
+        self._clients.send(goal_id[0], GoalRejected(goal_id[1]))
 
     def pass_feedback(self, communication: str, goal_id: _Id, data: Any) -> None:
         """Feedback of a goal."""
-        self._clients.tell(goal_id[0], FeedbackPassed(goal_id[1], data))
+        self._clients.send(goal_id[0], FeedbackPassed(goal_id[1], data))
 
     def end_goal(self, communication: str, goal_id: _Id, outcome: str, data: Any) -> None:
         """An accepted goal has ended for its caller."""
         self._goals.pop(goal_id, None)
-        self._clients.tell(goal_id[0], GoalOver(goal_id[1], outcome, data))
+        self._clients.send(goal_id[0], GoalOver(goal_id[1], outcome, data))

@@ -112,7 +112,7 @@ class Rotations:
         if not has_arrived:
             _log.warning("the rotation asked for by %s has failed: %s", rotation.asked.identifier, reason)
         if number is None:
-            self._tell_end(reason, has_arrived=has_arrived, is_own=is_own)
+            self._report_end(reason, has_arrived=has_arrived, is_own=is_own)
         elif rotation.asked.kind is CommunicationKind.ACTION:
             outcome = "succeeded" if has_arrived else "aborted"
             self._owe(lambda executor: executor.on_goal_ended(number, outcome, service_response(reason)))
@@ -121,13 +121,13 @@ class Rotations:
         else:
             self._owe(lambda executor: executor.on_call_failed(number, reason))
 
-    def _tell_end(self, reason: str, *, has_arrived: bool, is_own: bool) -> None:
+    def _report_end(self, reason: str, *, has_arrived: bool, is_own: bool) -> None:
         """A rotation that a message asked for has ended."""
         outcomes = ("done", "any") if has_arrived else ("failed", "any")
-        told = [name for name, channel in self._listeners.of(RotatedChannel) if channel.outcome in outcomes]
-        for identifier in told:
+        listening = [name for name, channel in self._listeners.of(RotatedChannel) if channel.outcome in outcomes]
+        for identifier in listening:
             self._owe(lambda executor, name=identifier: executor.receive(name, None))  # type: ignore[misc]
-        if not has_arrived and not is_own and not told:
+        if not has_arrived and not is_own and not listening:
             self._on_failed(reason)
 
     def report(self, executor: Supervised) -> None:

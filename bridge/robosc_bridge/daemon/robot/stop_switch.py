@@ -61,7 +61,7 @@ class StopSwitch:
     def begin(self, executor: Supervised) -> None:
         """A new run has begun: a stop from before it still holds."""
         if self._skill.is_stopped:
-            self._tell(StopEvent.STOP, executor)
+            self._report(StopEvent.STOP, executor)
 
     def reset(self) -> None:
         """Reset all stops."""
@@ -75,10 +75,10 @@ class StopSwitch:
         if why:
             self._skill.is_stopped = True
         elif executor is not None and event is not None:
-            self._tell(event, executor)
+            self._report(event, executor)
         return why
 
-    def _tell(self, event: StopEvent, executor: Supervised) -> None:
+    def _report(self, event: StopEvent, executor: Supervised) -> None:
         for identifier, channel in self._listeners.of(EmergencyStopChannel):
             if channel.event == event:
                 executor.receive(identifier, None)

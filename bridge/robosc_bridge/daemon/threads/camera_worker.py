@@ -68,7 +68,7 @@ class CameraWorker:
             self._camera.open()
         except BridgeError as error:
             return self._failed(str(error))
-        except Exception as error:  # Without a camera there is no line, which the model is told.
+        except Exception as error:  # Without a camera there is no line, which is reported to the model.
             _log.exception("the camera's driver failed")
             return self._failed(f"the driver failed: {type(error).__name__}: {error}")
         self._is_open = True

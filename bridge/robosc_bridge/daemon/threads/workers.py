@@ -171,8 +171,8 @@ class DriveWorker:
         self._scan_s: float | None = None
         # True if torque was to go during an exchange: it goes, whatever is wanted afterwards.
         self._must_let_go = False
-        # Faults that a person was told of since it was opened or reset: one that comes and goes is told once.
-        self._told: frozenset[MotorFault] = frozenset()
+        # Faults that were reported since it was opened or reset: one that comes and goes is reported once.
+        self._reported: frozenset[MotorFault] = frozenset()
 
     def is_cycling(self, now_s: float) -> bool:
         """Return True if its steps come to an end, each in its time; asked by other threads."""
@@ -218,7 +218,7 @@ class DriveWorker:
         self._base.open()
         self._backoff.succeeded()
         self._is_open, self._has_torque = True, False
-        self._told = frozenset()
+        self._reported = frozenset()
         self._silent = 0
         self._due_s = now_s
         self._report(DeviceUp(Device.DRIVE))
@@ -249,9 +249,9 @@ class DriveWorker:
         elif self._attentive is None:
             self.written()
         self._silent = 0
-        if news := reading.faults - self._told:
+        if news := reading.faults - self._reported:
             _log.warning("the motors report: %s", ", ".join(sorted(news)))
-            self._told |= news
+            self._reported |= news
         self._gate.on_drive_reading(reading)
         self._report(reading)
         if is_reset:
@@ -305,7 +305,7 @@ class DriveWorker:
 
     def _reset(self) -> None:
         self._has_torque = False
-        self._told = frozenset()
+        self._reported = frozenset()
         try:
             self._base.reset()
         except BridgeError as error:

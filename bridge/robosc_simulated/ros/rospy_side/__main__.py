@@ -65,12 +65,14 @@ class Node:
             self._to_static = publisher("/tf_static", TFMessage, latch=True)
             self._to_static.publish(TFMessage([self._mounting(frame) for frame in begin["frames"]]))
         if begin["stamped"]:
-            rospy.Subscriber("/cmd_vel", TwistStamped, lambda message: self._told(message.twist), tcp_nodelay=True)
+            rospy.Subscriber(
+                "/cmd_vel", TwistStamped, lambda message: self._on_velocity(message.twist), tcp_nodelay=True
+            )
         else:
-            rospy.Subscriber("/cmd_vel", Twist, self._told, tcp_nodelay=True)
+            rospy.Subscriber("/cmd_vel", Twist, self._on_velocity, tcp_nodelay=True)
         self._send(Frame({"kind": "ready"}))
 
-    def _told(self, twist: Any) -> None:
+    def _on_velocity(self, twist: Any) -> None:
         self._send(Frame({"kind": "velocity", "linear_m_s": twist.linear.x, "angular_rad_s": twist.angular.z}))
 
     def show(self, frame: Frame) -> None:

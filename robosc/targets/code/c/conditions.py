@@ -1,4 +1,4 @@
-"""Generated functions that tell whether a controllable event is allowed now, and which requirements hold."""
+"""Generated functions that say whether a controllable event is allowed now, and which requirements hold."""
 
 from abc import abstractmethod
 
@@ -52,7 +52,7 @@ class CConditions(CDiagrams, Conditions):
         super().__init__(unit.layout.supervisor, unit.system, Reading(unit))
 
     def allow_function(self, event: str) -> list[str]:
-        """The function that tells whether an event is allowed: plants, ranges, requirements, then the supervisor."""
+        """The function that says whether an event is allowed: plants, ranges, requirements, then the supervisor."""
         body = unused("s")
         for words, code in self.enabling(event):
             body += [Comment(words), when(self._scope.negated(code), Return(FALSE_CODE))]
@@ -60,11 +60,11 @@ class CConditions(CDiagrams, Conditions):
         return self._unit.definition(head, [*body, Return(TRUE_CODE)])
 
     def requirements_function(self, communication: str) -> list[str]:
-        """The function that tells for each requirement on a request whether it holds."""
+        """The function that says for each requirement on a request whether it holds."""
         return self._filling("requirements", communication, self.requirements(communication))
 
     def conjuncts_function(self, communication: str) -> list[str]:
-        """The function that tells for each top-level conjunct of the requirements whether it holds."""
+        """The function that says for each top-level conjunct of the requirements whether it holds."""
         return self._filling("conjuncts", communication, self.conjuncts(communication))
 
     def _filling(self, purpose: str, communication: str, items: list[Condition]) -> list[str]:

@@ -135,9 +135,9 @@ def _is_decided(operator: str, operands: tuple[Code, ...]) -> bool:
     """Return True if tests joined by an operator say nothing, as compilers warn: never all true, or always one."""
     tests = [test for test in map(_tested, operands) if test is not None]
     # Of a conjunction at most one equality of a place can be true, of a disjunction at most one inequality false.
-    told = {(subject, constant) for subject, constant, is_equal in tests if is_equal is (operator == "and")}
+    pairs = {(subject, constant) for subject, constant, is_equal in tests if is_equal is (operator == "and")}
     others = {(subject, constant) for subject, constant, is_equal in tests if is_equal is not (operator == "and")}
-    return len({subject for subject, _ in told}) < len(told) or bool(told & others)
+    return len({subject for subject, _ in pairs}) < len(pairs) or bool(pairs & others)
 
 
 class CWriter(ExpressionWriter):

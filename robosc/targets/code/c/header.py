@@ -383,7 +383,7 @@ def _entries(layout: Layout) -> list[str]:
             ]
         elif item.kind is CommunicationKind.ACTION:
             lines += [
-                *comment(f"The server of the action {item.name} told how far it is.{_message_words(layout)}"),
+                *comment(f"The server of the action {item.name} reported its progress.{_message_words(layout)}"),
                 f"{reply_head(layout, item.event(EventKind.FEEDBACK))};",
                 "",
             ]

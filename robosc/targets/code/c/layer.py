@@ -54,7 +54,7 @@ def request_heads(layout: Layout) -> list[tuple[str, str]]:
         incoming = layout.of_kind(CommunicationKind.INCOMING_MESSAGE)
         names = ", ".join(item.name for item in incoming if item.identifier == identifier)
         data = request_parameters(layout, identifier)
-        known = " Its data tells which of them; what is not known of it is unknown." if data else ""
+        known = " Its data says which of them; what is not known of it is unknown." if data else ""
         words = f"The caller sends a message on {identifier}: {names}.{known}"
         found.append((words, request_head(layout, identifier)))
     for item in layout.of_kind(CommunicationKind.SERVICE):

@@ -60,7 +60,7 @@ def _match_function(unit: Unit, item: Communication) -> list[str]:
 
 
 def _recognition(layout: Layout, identifier: str, places: dict[str, int]) -> list[list[str]]:
-    """The function that tells which message of an identifier a message is: the first whose condition is true."""
+    """The function that says which message of an identifier a message is: the first whose condition is true."""
     parameters = request_parameters(layout, identifier)
     sharing = possible_messages(layout.model, identifier)
     if sharing[0].when is None:

@@ -24,7 +24,7 @@ class Field:
         type: Its declared type.
         parts: Member and field of each property that is given.
         value: Member of the value of a single datum.
-        flag: Member that tells whether it is given.
+        flag: Member that says whether it is given.
     """
 
     type: Type
@@ -125,7 +125,7 @@ def _stored(unit: Unit, type_: Type, code: Code) -> Code:
 
 
 def default_function(unit: Unit, item: Communication) -> list[str]:
-    """The function that tells whether a request's data is all default."""
+    """The function that says whether a request's data is all default."""
     name, root = unit.layout.function("is_default", item.name), request_field(unit, item)
     place = f"request->data.{unit.layout.request_members[item.name]}"
     tests = [] if root is None else _non_default(root, place)

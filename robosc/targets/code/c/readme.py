@@ -41,14 +41,14 @@ All of it from one thread, with the time in microseconds since any moment. A cal
 ```
 
 The state is in `{prefix}_t.state`: numbers of states (`{upper}_STATE_...`), of locations (`{upper}_AT_...`), of values
-of enums (`{upper}_VALUE_...`), and the variables as they are. `{prefix}_enabled` tells whether an event is allowed now.
+of enums (`{upper}_VALUE_...`), and the variables as they are. `{prefix}_enabled` says whether an event is allowed now.
 
 ## What is different from the Python executor
 
 - The policy `random` draws from another generator (splitmix64): the same seed gives another sequence.
-- The counters count entries of the log; one entry may tell several unknown values.
+- The counters count entries of the log; one entry may list several unknown values.
 - The event log and the state topic are the caller's, made from the `log` callback and the state.
-- Received data is typed: what does not fit is for the caller to tell as unknown.
+- Received data is typed: what does not fit is for the caller to give as unknown.
 """
 
 
@@ -64,7 +64,7 @@ now, else held back. `{prefix}.h` documents the functions, `main.c` shows them a
 
 1. `{prefix}_init` with settings (NULL: the default ones) and callbacks, then `{prefix}_start`.
 2. What the caller sends goes to the first functions below, never to the robot: the layer sends it on through `publish`,
-   `call` or `send_goal`, or tells `blocked` why not.
+   `call` or `send_goal`, or reports to `blocked` why not.
 3. What the robot sends goes to the others; the layer hands it on to the caller (`pass_on`, `answer`, `pass_feedback`,
    `end_goal`). What the model does not know is the program's to pass on or not.
 4. `{prefix}_watch` at least every 100 ms: a caller that fell silent, stale sensors, replies that did not come.
@@ -76,18 +76,18 @@ All of it from one thread, with the time in microseconds since any moment. A cal
 {functions}
 ```
 
-`what` tells of the caller's message where it is (a pointer that the callback gets back), whether all of it is finite
+`what` says of the caller's message where it is (a pointer that the callback gets back), whether all of it is finite
 and whether it is all-default. Only the program knows that: the message may have fields that the model does not have.
 What is not said to be finite is held back.
 
 The state is in `{prefix}_t.state`: numbers of states (`{upper}_STATE_...`), of locations (`{upper}_AT_...`), of values
-of enums (`{upper}_VALUE_...`), and the variables as they are. `{prefix}_enabled` tells whether an event is allowed now.
+of enums (`{upper}_VALUE_...`), and the variables as they are. `{prefix}_enabled` says whether an event is allowed now.
 
 ## What is different from the Python layer
 
-- The counters count entries of the log; one entry may tell several unknown values.
+- The counters count entries of the log; one entry may list several unknown values.
 - The event log and the state topic are the program's, made from the `log` callback and the state.
-- Received data is typed: what does not fit is for the program to tell as unknown.
+- Received data is typed: what does not fit is for the program to give as unknown.
 """
 
 

@@ -298,7 +298,7 @@ def _entries(layout: Layout) -> list[list[str]]:
         body.append("guard(r, end_batch(r));")
         if layout.is_layer:
             source = layout.received_topics[identifier]
-            body += ["finish(r);", f"told(r, r->callbacks.pass_on(r->callbacks.context, {source}, message));"]
+            body += ["finish(r);", f"require(r, r->callbacks.pass_on(r->callbacks.context, {source}, message));"]
         result.append([receive_head(layout, identifier), "{", *indent([*ignored, *body]), "}"])
     return result + _replies(layout)
 
@@ -326,7 +326,7 @@ def _replies(layout: Layout) -> list[list[str]]:
     for place, item in enumerate(layout.of_kind(CommunicationKind.ACTION)):
         for kind in (EventKind.FEEDBACK, EventKind.RESPONSE):
             event, is_end = item.event(kind), kind is EventKind.RESPONSE
-            told = f"end_for_caller(r, {place}, {layout.upper}_END_SUCCEEDED, message);"
+            ended = f"end_for_caller(r, {place}, {layout.upper}_END_SUCCEEDED, message);"
             body = [
                 *([f"close_goal(r, {place});"] if is_end else []),
                 f"if (r->goals[{place}].is_running) {{",
@@ -334,7 +334,7 @@ def _replies(layout: Layout) -> list[list[str]]:
                 "} else {",
                 f"    unexpected(r, (int){layout.events[event]});",
                 "}",
-                *([told if is_end else f"pass_feedback(r, {place}, message);"] if layout.is_layer else []),
+                *([ended if is_end else f"pass_feedback(r, {place}, message);"] if layout.is_layer else []),
             ]
             add(event, [], [f"if (has_goal(r, {place}, id)) {{", *indent(body), "}"], [])
     return result

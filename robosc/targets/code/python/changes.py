@@ -20,7 +20,7 @@ def stale_bits(allows: Sequence[str], read: Mapping[str, set[str]]) -> dict[str,
     """For each attribute the bits of the events whose permission reads it, itself or through another method.
 
     Args:
-        allows: The methods that tell whether an event is allowed; the first one's bit is the lowest.
+        allows: The methods that say whether an event is allowed; the first one's bit is the lowest.
         read: For each of these, and of those that they call, what its expressions read and call.
     """
     bits: dict[str, int] = {}
@@ -59,9 +59,9 @@ def question_lines(requests: Sequence[str], silent: Sequence[str], allows: Seque
     """Statements of the constructor: what the two methods below ask, by bit.
 
     Args:
-        requests: The methods that tell whether each request is allowed.
+        requests: The methods that say whether each request is allowed.
         silent: The silent steps.
-        allows: The methods that tell whether each of those is allowed.
+        allows: The methods that say whether each of those is allowed.
     """
     bits = [*requests, *allows]
     lines = (
@@ -90,7 +90,7 @@ def enabled_requests_method(allows: Sequence[str]) -> list[str]:
     """The method that gives the enabled requests.
 
     Args:
-        allows: The methods that tell whether each request is allowed.
+        allows: The methods that say whether each request is allowed.
     """
     count = len(allows)
     if not count:

@@ -1,4 +1,4 @@
-"""Generated methods that tell whether a controllable event is allowed now, and which requirements hold."""
+"""Generated methods that say whether a controllable event is allowed now, and which requirements hold."""
 
 from robosc.automata import System
 from robosc.supervisor import DecisionNode
@@ -51,7 +51,7 @@ class PythonConditions(PythonDiagrams, Conditions):
         self.reads: dict[str, set[str]] = {}
 
     def allow_method(self, event: str) -> list[str]:
-        """The method that tells whether `event` is allowed: plants, ranges, requirements, then the supervisor."""
+        """The method that says whether `event` is allowed: plants, ranges, requirements, then the supervisor."""
         conditions = self.enabling(event)
         self.reads[f"self.{self._layout.methods['allow', event]}"] = words_of(code for _, code in conditions)
         lines: list[str] = []
@@ -62,12 +62,12 @@ class PythonConditions(PythonDiagrams, Conditions):
         return self._method("allow", event, f"Return True if {event} is allowed now.", result)
 
     def requirements_method(self, communication: str) -> list[str]:
-        """The method that tells for each requirement whether it holds."""
+        """The method that says for each requirement whether it holds."""
         words = f"Return for each requirement on {communication} whether it holds."
         return self._tuple_method("requirements", communication, words, self.requirements(communication))
 
     def conjuncts_method(self, communication: str) -> list[str]:
-        """The method that tells for each top-level conjunct of the requirements whether it holds."""
+        """The method that says for each top-level conjunct of the requirements whether it holds."""
         words = f"Return for each top-level conjunct of the requirements on {communication} whether it holds."
         return self._tuple_method("conjuncts", communication, words, self.conjuncts(communication))
 

@@ -186,7 +186,7 @@ def _description(description: Description) -> list[str]:
 
 
 def _allow_names(writer: Writer, description: Description) -> tuple[list[str], list[str]]:
-    """The methods that tell whether each request, and each silent step, is allowed."""
+    """The methods that say whether each request, and each silent step, is allowed."""
     methods = writer.layout.methods
     return (
         [methods["allow", f"{info.name}.request"] for info in requesting(description.communications)],

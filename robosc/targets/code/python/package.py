@@ -50,7 +50,7 @@ Then call, always from one thread, `layer.on_request(identifier, message)`, `on_
 `on_cancel` when the existing controller sends something; `layer.receive(identifier, message)`,
 `on_reply`, `on_goal_ended` and so on when the robot does; `layer.tick()` once a period, so that
 time is noticed; and `layer.stop(why)` at the end. What is let through goes to `robot`, what the
-existing controller is told to `caller`: they offer the protocols `RobotSide` and `LayerMiddleware`.
+existing controller receives to `caller`: they offer the protocols `RobotSide` and `LayerMiddleware`.
 
 `Settings` are those of the deployment; `open_event_log` makes the file of an event log.
 """,

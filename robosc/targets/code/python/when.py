@@ -1,4 +1,4 @@
-"""Generated methods that tell which incoming message a message is, in a supervision layer (language B.13)."""
+"""Generated methods that say which incoming message a message is, in a supervision layer (language B.13)."""
 
 from robosc.errors import InternalError
 from robosc.expressions.text import expression_text
@@ -12,7 +12,7 @@ from robosc.targets.code.statements import Comment, Return
 
 
 def matches_method(writer: Writer, communication: Communication) -> list[str]:
-    """The method that tells whether a message is the communication's, by its condition.
+    """The method that says whether a message is the communication's, by its condition.
 
     Every part that the condition reads is converted first, whether it decides or not: what is unknown is noted.
     """

@@ -45,7 +45,7 @@ constexpr int EXIT_OK = 0;
 constexpr int EXIT_FAULT = 1;
 constexpr int EXIT_USAGE = 2;
 
-/* Reports of what became of calls and goals, kept until the engine may be told: it must not be called from within
+/* Reports of what became of calls and goals, kept until the engine may receive them: it must not be called from within
    itself. */
 class Reports {
 public:
@@ -401,7 +401,7 @@ private:
         tell_reasons();
     }
 
-    /* Say why the robot is stopped, and when it no longer is; on the console a fault is told at the end. */
+    /* Say why the robot is stopped, and when it no longer is; on the console a fault is reported at the end. */
     void tell_reasons()
     {
         tell_status();
@@ -446,7 +446,7 @@ private:
         told_status_ = status;
     }
 
-    /* The engine knows nothing any more of goals that were told to be lost, but they may be running. */
+    /* The engine knows nothing any more of goals that were reported lost, but they may be running. */
     void cancel_abandoned()
     {
         guarded("no cancel of a lost goal", [this] { middleware_.cancel_abandoned(); });

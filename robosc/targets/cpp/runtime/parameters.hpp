@@ -61,7 +61,7 @@ struct Parameters {
     bool publish_state = false;
     StateMessage state_message = StateMessage::JSON;
     bool resample_scans = false;
-    /* True if the process ends by a fault, and tells it then. */
+    /* True if the process ends by a fault, and reports it then. */
     bool ends_by_fault = true;
 };
 

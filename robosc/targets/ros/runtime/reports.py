@@ -1,5 +1,5 @@
 """
-Outcomes of service calls and goals, on their way to the executor.
+Outcomes of service calls and goals, on their way to the executor; goals that were reported lost.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable
+from typing import Any
 
 from robosc.execution.runtime.runner import Runner
 
@@ -24,11 +25,26 @@ class Reports:
 
     def deliver(self, executor: Runner) -> bool:
         """
-        Tell what was kept until now; what that brings about waits for the next time.
+        Deliver what was kept until now; what that brings about waits for the next time.
 
-        Whether there was anything.
+        Return True if there was anything.
         """
         count = len(self._waiting)
         for _ in range(count):
             self._waiting.popleft()(executor)
         return count > 0
+
+
+class AbandonedGoal:
+    """
+    A goal that was reported lost although it may be running.
+
+    :ivar handle: Handle by which its client refers to it.
+    :ivar is_asked: True if its cancel was asked for since its server was seen.
+    """
+
+    __slots__ = ('handle', 'is_asked')
+
+    def __init__(self, handle: Any) -> None:
+        self.handle = handle
+        self.is_asked = False

@@ -1,5 +1,5 @@
 """
-Goals through actionlib's `ActionClient`: nothing waits, and every end is told to the executor.
+Goals through actionlib's `ActionClient`: nothing waits, and every end is reported to the executor.
 
 actionlib calls back in the threads of rospy; what it says goes through the inbox to the executor's
 thread, where everything here runs. A server of actionlib says in its status messages what became
@@ -14,7 +14,7 @@ from __future__ import annotations
 from typing import Any, Callable, Optional
 
 from robosc.targets.ros.runtime.presence import Presence
-from robosc.targets.ros.runtime.reports import Reports
+from robosc.targets.ros.runtime.reports import AbandonedGoal, Reports
 from robosc.targets.ros1.runtime.inbox import Action
 
 REFUSAL_S = 1.0
@@ -78,21 +78,6 @@ class _Goal:
         self.cancelled_s: float | None = None
 
 
-class _Abandoned:
-    """
-    A goal that was reported lost although it may be running.
-
-    :ivar handle: Handle by which actionlib refers to it.
-    :ivar is_asked: True if its cancel was asked for since its server was seen.
-    """
-
-    __slots__ = ('handle', 'is_asked')
-
-    def __init__(self, handle: Any) -> None:
-        self.handle = handle
-        self.is_asked = False
-
-
 class ActionGoals:
     """
     The goals of one action.
@@ -124,7 +109,7 @@ class ActionGoals:
         self._last_status: Any = None
         self._heard_s = 0.0
         self._goals: dict[int, _Goal] = {}
-        self._abandoned: dict[int, _Abandoned] = {}
+        self._abandoned: dict[int, AbandonedGoal] = {}
 
     def send(self, goal_id: int, message: Any) -> None:
         """Send a goal without waiting."""
@@ -143,7 +128,7 @@ class ActionGoals:
     def cancel(self, goal_id: int) -> None:
         """Ask for the cancel of an accepted goal without waiting."""
         goal = self._goals.get(goal_id)
-        # Its end may be known here and wait to be told.
+        # Its end may be known here and wait to be reported.
         if goal is not None:
             # No notice of the cancel is taken of a goal whose end is known and only its result
             # awaited.
@@ -176,7 +161,7 @@ class ActionGoals:
 
     def cancel_abandoned(self) -> None:
         """
-        Ask for the cancel of every goal that was told to be lost.
+        Ask for the cancel of every goal that was reported lost.
 
         Its server may be there and only be unseen.
         """
@@ -186,7 +171,7 @@ class ActionGoals:
 
     def _abandon(self, goal_id: int) -> None:
         """Tell that a goal is lost; it may be running, or on its way, and it is not forgotten."""
-        self._abandoned[goal_id] = _Abandoned(self._goals[goal_id].handle)
+        self._abandoned[goal_id] = AbandonedGoal(self._goals[goal_id].handle)
         self._end(goal_id, 'lost')
 
     def _look_for_server(self) -> None:
@@ -202,28 +187,28 @@ class ActionGoals:
     # What actionlib says, in the threads of rospy.
 
     def _transition(self, goal_id: int) -> Callable[[Any], None]:
-        def tell(handle: Any) -> None:
+        def on_transition(handle: Any) -> None:
             state, status = handle.get_comm_state(), handle.get_goal_status()
             result = handle.get_result() if state == DONE else None
             self._put(lambda: self._changed(goal_id, state, status, result), None)
 
-        return tell
+        return on_transition
 
     def _feedback(self, goal_id: int) -> Callable[[Any, Any], None]:
         return lambda handle, data: self._put(
-            lambda: self._told(goal_id, data), feedback_kind(self.name)
+            lambda: self._on_feedback(goal_id, data), feedback_kind(self.name)
         )
 
     # The same in the executor's thread.
 
-    def _told(self, goal_id: int, data: Any) -> None:
+    def _on_feedback(self, goal_id: int, data: Any) -> None:
         if goal_id in self._goals:
             self._reports.add(lambda executor: executor.on_feedback(goal_id, data))
 
     def _changed(self, goal_id: int, state: int, status: int, result: Any) -> None:
         goal = self._goals.get(goal_id)
         if goal is None:
-            # It was told to be lost; now it has ended, or its server has heard the cancel.
+            # It was reported lost; now it has ended, or its server has heard the cancel.
             if state in _CANCEL_HEARD:
                 self._abandoned.pop(goal_id, None)
             return

@@ -40,19 +40,19 @@ class CalledService:
 
     :param make_default: Makes the default response.
     :param put: Hands something to the executor's thread.
-    :param tell: Called there with the number and the message of each call; it, or something later,
-        has it answered.
+    :param on_call: Called there with the number and the message of each call; it, or something
+        later, has it answered.
     """
 
     def __init__(
         self,
         make_default: Callable[[], Any],
         put: Callable[[Action], None],
-        tell: Callable[[int, Any], None],
+        on_call: Callable[[int, Any], None],
     ) -> None:
         self._make_default = make_default
         self._put = put
-        self._tell = tell
+        self._on_call = on_call
         self._lock = threading.Lock()
         self._waiting: dict[int, _Call] = {}
         self._count = 0
@@ -81,7 +81,7 @@ class CalledService:
             self._count += 1
             number = self._count
             self._waiting[number] = call
-            self._put(lambda: self._tell(number, request))
+            self._put(lambda: self._on_call(number, request))
         call.is_answered.wait()
         return call.response
 
@@ -99,7 +99,7 @@ class CalledService:
         self.answer(number, self._make_default())
 
     def close(self) -> None:
-        """Answer every new call with the default response from now on, and tell nobody."""
+        """Answer every new call with the default response from now on, and notify nobody."""
         with self._lock:
             self._is_closed = True
 
@@ -121,9 +121,9 @@ class ServedAction:
 
     :param name: The action's name on ROS, for warnings.
     :param put: Hands something to the executor's thread.
-    :param tell_goal: Called there with the number and the message of each goal; it calls `accept`
+    :param on_goal: Called there with the number and the message of each goal; it calls `accept`
         or `reject`.
-    :param tell_cancel: Called there with the number of a goal whose cancel was asked for.
+    :param on_cancel: Called there with the number of a goal whose cancel was asked for.
     :param warn: Called with a text.
     """
 
@@ -131,14 +131,14 @@ class ServedAction:
         self,
         name: str,
         put: Callable[[Action], None],
-        tell_goal: Callable[[int, Any], None],
-        tell_cancel: Callable[[int], None],
+        on_goal: Callable[[int, Any], None],
+        on_cancel: Callable[[int], None],
         warn: Callable[[str], None],
     ) -> None:
         self._name = name
         self._put = put
-        self._tell_goal = tell_goal
-        self._tell_cancel = tell_cancel
+        self._on_goal = on_goal
+        self._on_cancel = on_cancel
         self._warn = warn
         self._lock = threading.Lock()
         self._goals: dict[int, Any] = {}
@@ -167,12 +167,12 @@ class ServedAction:
         self._count += 1
         self._goals[self._count] = handle
         self._numbers[handle.get_goal_id().id] = self._count
-        self._tell_goal(self._count, handle.get_goal())
+        self._on_goal(self._count, handle.get_goal())
 
     def _cancel(self, handle: Any) -> None:
         number = self._numbers.get(handle.get_goal_id().id)
         if number is not None:  # Otherwise its end is on the way.
-            self._tell_cancel(number)
+            self._on_cancel(number)
 
     def accept(self, number: int) -> None:
         """Let the goal through."""
@@ -199,7 +199,7 @@ class ServedAction:
         self._try_to('end', lambda: end(result))
 
     def close(self) -> None:
-        """From now on reject every new goal, without anybody's being told."""
+        """From now on reject every new goal, and notify nobody."""
         with self._lock:
             self._is_closed = True
 
@@ -213,13 +213,13 @@ class ServedAction:
         self._numbers.pop(handle.get_goal_id().id, None)
         return handle
 
-    def _try_to(self, what: str, tell: Callable[[], None]) -> None:
+    def _try_to(self, what: str, on_call: Callable[[], None]) -> None:
         """
-        Warn of a caller that cannot be told something: that is no fault.
+        Warn of a caller that cannot be notified: that is no fault.
 
         The robot is not to stop for it.
         """
         try:
-            tell()
+            on_call()
         except Exception as error:
             self._warn(f'no {what} of a goal of {self._name}: {error}')

@@ -35,7 +35,7 @@ public:
         const auto [handle, rest] = place(shared_, name);
         name_ = handle.resolveName(rest);
         client_ = std::make_unique<actionlib::ActionClient<Action>>(handle, rest, &shared_->queue);
-        /* The client comes first: when a message counts as heard, it has told what it says of goals. */
+        /* The client comes first: when a message counts as heard, it has reported what it says about goals. */
         ros::NodeHandle listener = handle;
         const boost::function<void(const actionlib_msgs::GoalStatusArray::ConstPtr&)> hear
             = [this](const actionlib_msgs::GoalStatusArray::ConstPtr&) { heard_us_ = now_us(); };
@@ -54,11 +54,11 @@ public:
         }
         Handle handle = client_->sendGoal(
             goal, [this, id](Handle handle) { changed(id, handle); },
-            [this, id](Handle, const FeedbackConstPtr& feedback) { told(id, feedback); });
+            [this, id](Handle, const FeedbackConstPtr& feedback) { on_feedback(id, feedback); });
         goals_[id] = Sent{handle, now_us()};
     }
 
-    /* Ask for the cancel of an accepted goal; there is no answer. Its end may be known here and wait to be told. */
+    /* Ask for the cancel of an accepted goal; there is no answer. Its end may be known here and wait to be reported. */
     void cancel(std::uint32_t id)
     {
         const auto found = goals_.find(id);
@@ -98,7 +98,7 @@ public:
 
     bool has_abandoned() const { return !abandoned_.empty(); }
 
-    /* Ask for the cancel of every goal that was told to be lost; who is seen has heard it. */
+    /* Ask for the cancel of every goal that was reported lost; a server that is seen has heard it. */
     void cancel_abandoned()
     {
         const bool is_heard = is_ready();
@@ -196,7 +196,7 @@ private:
         }
     }
 
-    void told(std::uint32_t id, const FeedbackConstPtr& feedback)
+    void on_feedback(std::uint32_t id, const FeedbackConstPtr& feedback)
     {
         if (goals_.find(id) != goals_.end()) {
             shared_->report([take = feedback_, id, feedback](robot_t* robot, std::uint64_t now, Notes& notes) {

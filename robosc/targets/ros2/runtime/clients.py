@@ -1,7 +1,7 @@
 """
 Service calls and goals through clients of ROS 2.
 
-Nothing waits, and every end is told to the executor.
+Nothing waits, and every end is reported to the executor.
 
 The clients are handed in; what they must do is what rclpy's `Client` and `ActionClient` do.
 Everything runs in the node's one thread. What comes back is kept in `Reports` until the node's
@@ -17,7 +17,7 @@ from collections.abc import Callable
 from typing import Any
 
 from robosc.targets.ros.runtime.presence import Presence
-from robosc.targets.ros.runtime.reports import Reports
+from robosc.targets.ros.runtime.reports import AbandonedGoal, Reports
 
 REFUSAL_S = 0.25
 """Time after a refused cancel during which the goal's end may still be on its way, in seconds."""
@@ -131,21 +131,6 @@ class _Goal:
         self.is_unknown = False
 
 
-class _Abandoned:
-    """
-    A goal that was reported lost although it may be running.
-
-    :ivar handle: Handle by which rclpy refers to it.
-    :ivar is_asked: True if its cancel was asked for since its server was seen.
-    """
-
-    __slots__ = ('handle', 'is_asked')
-
-    def __init__(self, handle: Any) -> None:
-        self.handle = handle
-        self.is_asked = False
-
-
 class ActionGoals:
     """
     The goals of one action.
@@ -165,7 +150,7 @@ class ActionGoals:
         self._monotonic = monotonic
         self._presence = Presence(client.server_is_ready)
         self._goals: dict[int, _Goal] = {}
-        self._abandoned: dict[int, _Abandoned] = {}
+        self._abandoned: dict[int, AbandonedGoal] = {}
 
     def is_ready(self) -> bool:
         """Return True if there is a server."""
@@ -183,7 +168,7 @@ class ActionGoals:
     def cancel(self, goal_id: int) -> None:
         """Ask for the cancel of an accepted goal without waiting."""
         goal = self._goals.get(goal_id)
-        # Its end may be known here and wait to be told.
+        # Its end may be known here and wait to be reported.
         if goal is not None:
             future = goal.handle.cancel_goal_async()
             future.add_done_callback(lambda done: self._cancel_answered(goal_id, done))
@@ -212,7 +197,7 @@ class ActionGoals:
 
     def cancel_abandoned(self) -> None:
         """
-        Ask for the cancel of every goal that was told to be lost.
+        Ask for the cancel of every goal that was reported lost.
 
         Its server may be there and only be unseen.
         """
@@ -223,7 +208,7 @@ class ActionGoals:
         """Tell that a goal is lost; an accepted one may be running, and is not forgotten."""
         handle = self._goals[goal_id].handle
         if handle is not None:
-            self._abandoned[goal_id] = _Abandoned(handle)
+            self._abandoned[goal_id] = AbandonedGoal(handle)
         self._end(goal_id, 'lost')
 
     def _look_for_server(self) -> None:
@@ -250,7 +235,7 @@ class ActionGoals:
     def _feedback(self, goal_id: int) -> Callable[[Any], None]:
         def receive(message: Any) -> None:
             if goal_id not in self._goals:
-                return  # It was told to be lost.
+                return  # It was reported lost.
             data = message.feedback
             self._reports.add(lambda executor: executor.on_feedback(goal_id, data))
 
@@ -272,7 +257,7 @@ class ActionGoals:
             return
         if goal is None:
             # Its server counted as lost: nobody would ever stop this one.
-            self._abandoned[goal_id] = _Abandoned(handle)
+            self._abandoned[goal_id] = AbandonedGoal(handle)
             self._cancel_abandoned(goal_id)
             return
         goal.handle = handle
@@ -281,7 +266,7 @@ class ActionGoals:
 
     def _result_came(self, goal_id: int, future: Any) -> None:
         if goal_id not in self._goals:
-            # It was told to be lost; now it has really ended, unless the client failed.
+            # It was reported lost; now it has really ended, unless the client failed.
             if future.exception() is None:
                 self._abandoned.pop(goal_id, None)
             return

@@ -8,7 +8,7 @@ The servers are handed in; what they must do is what rclpy's `Service`, `ActionS
 coroutine that awaits an answer would be resumed by rclpy's executor again and again, without a
 pause, until the answer is there.
 
-A caller that is gone, so that it cannot be told anything, is worth a warning and no fault: the
+A caller that is gone, so that it cannot be notified, is worth a warning and no fault: the
 robot is not to stop for it.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
@@ -41,7 +41,7 @@ class CalledService:
 
     :param name: The service's name on ROS, for warnings.
     :param make_default: Makes the default response.
-    :param tell: Called with the number and the message of each call.
+    :param on_call: Called with the number and the message of each call.
     :param warn: Called with a text.
     """
 
@@ -49,12 +49,12 @@ class CalledService:
         self,
         name: str,
         make_default: Callable[[], Any],
-        tell: Callable[[int, Any], None],
+        on_call: Callable[[int, Any], None],
         warn: Callable[[str], None],
     ) -> None:
         self._name = name
         self._make_default = make_default
-        self._tell = tell
+        self._on_call = on_call
         self._warn = warn
         self._calls: dict[int, _Call] = {}
         self._count = 0
@@ -74,7 +74,7 @@ class CalledService:
         """Take in a call; return its answer, or a promise of one."""
         self._count += 1
         call = self._calls[self._count] = _Call(self._count)
-        self._tell(call.number, request)
+        self._on_call(call.number, request)
         return call if call.response is None else call.response
 
     def _respond(self, response: Any, header: Any) -> None:
@@ -128,9 +128,9 @@ class ServedAction:
 
     :param name: The action's name on ROS, for warnings.
     :param make_default: Makes the default result.
-    :param tell_goal: Called with the number and the message of each goal; `accept` is called
+    :param on_goal: Called with the number and the message of each goal; `accept` is called
         meanwhile, or not.
-    :param tell_cancel: Called with the number of a goal whose cancel was asked for.
+    :param on_cancel: Called with the number of a goal whose cancel was asked for.
     :param warn: Called with a text.
     """
 
@@ -138,14 +138,14 @@ class ServedAction:
         self,
         name: str,
         make_default: Callable[[], Any],
-        tell_goal: Callable[[int, Any], None],
-        tell_cancel: Callable[[int], None],
+        on_goal: Callable[[int, Any], None],
+        on_cancel: Callable[[int], None],
         warn: Callable[[str], None],
     ) -> None:
         self._name = name
         self._make_default = make_default
-        self._tell_goal = tell_goal
-        self._tell_cancel = tell_cancel
+        self._on_goal = on_goal
+        self._on_cancel = on_cancel
         self._warn = warn
         self._goals: dict[int, _Goal] = {}
         self._numbers: dict[bytes, int] = {}
@@ -168,7 +168,7 @@ class ServedAction:
         """Take in a goal; return True if it is accepted."""
         self._count += 1
         number = self._count
-        self._tell_goal(number, message)
+        self._on_goal(number, message)
         if number not in self._goals:
             return False
         self._beginning = number
@@ -187,16 +187,16 @@ class ServedAction:
             self.end(number, *goal.end)
 
     def cancel(self, handle: Any) -> bool:
-        """Take in that a caller wants to cancel a goal; tell whether that is about to happen."""
+        """Take in that a caller wants to cancel a goal; return whether that is about to happen."""
         number = self._numbers.get(bytes(handle.goal_id.uuid))
         if number is None:
             return False  # Its end is on the way.
-        self._tell_cancel(number)
+        self._on_cancel(number)
         return True
 
     def check(self) -> None:
         """
-        Cancel a goal whose caller was gone before it could be told that it is accepted.
+        Cancel a goal whose caller was gone before it could learn that it is accepted.
 
         Nobody else would.
         """
@@ -204,9 +204,9 @@ class ServedAction:
         if number is not None:
             del self._goals[number]
             self._warn(f'a goal of {self._name} is cancelled: its caller is gone')
-            self._tell_cancel(number)
+            self._on_cancel(number)
 
-    # What the layer tells.
+    # Reports of the layer.
 
     def accept(self, number: int) -> None:
         """Let the goal through."""

@@ -240,7 +240,7 @@ void declare_parameters_of(Node& node, const std::vector<Declaration>& declarati
         try {
             return value_of(node.declare_parameter(item.name, ros_value_of(item.value), descriptor));
         } catch (const rclcpp::exceptions::InvalidParameterValueException&) {
-            /* The value that was given is out of its range: `validated` tells of that. */
+            /* The value that was given is out of its range: `validated` reports that. */
             descriptor.floating_point_range.clear();
             return value_of(node.declare_parameter(item.name, ros_value_of(item.value), descriptor));
         }

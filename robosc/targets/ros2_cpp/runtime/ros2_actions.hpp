@@ -1,4 +1,4 @@
-/* The goals of one action, through rclcpp_action: nothing waits, and every end is told to the engine. */
+/* The goals of one action, through rclcpp_action: nothing waits, and every end is reported to the engine. */
 
 #pragma once
 
@@ -54,13 +54,13 @@ public:
         typename Client::SendGoalOptions options;
         options.goal_response_callback = [this, id](Handle handle) { answered(id, handle); };
         options.feedback_callback
-            = [this, id](Handle, const std::shared_ptr<const Feedback> feedback) { told(id, feedback); };
+            = [this, id](Handle, const std::shared_ptr<const Feedback> feedback) { on_feedback(id, feedback); };
         options.result_callback = [this, id](const WrappedResult& result) { came(id, result); };
         goals_[id] = Sent{};
         client_->async_send_goal(goal, options);
     }
 
-    /* Ask for the cancel of an accepted goal. Its end may be known here and wait to be told. */
+    /* Ask for the cancel of an accepted goal. Its end may be known here and wait to be reported. */
     void cancel(std::uint32_t id)
     {
         const auto found = goals_.find(id);
@@ -101,7 +101,7 @@ public:
 
     bool has_abandoned() const { return !abandoned_.empty(); }
 
-    /* Ask for the cancel of every goal that was told to be lost: its server may be there and only be unseen. */
+    /* Ask for the cancel of every goal that was reported lost: its server may be there and only be unseen. */
     void cancel_abandoned()
     {
         for (auto& [id, goal] : std::map<std::uint32_t, Abandoned>(abandoned_)) {
@@ -131,7 +131,7 @@ private:
             client_->async_cancel_goal(
                 handle, [callback](typename CancelResponse::SharedPtr response) { callback(response); });
         } catch (const rclcpp_action::exceptions::UnknownGoalHandleError&) {
-            /* It has ended, which is about to be told. */
+            /* It has ended, which is about to be reported. */
         }
     }
 
@@ -177,7 +177,7 @@ private:
         }
     }
 
-    void told(std::uint32_t id, const std::shared_ptr<const Feedback>& feedback)
+    void on_feedback(std::uint32_t id, const std::shared_ptr<const Feedback>& feedback)
     {
         if (goals_.find(id) != goals_.end()) {
             reports_.add([take = feedback_, id, feedback](robot_t* robot, std::uint64_t now, Notes& notes) {
@@ -189,7 +189,7 @@ private:
     void came(std::uint32_t id, const WrappedResult& result)
     {
         if (goals_.erase(id) == 0) {
-            /* It was told to be lost; now it has really ended. */
+            /* It was reported lost; now it has really ended. */
             abandoned_.erase(id);
         } else if (result.code == rclcpp_action::ResultCode::SUCCEEDED) {
             reports_.add([take = result_, id, data = result.result](robot_t* robot, std::uint64_t now, Notes& notes) {

@@ -434,7 +434,7 @@ def test_the_header_says_where_data_tells_messages_apart() -> None:
     text = generate(layer_of_text(EVERYTHING), "c99")["everything_supervisor.h"]
     # Comments go over lines that begin with an asterisk.
     header = " ".join(word for word in text.split() if word != "*")
-    told = "Its data tells which of them; what is not known of it is unknown."
+    told = "Its data says which of them; what is not known of it is unknown."
     assert f"The caller sends a message on /beep: loud, quiet. {told}" in header
     assert "The caller sends a message on bell: bell." in header
     assert f"on bell: bell. {told}" not in header

@@ -1,8 +1,8 @@
 /* Answers and ends of goals that the caller waits for. */
 
 #if ROBOT_REQUEST_COUNT > 0 || ROBOT_SENSOR_COUNT > 0
-/* The caller was told something; what failed is a fault. */
-static void told(robot_t *r, bool is_well)
+/* A callback of the caller has returned; a failure is a fault. */
+static void require(robot_t *r, bool is_well)
 {
     if (!is_well) {
         fail(r, ROBOT_FAULT_CALLBACK);
@@ -19,16 +19,16 @@ static uint64_t silent_from(const robot_t *r, int topic)
 #endif
 
 #if ROBOT_ACTION_COUNT > 0
-/* A goal has ended: its caller is told, unless it was before. A cancelled one is aborted to a caller that did not ask
-   for that. */
+/* A goal has ended: report that to its caller, unless that was done before. A cancelled one is aborted to a caller that
+   did not ask for that. */
 static void end_for_caller(robot_t *r, int action, robot_end_t end, const void *message)
 {
     robot_goal_t *goal = &r->goals[action];
     if (goal->is_awaited) {
         const robot_end_t shown = end == ROBOT_END_CANCELLED && !goal->is_cancelled_by_caller ? ROBOT_END_ABORTED : end;
         goal->is_awaited = false;
-        told(r, r->callbacks.end_goal(r->callbacks.context, ACTIONS[action].communication, goal->caller_id, shown,
-                                      message));
+        require(r, r->callbacks.end_goal(r->callbacks.context, ACTIONS[action].communication, goal->caller_id, shown,
+                                         message));
     }
 }
 #endif
@@ -49,8 +49,8 @@ static void finish(robot_t *r)
             break;
         }
         r->calls[first].is_awaited = false;
-        told(r, r->callbacks.answer_default(r->callbacks.context, SERVICES[first].communication,
-                                            r->calls[first].caller_id));
+        require(r, r->callbacks.answer_default(r->callbacks.context, SERVICES[first].communication,
+                                               r->calls[first].caller_id));
     }
 #endif
 #if ROBOT_ACTION_COUNT > 0

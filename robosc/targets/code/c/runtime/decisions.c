@@ -32,15 +32,7 @@ static bool send(robot_t *r, int request, const robot_request_t *data)
 #endif
 #if ROBOT_ACTION_COUNT > 0
     if (REQUESTS[request].action >= 0) {
-        robot_goal_t *goal = &r->goals[REQUESTS[request].action];
-        goal->is_open = true;
-        goal->is_running = true;
-        goal->is_accepted = false;
-        goal->is_cancel_wanted = false;
-        goal->is_cancel_sent = false;
-        goal->id = r->next_goal_id++;
-        goal->deadline_us = later(r->now_us, r->settings.action_timeout_us);
-        get_requirements(&r->state, REQUESTS[request].action, goal->held);
+        robot_goal_t *goal = open_goal(r, REQUESTS[request].action);
         if (!callbacks->send_goal(callbacks->context, goal->id, data)) {
             goal->is_open = false;
             return fault(r, ROBOT_FAULT_CALLBACK);
@@ -54,7 +46,7 @@ static bool send(robot_t *r, int request, const robot_request_t *data)
     return true;
 }
 
-/* Issue a request, unless its data is unknown or does not fit: whether it was is told by `is_issued`. */
+/* Issue a request, unless its data is unknown or does not fit: `is_issued` says whether it was. */
 static bool issue(robot_t *r, int request, bool *is_issued)
 {
     robot_request_t data;

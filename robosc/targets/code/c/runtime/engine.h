@@ -261,7 +261,7 @@ void robot_tick(robot_t *r, uint64_t now_us);
 #endif
 void robot_watch(robot_t *r, uint64_t now_us);
 
-/* Come to rest until `robot_restart`; tell with is_fault whether the program found a fault. */
+/* Come to rest until `robot_restart`; is_fault says whether the program found a fault. */
 void robot_stop(robot_t *r, uint64_t now_us, bool is_fault);
 
 /* Begin again in the initial state, whatever happened. */

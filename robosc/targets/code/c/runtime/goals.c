@@ -11,6 +11,21 @@ static bool is_any_goal_open(const robot_t *r)
     return false;
 }
 
+/* Begin a goal with a new id and the requirements that hold now. */
+static robot_goal_t *open_goal(robot_t *r, int action)
+{
+    robot_goal_t *goal = &r->goals[action];
+    goal->is_open = true;
+    goal->is_running = true;
+    goal->is_accepted = false;
+    goal->is_cancel_wanted = false;
+    goal->is_cancel_sent = false;
+    goal->id = r->next_goal_id++;
+    goal->deadline_us = later(r->now_us, r->settings.action_timeout_us);
+    get_requirements(&r->state, action, goal->held);
+    return goal;
+}
+
 /* Ask for the cancel of a goal, once; before its acceptance it is only remembered. */
 static bool request_cancel(robot_t *r, int action)
 {

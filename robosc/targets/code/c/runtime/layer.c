@@ -4,7 +4,7 @@
 static void hold_back(robot_t *r, const char *identifier, int why)
 {
     note(r, ROBOT_LOG_BLOCKED, why);
-    told(r, r->callbacks.blocked(r->callbacks.context, identifier, (robot_refusal_t)why));
+    require(r, r->callbacks.blocked(r->callbacks.context, identifier, (robot_refusal_t)why));
     /* What let nothing through because it failed stops the robot now that the caller knows. */
     guard(r, why != (int)ROBOT_REFUSAL_FAULT);
     finish(r);
@@ -72,7 +72,7 @@ static int message_refusal(robot_t *r, uint64_t now_us, int topic, const robot_s
     return refusal(r, sent_by_caller);
 }
 
-/* It is one of the model's, unless `why` tells otherwise. */
+/* It is one of the model's, unless `why` says otherwise. */
 static void let_message_through(robot_t *r, int topic, int request, int why, const robot_sent_t *sent_by_caller)
 {
     if (why == LET_THROUGH) {
@@ -121,7 +121,7 @@ static void let_call_through(robot_t *r, uint64_t now_us, int request, uint32_t 
         }
     }
     if (why != LET_THROUGH) {
-        told(r, callbacks->answer_default(callbacks->context, service, caller_id));
+        require(r, callbacks->answer_default(callbacks->context, service, caller_id));
         hold_back(r, REQUESTS[request].identifier, why);
         return;
     }
@@ -133,8 +133,8 @@ static void answer_caller(robot_t *r, int service, bool is_awaited, const void *
 {
     if (is_awaited) {
         r->calls[service].is_awaited = false;
-        told(r, r->callbacks.answer(r->callbacks.context, SERVICES[service].communication, r->calls[service].caller_id,
-                                    message));
+        require(r, r->callbacks.answer(r->callbacks.context, SERVICES[service].communication,
+                                       r->calls[service].caller_id, message));
     }
 }
 #endif
@@ -144,17 +144,9 @@ static int send_goal(robot_t *r, int request, uint32_t caller_id, const void *me
 {
     const robot_callbacks_t *callbacks = &r->callbacks;
     const robot_communication_t action = REQUESTS[request].communication;
-    robot_goal_t *goal = &r->goals[REQUESTS[request].action];
-    goal->is_open = true;
-    goal->is_running = true;
-    goal->is_accepted = false;
-    goal->is_cancel_wanted = false;
-    goal->is_cancel_sent = false;
+    robot_goal_t *goal = open_goal(r, REQUESTS[request].action);
     goal->is_cancelled_by_caller = false;
     goal->caller_id = caller_id;
-    goal->id = r->next_goal_id++;
-    goal->deadline_us = later(r->now_us, r->settings.action_timeout_us);
-    get_requirements(&r->state, REQUESTS[request].action, goal->held);
     if (!callbacks->send_goal(callbacks->context, goal->id, action, message)) {
         goal->is_open = false;
         return failed(r);
@@ -184,7 +176,7 @@ static void let_goal_through(robot_t *r, uint64_t now_us, int request, uint32_t 
         why = send_goal(r, request, caller_id, sent_by_caller->message);
     }
     if (why != LET_THROUGH) {
-        told(r, callbacks->reject_goal(callbacks->context, REQUESTS[request].communication, caller_id));
+        require(r, callbacks->reject_goal(callbacks->context, REQUESTS[request].communication, caller_id));
         hold_back(r, REQUESTS[request].identifier, why);
         return;
     }
@@ -215,8 +207,8 @@ static void cancel_for_caller(robot_t *r, uint64_t now_us, int action, uint32_t 
 static void pass_feedback(robot_t *r, int action, const void *message)
 {
     if (r->goals[action].is_awaited) {
-        told(r, r->callbacks.pass_feedback(r->callbacks.context, ACTIONS[action].communication,
-                                           r->goals[action].caller_id, message));
+        require(r, r->callbacks.pass_feedback(r->callbacks.context, ACTIONS[action].communication,
+                                              r->goals[action].caller_id, message));
     }
 }
 #endif

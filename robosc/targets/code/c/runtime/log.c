@@ -1,10 +1,10 @@
 #if ROBOT_IS_LAYER
 /* The layer: batches, silent steps, requests of the caller, releases, calls, goals, sensors, safe stop. Nothing in this
-   part depends on the model but through the tables and functions above it. A function that may find a fault tells by
+   part depends on the model but through the tables and functions above it. A function that may find a fault says by
    false, with the reason in `why`. */
 #else
 /* The executor: batches, silent steps, decisions, releases, calls, goals, sensors, safe stop. Nothing in this part
-   depends on the model but through the tables and functions above it. A function that may find a fault tells by
+   depends on the model but through the tables and functions above it. A function that may find a fault says by
    false, with the reason in `why`. */
 #endif
 

@@ -1,6 +1,6 @@
 /* Silent steps. */
 
-/* Take one silent step, cancels first, then resets, then taus; whether there was one is told by `has_stepped`. */
+/* Take one silent step, cancels first, then resets, then taus; `has_stepped` says whether there was one. */
 static bool silent_step(robot_t *r, bool *has_stepped)
 {
     (void)r;

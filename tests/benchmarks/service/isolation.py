@@ -27,7 +27,7 @@ ROOT = Path(__file__).parents[3]
 ROUNDS = 20
 COLD_ROUNDS = 3
 PAUSE_S = 0.03
-AIM_MS = 15.0
+AIM_MS = 3.0
 
 HEADER = ("task", "in-process", "ready process", "of it isolation", "least", "aim", "back to back", "from scratch")
 

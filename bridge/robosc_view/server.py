@@ -10,6 +10,7 @@ import contextlib
 import logging
 import os
 import ssl
+from collections import Counter
 from collections.abc import Awaitable, Callable, Sequence
 from typing import Any
 
@@ -41,8 +42,16 @@ _log = logging.getLogger(__name__)
 MAXIMUM_VIEWERS = 32
 """Pages that are open at the same time."""
 
+RESERVED_VIEWERS = 8
+"""Places among them that only pages with the token get: strangers cannot lock out whoever leads the robot."""
+
+VIEWERS_OF_HOST = 12
+"""Pages without the token that one host may have open."""
+
 MAXIMUM_CONNECTIONS = 128
 """At the same time, those of pages among them."""
+
+_FULL = "full: as many pages are open as may be; a page with the token of this start has places of its own\n"
 
 MAXIMUM_WAITING = 4
 """Commands of one page that wait for their answer; stops are not counted."""
@@ -123,6 +132,7 @@ class ViewServer:
         self._sweep: asyncio.Task[None] | None = None
         self._silent: dict[Any, float] = {}
         self._viewers = 0
+        self._strangers: Counter[str] = Counter()
         self._sockets: dict[web.WebSocketResponse, asyncio.Transport] = {}
 
     async def start(self) -> None:
@@ -144,6 +154,7 @@ class ViewServer:
         app.router.add_get("/", self._index, allow_head=False)
         app.router.add_get("/page/{name}", self._asset, allow_head=False)
         app.router.add_get("/stream", self._stream, allow_head=False)
+        app.router.add_get("/places", self._places, allow_head=False)
         self._runner = web.AppRunner(
             app,
             access_log=None,
@@ -194,8 +205,13 @@ class ViewServer:
         assert self._runner is not None  # noqa: S101  # Nobody connects before `start`.
         server = self._runner.server
         # Those that were accepted just now are no connections of the server's yet.
-        if server is None or len({*server.connections, *self._silent}) >= MAXIMUM_CONNECTIONS:
+        if server is None:
             return _RefusedConnection()
+        if len({*server.connections, *self._silent}) >= MAXIMUM_CONNECTIONS:
+            if not self._silent:
+                return _RefusedConnection()
+            # The one that has asked for nothing for the longest gives way: a page asks at once.
+            self._cut_off(next(iter(self._silent)))
         handler = server()
         self._silent[handler] = asyncio.get_running_loop().time() + REQUEST_LIMIT_S
         return handler
@@ -206,10 +222,14 @@ class ViewServer:
         while True:
             await asyncio.sleep(_SWEEP_S)
             for handler in [item for item, until_s in self._silent.items() if until_s < loop.time()]:
-                del self._silent[handler]
-                handler.force_close()
-                if handler.transport is not None:
-                    handler.transport.abort()
+                self._cut_off(handler)
+
+    def _cut_off(self, handler: Any) -> None:
+        """End a connection on which nothing was asked for."""
+        del self._silent[handler]
+        handler.force_close()
+        if handler.transport is not None:
+            handler.transport.abort()
 
     # Requests
 
@@ -251,17 +271,44 @@ class ViewServer:
         assert self._access is not None  # noqa: S101
         if not self._access.is_own_page(request.headers.get("Origin"), request.headers.get("Host")):
             raise web.HTTPForbidden(text="only a page of this server may open a stream\n")
-        if self._viewers >= MAXIMUM_VIEWERS:
-            raise web.HTTPServiceUnavailable(text=f"{MAXIMUM_VIEWERS} pages are open already\n")
+        host = str(request.remote)
+        is_known = self._access.is_token(request.query.get("token"))
+        if not self._has_place(host, is_known=is_known):
+            raise web.HTTPServiceUnavailable(text=_FULL)
         self._viewers += 1
+        if not is_known:
+            self._strangers[host] += 1
         broadcaster = self._shared or Broadcaster(self._source(), self._robot_cache)
         self._broadcasters.add(broadcaster)
         try:
             return await self._serve(request, broadcaster)
         finally:
             self._viewers -= 1
+            if not is_known:
+                self._strangers[host] -= 1
+                self._strangers += Counter()  # Drops those without a page.
             if not broadcaster.is_watched:
                 self._broadcasters.discard(broadcaster)
+
+    def _has_place(self, host: str, *, is_known: bool) -> bool:
+        """Return True if one more page of a host may open a stream.
+
+        Args:
+            host: Address of the page.
+            is_known: True if the page has the token.
+        """
+        if is_known:
+            return self._viewers < MAXIMUM_VIEWERS
+        places = MAXIMUM_VIEWERS - RESERVED_VIEWERS
+        return self._strangers.total() < places and self._strangers[host] < VIEWERS_OF_HOST
+
+    async def _places(self, request: web.Request) -> web.StreamResponse:
+        """Tell a page whose stream did not open whether there is a place: it cannot read the answer to the stream."""
+        assert self._access is not None  # noqa: S101
+        is_known = self._access.is_token(request.query.get("token"))
+        if not self._has_place(str(request.remote), is_known=is_known):
+            raise web.HTTPServiceUnavailable(text=_FULL)
+        return web.Response(status=204)
 
     async def _serve(self, request: web.Request, broadcaster: Broadcaster) -> web.StreamResponse:
         largest = MAXIMUM_LED_BYTES if isinstance(broadcaster.source, ManualSource) else MAXIMUM_BYTES

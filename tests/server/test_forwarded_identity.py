@@ -1,5 +1,6 @@
 """Tests of callers that a proxy names, over a Unix socket and with a client certificate, and of who may name nobody."""
 
+import socket
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -91,6 +92,14 @@ def test_calls_over_a_socket_have_the_scopes_that_the_proxy_tells(tmp_path: Path
         assert list_jobs(address, anna, ("x-robosc-scopes", "synthesize"), all_owners=True) == "PERMISSION_DENIED"
         assert list_jobs(address, anna, ("x-robosc-scopes", "synthesize admin"), all_owners=True) == "OK"
         assert health(["--socket", str(file), "--alive"]) == 0
+
+
+def test_a_socket_that_a_killed_server_has_left_is_replaced(tmp_path: Path) -> None:
+    file = tmp_path / "server.socket"
+    with socket.socket(socket.AF_UNIX) as left:
+        left.bind(str(file))
+    with served(given_workers=StartedWorkers(), socket=file) as address:
+        assert list_jobs(address) == "OK"
 
 
 def test_the_headers_mean_nothing_to_a_server_that_trusts_no_proxy() -> None:

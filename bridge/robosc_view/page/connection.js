@@ -9,13 +9,16 @@ const LOOK_EVERY_MS = 250;
 export class Connection {
   /**
    * @param {string} address Of the stream.
+   * @param {string} places Address that tells whether there is a place for a stream.
    * @param {{onMessage: (message: object) => void, onChange: () => void, onLook: () => void}} handlers Told of each
    *   message, of each change of `isOpen`, and several times a second.
    */
-  constructor(address, handlers) {
+  constructor(address, places, handlers) {
     this.address = address;
+    this.places = places;
     this.handlers = handlers;
     this.isOpen = false;
+    this.isFull = false;
     this.heardMs = performance.now();
     this.waitMs = FIRST_WAIT_MS;
     this.timer = null;
@@ -51,7 +54,10 @@ export class Connection {
   changed(socket, isOpen) {
     if (socket !== this.socket) return;
     this.isOpen = isOpen;
-    if (isOpen) this.openedMs = performance.now();
+    if (isOpen) {
+      this.openedMs = performance.now();
+      this.isFull = false;
+    }
     this.handlers.onChange();
   }
 
@@ -59,8 +65,19 @@ export class Connection {
     if (socket !== this.socket) return;
     this.socket = null;
     if (this.isOpen) this.changed(null, false);
+    else void this.askPlaces();
     this.timer = setTimeout(() => this.open(), this.waitMs);
     this.waitMs = Math.min(this.waitMs * 2, LONGEST_WAIT_MS);
+  }
+
+  /** Asks whether the server is full: a browser does not tell why a stream did not open. */
+  async askPlaces() {
+    try {
+      this.isFull = (await fetch(this.places)).status === 503 && !this.isOpen;
+    } catch {
+      this.isFull = false;
+    }
+    this.handlers.onLook();
   }
 
   received(socket, data) {

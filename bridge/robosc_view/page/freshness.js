@@ -14,14 +14,16 @@ const PLACES = ["stale", "large-stale"];
 const SENTENCES = {
   connecting: () => "Connecting to the server.",
   lost: () => "Connection lost: nothing shown here is live.",
+  full: () => "The server is full: close other pages, or open the address with the token, which has places of its own.",
   silent: () => "The server is silent: nothing shown here is live.",
   gone: () => `The source is lost: ${received.gone ?? "no reason was told"}`,
   old: () => "The bridge's loop hangs: nothing shown here is live.",
 };
-const WORDS = { connecting: "connecting", lost: "no connection", silent: "silent", gone: "source lost", old: "hangs", waiting: "waiting" };
+const WORDS = { connecting: "connecting", lost: "no connection", full: "full", silent: "silent", gone: "source lost", old: "hangs", waiting: "waiting" };
 
 /** One of the names above; "waiting": connected, without a definition yet; "live". */
 function freshness(connection) {
+  if (!connection.isOpen && connection.isFull) return "full";
   if (!connection.isOpen) return received.definition === null ? "connecting" : "lost";
   if (connection.silenceMs > SILENT_MS) return "silent";
   if (received.gone !== null) return "gone";
@@ -32,7 +34,7 @@ function freshness(connection) {
 /**
  * Keeps the page true about its age.
  *
- * @param {() => {isOpen: boolean, silenceMs: number}} connection The connection.
+ * @param {() => {isOpen: boolean, isFull: boolean, silenceMs: number}} connection The connection.
  * @returns {() => string} To be called when something may have changed and several times a second; what it is now.
  */
 export function startFreshness(connection) {

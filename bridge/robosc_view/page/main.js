@@ -110,7 +110,9 @@ startTheme(() => {
   touch("map");
 });
 
-connection = new Connection(`${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/stream`, {
+const shown = token ? `?token=${encodeURIComponent(token)}` : "";
+const streamAddress = `${location.protocol === "https:" ? "wss" : "ws"}://${location.host}/stream${shown}`;
+connection = new Connection(streamAddress, `/places${shown}`, {
   onMessage(message) {
     if (Object.hasOwn(receive, message.type)) receive[message.type](message);
     lookAtFreshness();

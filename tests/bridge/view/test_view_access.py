@@ -259,6 +259,7 @@ def test_there_is_a_limit_of_pages_and_of_connections(
 ) -> None:
     async def pages() -> None:
         monkeypatch.setattr(server_module, "MAXIMUM_VIEWERS", 3)
+        monkeypatch.setattr(server_module, "RESERVED_VIEWERS", 0)
         async with opened(endpoint.url), opened(endpoint.url), opened(endpoint.url):
             with pytest.raises(aiohttp.WSServerHandshakeError) as error:
                 async with opened(endpoint.url):
@@ -283,12 +284,36 @@ def test_there_is_a_limit_of_pages_and_of_connections(
     wait_until(lambda: runner.server is not None and not runner.server.connections)
     monkeypatch.setattr(server_module, "MAXIMUM_CONNECTIONS", 2)
     host, _, port = endpoint.address.rpartition(":")
-    with (
-        socket.create_connection((host, int(port))),
-        socket.create_connection((host, int(port))),
-        pytest.raises(aiohttp.ClientError),
-    ):
-        got(endpoint.url, "/")
+    # Who asks for nothing gives way to who asks.
+    with socket.create_connection((host, int(port))) as first, socket.create_connection((host, int(port))):
+        assert got(endpoint.url, "/")[0] == 200
+        first.settimeout(LIMIT_S)
+        with contextlib.suppress(ConnectionResetError):
+            assert first.recv(1) == b""
+
+
+def test_strangers_cannot_lock_out_who_has_the_token(endpoint: ViewEndpoint, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def pages() -> None:
+        monkeypatch.setattr(server_module, "MAXIMUM_VIEWERS", 4)
+        monkeypatch.setattr(server_module, "RESERVED_VIEWERS", 1)
+        monkeypatch.setattr(server_module, "VIEWERS_OF_HOST", 2)
+        base, _, token = endpoint.url.partition("/?token=")
+        async with opened(endpoint.url), opened(endpoint.url), aiohttp.ClientSession() as session:
+            with pytest.raises(aiohttp.WSServerHandshakeError) as error:
+                async with opened(endpoint.url):
+                    pass
+            assert error.value.status == 503
+            async with session.get(f"{base}/places") as answer:
+                assert answer.status == 503
+                assert (await answer.text()).startswith("full")
+            async with session.get(f"{base}/places?token={token}") as answer:
+                assert answer.status == 204
+            stream = f"{base}/stream?token={token}"
+            async with session.ws_connect(stream, headers={"Origin": base}) as known:
+                assert not known.closed
+        assert not endpoint._server._strangers or endpoint._server._strangers.total() <= 2
+
+    asyncio.run(pages())
 
 
 def test_who_asks_for_nothing_is_cut_off(robot: LiveRobot, monkeypatch: pytest.MonkeyPatch) -> None:

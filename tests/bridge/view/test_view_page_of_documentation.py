@@ -14,6 +14,8 @@ WORDS = " ".join(PAGE.split())
 
 def test_the_limits() -> None:
     assert f"| {server.MAXIMUM_VIEWERS}; {server.MAXIMUM_CONNECTIONS} |" in PAGE
+    strangers = server.MAXIMUM_VIEWERS - server.RESERVED_VIEWERS
+    assert f"| {strangers}; {server.VIEWERS_OF_HOST} |" in PAGE
     assert f"time for a request | {server.REQUEST_LIMIT_S:g} s |" in PAGE
     assert f"| {requests.MAXIMUM_BYTES} bytes; {server.REQUESTS_A_S:g}, {server.BURST} in a burst |" in PAGE
     assert f"that plays with a model | {requests.MAXIMUM_LED_BYTES} bytes |" in PAGE

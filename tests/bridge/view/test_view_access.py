@@ -24,6 +24,7 @@ from robosc_view.server import BURST, MAXIMUM_VIEWERS, answer_headers
 from support.certificates import Authority
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.pages_open import LIMIT_S, opened, token_of
+from support.view_servers import remotely_viewed
 from support.waiting import wait_until
 
 
@@ -290,6 +291,23 @@ def test_there_is_a_limit_of_pages_and_of_connections(
         first.settimeout(LIMIT_S)
         with contextlib.suppress(ConnectionResetError):
             assert first.recv(1) == b""
+
+
+def test_connections_that_come_at_once_give_way_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(server_module, "MAXIMUM_CONNECTIONS", 1)
+    monkeypatch.setattr(server_module, "_SWEEP_S", 0.01)
+
+    async def test() -> None:
+        async with remotely_viewed("127.0.0.1:1") as server:
+            host, _, port = server.address.rpartition(":")
+            # The loop accepts both together, and knows the second before it has made the connection of the first.
+            with socket.create_connection((host, int(port))) as first, socket.create_connection((host, int(port))):
+                first.setblocking(False)
+                async with asyncio.timeout(LIMIT_S):
+                    with contextlib.suppress(ConnectionResetError):
+                        assert await asyncio.get_running_loop().sock_recv(first, 1) == b""
+
+    asyncio.run(test())
 
 
 def test_strangers_cannot_lock_out_who_has_the_token(endpoint: ViewEndpoint, monkeypatch: pytest.MonkeyPatch) -> None:

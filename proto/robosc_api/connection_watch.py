@@ -228,8 +228,7 @@ class Arrivals(Layer):
     """Layer that notes from which connections requests arrive.
 
     It stands inside the guard and the wait for requests, so that only requests of admitted callers count; it is never
-    the outermost layer. Health checks
-    need no token, and explain nothing; their open watches count as calls.
+    the outermost layer. Health checks need no token, and explain nothing; their open watches count as calls.
     """
 
     def __init__(self) -> None:

@@ -112,13 +112,6 @@ def test_without_a_file_there_are_no_lines() -> None:
         map_channels(example("maze_solver/maze_solver"), loaded.configuration)
 
 
-def test_identifiers_are_told_on_one_line_whatever_is_in_them() -> None:
-    text = 'robot R { component C { outgoing message m with identifier: "/a\n\x1b[31m", type: none } }'
-    (line,) = errors_of(model_of(text), "")
-    assert line.startswith("c.yaml:1: channels: outgoing message 'm' ('/a")
-    assert line.isprintable()
-
-
 def test_names_of_communications_may_stand_for_their_identifiers() -> None:
     model = with_message("incoming", "Twist")
     assert mapped(model, "channels: {m: {channel: drive}}").channels == {"m": kinds.DriveChannel()}

@@ -402,7 +402,7 @@ def test_nothing_forges_a_line_or_moves_the_cursor(capsys: pytest.CaptureFixture
     path.write_text(
         'robot R { component C { incoming message m with identifier: "a\nerror: fake\x1b[2J", type: none } }'
     )
-    assert main(["check", str(path)]) == 0
+    assert main(["check", str(path)]) == 1
     assert main(["explain", "\x1b[2J\nfake"]) == 2
     assert main(["check", "\x1b[2J\nfake"]) == 2
     error = capsys.readouterr().err

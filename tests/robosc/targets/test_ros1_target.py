@@ -124,7 +124,7 @@ def test_a_package_may_be_called_as_one_likes() -> None:
     ("body", "problem"),
     [
         ('component C { outgoing message m with identifier: "/a b", type: none }', "the identifier '/a b' of 'm'"),
-        ('component C { outgoing message m with identifier: "/a\\n", type: none }', "identifier '/a\\n' of 'm'"),
+        ('component C { outgoing message m with identifier: "/a b", type: none }', "identifier '/a b' of 'm'"),
         ('component C { outgoing message m with identifier: "{{ 1 }}", type: none }', "identifier '{{ 1 }}' of 'm'"),
         (
             'component C { outgoing message m with identifier: "$(env HOME)", type: none }',

@@ -250,7 +250,7 @@ def test_a_package_says_who_maintains_it_under_which_licence() -> None:
         ('component C { outgoing message m with identifier: "/1", type: none }', "identifier '/1' of 'm'"),
         ('component C { outgoing message m with identifier: "/a/", type: none }', "identifier '/a/' of 'm'"),
         ('component C { outgoing message m with identifier: "/a//b", type: none }', "identifier '/a//b' of 'm'"),
-        ('component C { outgoing message m with identifier: "/a\\n", type: none }', "identifier '/a\\n' of 'm'"),
+        ('component C { outgoing message m with identifier: "/a b", type: none }', "identifier '/a b' of 'm'"),
         ('component C { outgoing message m with identifier: "{x}", type: none }', "identifier '{x}' of 'm'"),
         ('component C { outgoing message m with identifier: "/' + "x" * 220 + '", type: none }', "no ROS name"),
         (

@@ -134,6 +134,9 @@ def test_it_follows_the_line_and_stops_for_whatever_there_is(follower: Follower)
     # The operator.
     os.write(follower.keys, b" ")
     follower.until(follower.stands, "a stop by the operator")
+    # On OpenCR it lets the motors go, too; the robot continues after that alone.
+    servos = (follower.robot.left, follower.robot.right)
+    follower.until(lambda: not any(servo.table["torque enable"] for servo in servos), "the motors to let go")
     os.write(follower.keys, b"r")
     follower.until(follower.drives, "it to go on when the operator says so")
 

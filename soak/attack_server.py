@@ -94,7 +94,7 @@ def flooded(port: int, deadline: Deadline, first: bytes, chunk: bytes, connectio
                     line.sendall(first)
                     line.setblocking(False)  # named by the library
                 with contextlib.suppress(BlockingIOError):
-                    # What came back is dropped, so that the other end never waits for this one.
+                    # Answers are dropped, so that the other end never waits for this one.
                     if not line.recv(2**20):
                         raise ConnectionResetError
                 if connections == 1:

@@ -61,7 +61,7 @@ def prometheus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Prometheus]
         server_process("--metrics-address", f"127.0.0.1:{metrics}") as (_, address),
         _running(tmp_path_factory.mktemp("prometheus"), metrics) as made,
     ):
-        # What happens before the first look is no increase.
+        # An increase before the first look is not seen by it.
         assert eventually(lambda: made.values('up{job="robosc-server"}') == [1.0])
         _work(address)
         yield made

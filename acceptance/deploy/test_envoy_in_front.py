@@ -107,7 +107,7 @@ def test_callers_with_certificates(folder: Path) -> None:
         assert list_jobs(address, authority) == "UNAVAILABLE"
         stranger = Authority(folder, "others").sign("stranger")
         assert list_jobs(address, authority, certificate=stranger) == "UNAVAILABLE"
-        # What callers send in the name of the proxy counts for nothing.
+        # Headers that callers send in the name of the proxy count for nothing.
         assert list_jobs(address, authority, *SPOOFED, certificate=anna) == "OK"
         assert list_jobs(address, authority, *SPOOFED, certificate=anna, all_owners=True) == "PERMISSION_DENIED"
 

@@ -239,7 +239,7 @@ def evaluated(
             if isinstance(found, _Reported):
                 runs.append(found.run)
             elif found not in failures:
-                # What no world can be run without is reported once.
+                # A part that no world can be run without is reported once.
                 failures.append(found)
     for experiment in experiments:
         say(f"{experiment.name}: lines of code")

@@ -220,7 +220,7 @@ class _Watch:
                 _settle(self._loop, self._next, response)
         except Exception as error:
             why = _translated(error)
-        # What ended it is the last thing to be reported, after the response before it was taken.
+        # The cause of its end is reported last, after the response before it was taken.
         self._go.acquire()
         if not self._is_over:
             _settle(self._loop, self._next, error=why)

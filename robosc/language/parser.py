@@ -61,7 +61,7 @@ def parse(file: SourceFile) -> Parsed:
     tokens, places = tokenize(file.text), Places(file)
     hidden = obstacle(file, tokens, places)
     if hidden is not None:
-        # What else is found may come of it: it is reported alone, and the rest read for the sake of what is sound.
+        # Other findings may come of it: it is reported alone, and the rest read for the sake of its sound parts.
         tokens = readable_tokens(file.text)
     # Whoever works with the tree walks it recursively too.
     allow_depth(MAXIMUM_NESTING, FRAMES_PER_LEVEL)

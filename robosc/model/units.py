@@ -199,7 +199,7 @@ class Libraries:
                 "Remove or rename one of the files, or do not search its folder.",
             )
             return None
-        # What is sound of a broken one is better known than nothing: its errors are reported.
+        # The sound parts of a broken one are better known than nothing: its errors are reported.
         for tree in (*found.values(), *partly.values()):
             return make_unit(tree, self._findings)
         if name.text not in self._broken:

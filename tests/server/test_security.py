@@ -319,7 +319,7 @@ class TestQuotas:
                 assert caught.value.reason == "QUOTA_EXCEEDED"
                 assert caught.value.retry_after_s is not None
                 assert 0 < caught.value.retry_after_s <= 30
-                # What is kept counts, too: otherwise a caller could ask for it without end.
+                # A kept result counts, too: otherwise a caller could ask for it without end.
                 with pytest.raises(ServerBusyError):
                     client.check(bundle_of("a"))
                 with pytest.raises(ServerBusyError, match="2 tasks per minute"):

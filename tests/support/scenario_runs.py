@@ -149,7 +149,7 @@ class Companion:
             snapshot = self._run.machine.operations.feed.snapshot
             if snapshot is not None and snapshot.scan is not None and snapshot.scan is not last:
                 last = snapshot.scan
-                # What is not measured is too far away, as a LiDAR of ROS tells it.
+                # An unmeasured range is too far away, as a LiDAR of ROS reports it.
                 ranges_m = [math.inf if math.isnan(range_m) else range_m for range_m in last.ranges_m]
                 person = find_person(Scan(ranges_m, 0.0, math.tau / len(ranges_m), last.min_m, last.max_m))
                 self.say(MessageReceived(self.program, self._identifier, self._data(person)))

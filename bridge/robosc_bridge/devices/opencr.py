@@ -118,7 +118,7 @@ class OpenCrBase:
         self._pressed_s: dict[str, float] = {}
         self._heartbeat = 0
         self._source: VelocitySource = CONSTANT
-        # What was commanded last.
+        # The last command.
         self._words = (0, 0)
         # The uptime in the last block, and when that was asked for and received.
         self._uptime: tuple[int, float, float] | None = None

@@ -300,7 +300,7 @@ def test_a_device_that_is_silent_is_not_asked_again_behind_what_was_interjected(
             bus.read(1, 132, 4)
         assert [request[7] for request in peer.requests] == [0x02, 0x03]
         assert bus.counters.repeated == 0
-        # What follows is as after any silence.
+        # The rest is as after any silence.
         bus.interruption = None
         bus.begin(10.0)
         assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))

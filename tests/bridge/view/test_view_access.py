@@ -285,7 +285,7 @@ def test_there_is_a_limit_of_pages_and_of_connections(
     wait_until(lambda: runner.server is not None and not runner.server.connections)
     monkeypatch.setattr(server_module, "MAXIMUM_CONNECTIONS", 2)
     host, _, port = endpoint.address.rpartition(":")
-    # Who asks for nothing gives way to who asks.
+    # A connection that asks for nothing gives way to one that asks.
     with socket.create_connection((host, int(port))) as first, socket.create_connection((host, int(port))):
         assert got(endpoint.url, "/")[0] == 200
         first.settimeout(LIMIT_S)

@@ -224,7 +224,7 @@ def test_the_load_of_callers_is_for_themselves_and_an_admin(tmp_path: Path) -> N
                 caller="me", waiting_tasks=1, running_tasks=1, queued_jobs=1, running_jobs=1, ended_jobs=0
             )
             mine.first_queued_time.CopyFrom(first.create_time)
-            # What has ended a minute ago counts no more.
+            # Tasks that ended a minute ago count no more.
             assert await loads() == {"me": mine}
             choices.times.wall_s -= 2.0
             assert (await loads())["me"].ended_jobs == 1

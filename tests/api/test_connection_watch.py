@@ -181,7 +181,8 @@ def test_open_calls_keep_their_connection() -> None:
             assert arrivals.take() == (frozenset(), {})
             await asyncio.to_thread(watch.look)
             assert watch.closed
-            # The channel connects again by itself.
+            # A call that is sent before its channel has seen the end fails; later ones get a new connection.
+            await asyncio.wait_for(channel.wait_for_state_change(grpc.ChannelConnectivity.READY), PATIENCE_S)
             assert (await call(channel, b"again")).answer == b"again"
 
     asyncio.run(watched())

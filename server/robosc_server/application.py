@@ -276,6 +276,9 @@ def _options(settings: Settings, request_bytes: int, connections: int) -> list[t
         ("grpc.absolute_max_metadata_size", _METADATA_BYTES),
         # The server refuses large messages with a reason; beyond this size gRPC refuses without one.
         ("grpc.max_receive_message_length", 2 * request_bytes),
+        # A probed window grows to megabytes, and so much of a message that gRPC refuses would still be received. The
+        # window of a message that is read grows to its size all the same.
+        ("grpc.http2.bdp_probe", 0),
     ]
 
 

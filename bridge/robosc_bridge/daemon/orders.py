@@ -125,9 +125,9 @@ class Latches:
         """Let the safety layer forget all of them; why it does not."""
         if self._orders.is_stop_coming:
             return str(Reason.OPERATOR_STOP)
-        remaining = self._safety.reset()
-        if remaining:
-            return " ".join(remaining)
+        if remaining := self._safety.reset():
+            wait = " The motors have not let go yet; try again in a moment." if self._safety.is_letting_go else ""
+            return " ".join(remaining) + wait
         if self._orders.is_stop_coming:
             # It came between the two, and may have been forgotten with the others.
             self._safety.operator_stop()

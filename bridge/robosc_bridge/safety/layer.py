@@ -209,6 +209,12 @@ class SafetyLayer:
                 self._asked_m_s = 0.0
             return remaining
 
+    @property
+    def is_letting_go(self) -> bool:
+        """True if a latched reason wants torque off, and the motors still have it."""
+        with self._lock:
+            return self._torque_since_s is not None and not self._latched.isdisjoint(self._torque_off)
+
     def _holds(self, reason: Reason) -> bool:
         """Return True if a latched reason has not had its effect yet, or its cause still holds."""
         if reason not in self._reasons:

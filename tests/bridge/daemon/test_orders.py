@@ -7,11 +7,13 @@ import pytest
 
 from robosc_bridge.daemon.lifecycle import RESET_LIMIT_S, STOP_LIMIT_S
 from robosc_bridge.daemon.loop import Key
+from robosc_bridge.daemon.orders import Latches, Orders
 from robosc_bridge.daemon.states import OperatorCommand, Order, State
 from robosc_bridge.daemon.threads.reports import Device, DeviceDown, DeviceUp, ResetDone
 from robosc_bridge.devices.interface import STANDSTILL
 from robosc_bridge.safety import Reason
 from support.daemons import Scene
+from support.safety import Bench
 
 DONE = ""
 RESET_THEN_STANDBY = (OperatorCommand.RESET, OperatorCommand.STANDBY)
@@ -267,6 +269,17 @@ def test_a_resume_before_the_stop_was_put_out_is_refused() -> None:
     assert answers == [str(Reason.OPERATOR_STOP)]
     scene.live(0.1, 2.0)
     assert scene.out == STANDSTILL
+
+
+def test_a_resume_waits_until_the_motors_have_let_go() -> None:
+    bench = Bench(is_torque_off_on_operator_stop=True)
+    latches = Latches(bench.layer, Orders())
+    bench.drive()
+    bench.layer.operator_stop()
+    bench.cycle()
+    assert latches.release() == f"{Reason.OPERATOR_STOP} The motors have not let go yet; try again in a moment."
+    bench.cycles(1.0)
+    assert latches.release() == ""
 
 
 def test_a_lost_drive_that_is_back_leaves_the_fault_and_can_be_started() -> None:

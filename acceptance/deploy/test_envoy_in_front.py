@@ -20,16 +20,14 @@ import pytest
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import padding, rsa
 
-from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc
 from support.certificates import Authority
 from support.checkers import found
 from support.containers import TOP
 from support.job_workers import StartedWorkers
-from support.service import served
-from support.waiting import PATIENCE_S, wait_until
+from support.service import served, status_of_list
+from support.waiting import wait_until
 
 ENVOY = TOP / "deploy" / "envoy"
-JOBS: Any = jobs_pb2_grpc.JobServiceStub
 KEY = rsa.generate_private_key(public_exponent=65537, key_size=2048)
 SPOOFED = (("x-robosc-caller", "root"), ("x-robosc-scopes", "synthesize admin"))
 
@@ -87,16 +85,10 @@ def list_jobs(
     certificate: tuple[Path, Path] | None = None,
     all_owners: bool = False,
 ) -> str:
-    """Return the status of a call."""
+    """Return the status of a call over TLS."""
     own = (None, None) if certificate is None else (certificate[1].read_bytes(), certificate[0].read_bytes())
     credentials = grpc.ssl_channel_credentials(authority.file.read_bytes(), *own)
-    with grpc.secure_channel(address, credentials) as channel:
-        try:
-            request = jobs_pb2.ListJobsRequest(all_owners=all_owners)
-            JOBS(channel).ListJobs(request, metadata=metadata, timeout=PATIENCE_S)
-        except grpc.RpcError as error:
-            return str(error.code().name)
-    return "OK"
+    return status_of_list(address, *metadata, all_owners=all_owners, credentials=credentials)
 
 
 def test_callers_with_certificates(folder: Path) -> None:

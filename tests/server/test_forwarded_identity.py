@@ -3,22 +3,16 @@
 import socket
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
-import grpc
 import pytest
 
 from robosc_api.security import Scope, SecurityError, ServerSecurity, check_listening
 from robosc_api.security.forwarded import forwarded_entry
-from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc
 from robosc_server.health_check import main as health
 from robosc_server.workers import WorkersError
 from robosc_server.workers.cluster_check import check_cluster
 from support.job_workers import StartedWorkers
-from support.service import served
-from support.waiting import PATIENCE_S
-
-JOBS: Any = jobs_pb2_grpc.JobServiceStub
+from support.service import served, status_of_list
 
 
 @pytest.mark.parametrize(
@@ -70,27 +64,17 @@ def test_a_forwarded_identity_is_taken_over_a_socket_and_from_a_proxy_with_a_cer
     check_listening("10.0.0.1:1", ServerSecurity(certificate=FILE, key=FILE, client_ca=FILE, forwarded_identity=True))
 
 
-def list_jobs(address: str, *metadata: tuple[str, str], all_owners: bool = False) -> str:
-    with grpc.insecure_channel(address) as channel:
-        try:
-            request = jobs_pb2.ListJobsRequest(all_owners=all_owners)
-            JOBS(channel).ListJobs(request, metadata=metadata, timeout=PATIENCE_S)
-        except grpc.RpcError as error:
-            return str(error.code().name)
-    return "OK"
-
-
 def test_calls_over_a_socket_have_the_scopes_that_the_proxy_tells(tmp_path: Path) -> None:
     file = tmp_path / "server.socket"
     anna = ("x-robosc-caller", "anna")
     with served(given_workers=StartedWorkers(), socket=file, forwarded_identity=True) as address:
         assert address == f"unix:{file}"
         assert file.stat().st_mode & 0o777 == 0o660
-        assert list_jobs(address, anna, ("x-robosc-scopes", "synthesize")) == "OK"
-        assert list_jobs(address, anna, ("x-robosc-scopes", "watch")) == "PERMISSION_DENIED"
-        assert list_jobs(address) == "UNAUTHENTICATED"
-        assert list_jobs(address, anna, ("x-robosc-scopes", "synthesize"), all_owners=True) == "PERMISSION_DENIED"
-        assert list_jobs(address, anna, ("x-robosc-scopes", "synthesize admin"), all_owners=True) == "OK"
+        assert status_of_list(address, anna, ("x-robosc-scopes", "synthesize")) == "OK"
+        assert status_of_list(address, anna, ("x-robosc-scopes", "watch")) == "PERMISSION_DENIED"
+        assert status_of_list(address) == "UNAUTHENTICATED"
+        assert status_of_list(address, anna, ("x-robosc-scopes", "synthesize"), all_owners=True) == "PERMISSION_DENIED"
+        assert status_of_list(address, anna, ("x-robosc-scopes", "synthesize admin"), all_owners=True) == "OK"
         assert health(["--socket", str(file), "--alive"]) == 0
 
 
@@ -99,13 +83,13 @@ def test_a_socket_that_a_killed_server_has_left_is_replaced(tmp_path: Path) -> N
     with socket.socket(socket.AF_UNIX) as left:
         left.bind(str(file))
     with served(given_workers=StartedWorkers(), socket=file) as address:
-        assert list_jobs(address) == "OK"
+        assert status_of_list(address) == "OK"
 
 
 def test_the_headers_mean_nothing_to_a_server_that_trusts_no_proxy() -> None:
     with served(given_workers=StartedWorkers()) as address:
         words = (("x-robosc-caller", "anna"), ("x-robosc-scopes", "synthesize admin"))
-        assert list_jobs(address, *words, all_owners=True) == "PERMISSION_DENIED"
+        assert status_of_list(address, *words, all_owners=True) == "PERMISSION_DENIED"
 
 
 def test_a_cluster_on_other_machines_needs_tls_or_the_word() -> None:

@@ -13,19 +13,12 @@ from robosc_server.jobs.convert import submission
 from robosc_server.tasks.fields import Nested, has_few_fields, nested_of
 from robosc_server.tasks.requests import RequestLimits, accept_request
 from robosc_server.tasks.task import Reason, TaskKind
+from support.requests import varint
 
 LIMITS = RequestLimits()
 LOOP: Nested = {}
 LOOP |= {1: LOOP, 200: LOOP, 2**29 - 1: LOOP}
 """Of a message that may hold itself."""
-
-
-def varint(number: int) -> bytes:
-    found = b""
-    while number > 0x7F:
-        found += bytes([number & 0x7F | 0x80])
-        number >>= 7
-    return found + bytes([number])
 
 
 def delimited(number: int, content: bytes) -> bytes:

@@ -18,6 +18,7 @@ from hypothesis import strategies as st
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.fields import Nested, has_few_fields, nested_of
+from support.requests import varint
 
 TYPES = tuple(
     GetMessageClass(descriptor)
@@ -113,14 +114,6 @@ def sent(draw: st.DrawFn) -> tuple[Any, bytes]:
     """A type of request and a message of that type, serialized."""
     kind = draw(st.sampled_from(TYPES))
     return kind, draw(messages(kind.DESCRIPTOR, 4)).SerializeToString()
-
-
-def varint(number: int) -> bytes:
-    found = b""
-    while number > 0x7F:
-        found += bytes([number & 0x7F | 0x80])
-        number >>= 7
-    return found + bytes([number])
 
 
 # Pieces of the encoding, right and wrong ones: tags with a kind, lengths, numbers of too many bytes.

@@ -19,7 +19,7 @@ from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestCache, RequestLim
 from robosc_server.tasks.task import Reason, Task, TaskKind
 from support.effort import examples
 from support.models import EXAMPLES
-from support.requests import MESSAGES, bundle_at, small_request
+from support.requests import MESSAGES, bundle_at, small_request, varint
 
 LIMITS = RequestLimits()
 
@@ -38,14 +38,6 @@ def refusal(kind: TaskKind, request: Any, limits: RequestLimits = LIMITS) -> Ref
 def field(number: int, content: bytes) -> bytes:
     """A field of bytes as it stands in a message."""
     return bytes([number << 3 | 2]) + varint(len(content)) + content
-
-
-def varint(value: int) -> bytes:
-    found = bytearray()
-    while value > 127:
-        found.append(value & 127 | 128)
-        value >>= 7
-    return bytes([*found, value])
 
 
 class TestAcceptance:

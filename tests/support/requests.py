@@ -56,6 +56,15 @@ def bundle_at(model: Path) -> pb.Bundle:
     return bundle_message(load_bundle(model))
 
 
+def varint(number: int) -> bytes:
+    """A number in the variable length that Protocol Buffers give it."""
+    found = b""
+    while number > 0x7F:
+        found += bytes([number & 0x7F | 0x80])
+        number >>= 7
+    return found + bytes([number])
+
+
 def small_request(kind: TaskKind, text: str = "", name: str = "robot.rscd") -> Any:
     """A request of a kind with the least that it needs."""
     main = pb.SourceFile(name=name, text=text)

@@ -14,10 +14,12 @@ from contextlib import asynccontextmanager, contextmanager
 from pathlib import Path
 from typing import Any
 
+import grpc
 import structlog
 
 from robosc.source import Bundle, SourceFile
 from robosc_api.security import ServerSecurity
+from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc
 from robosc_server.application import running_server
 from robosc_server.operations.settings import Settings
 from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
@@ -25,6 +27,7 @@ from support.held_time import HeldLoop
 from support.waiting import PATIENCE_S
 
 _PAUSE_S = 0.005
+_JOBS: Any = jobs_pb2_grpc.JobServiceStub
 
 
 @contextmanager
@@ -172,6 +175,19 @@ def logged_server_process(
                 reader.join(PATIENCE_S)
                 process.stdout.close()
                 process.stderr.close()
+
+
+def status_of_list(address: str, *metadata: tuple[str, str], all_owners: bool = False, credentials: Any = None) -> str:
+    """Return the status of a list of jobs that is asked for in clear text, or with credentials."""
+    channel = grpc.insecure_channel(address) if credentials is None else grpc.secure_channel(address, credentials)
+    with channel:
+        try:
+            _JOBS(channel).ListJobs(
+                jobs_pb2.ListJobsRequest(all_owners=all_owners), metadata=metadata, timeout=PATIENCE_S
+            )
+        except grpc.RpcError as error:
+            return str(error.code().name)
+    return "OK"
 
 
 def bundle_of(text: str, name: str = "robot.rscd", **libraries: str) -> Bundle:

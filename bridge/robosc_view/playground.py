@@ -207,7 +207,7 @@ class Playground:
         self._is_changed = True
         self._commands.put_nowait(None)
 
-    # What is wanted
+    # Requests of the page
 
     async def _do(self, command: RunCommand, sink: Sink) -> None:
         run = self._run
@@ -368,7 +368,7 @@ class Playground:
         await self._define(sink)
         await self._show(sink, RunReport("changed", ("the model has changed", *sentences)))
 
-    # What is reported
+    # Reports
 
     def _initial_report(self) -> RunReport:
         """Report of where a run has begun; an empty one where there is no choice."""

@@ -270,7 +270,7 @@ def _tools(machine: Machine, needed: frozenset[Purpose]) -> Iterator[Finding]:
     """Programs that build generated packages."""
     catkin = ("catkin_make", "catkin_make_isolated", "catkin")
     both = frozenset({Purpose.ROS1, Purpose.ROS2})
-    # Where no ROS is needed all of them are reported, and none is missed.
+    # All of them are reported where no ROS is needed, and none is missed.
     listed = needed & both or both
     for part, names, builders, what, fix in (
         ("colcon", ("colcon",), {Purpose.ROS2}, "builds ROS 2 packages", "pip install colcon-common-extensions"),

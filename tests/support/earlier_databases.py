@@ -78,7 +78,7 @@ def check(store: Store) -> None:
         waits = await store.find_by_key("me", "i")
         assert waits is not None and waits.id == "waits"
         owners = await store._database.read(lambda connection: connection.execute(_OWNERS).all())
-        # Of several callers, the first by name.
+        # The first by name of several callers.
         assert {row.key: row.owner for row in owners} == {"k": "me", "l": "", "large": "ann"}
         await store.keep_results([("new", TaskKind.CHECK, Result((b"x",)), "you")])
         # A server of the first version may go on for a while.

@@ -59,7 +59,7 @@ UDEV_FOLDERS = tuple(map(Path, ("/etc/udev/rules.d", "/run/udev/rules.d", "/usr/
 
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
-_EPILOG = "exit status: 0 all is well, or the bridge was told to end; 1 a fault stopped it; 2 wrong use or files"
+_EPILOG = "exit status: 0 all is well, or the bridge was ended by a signal; 1 a fault stopped it; 2 wrong use or files"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -118,11 +118,11 @@ def make_parser() -> Parser:
     run.add_argument(
         "--dry",
         action="store_true",
-        help="everything but motion: torque stays off, and the velocities are told instead; the supervisor is shown "
-        "the motion that would have been",
+        help="everything but motion: torque stays off, and the velocities are logged instead; the supervisor gets the "
+        "readings that the motion would have given",
     )
     add_recording(run)
-    run.add_argument("--verbose", action="store_true", help="tell more")
+    run.add_argument("--verbose", action="store_true", help="log more")
     run.set_defaults(run=_run)
 
     checked = commands.add_parser("check", help="check a configuration against a model", epilog=_EPILOG)

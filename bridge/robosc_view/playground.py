@@ -136,7 +136,7 @@ class Playground:
     ) -> None:
         self._watched = watched
         self._kept = kept
-        # Name of the page; empty: it has not told it.
+        # Name of the page; empty: the page has not sent it.
         self._page = ""
         self._file = file
         self._make = make
@@ -161,7 +161,7 @@ class Playground:
         self._entries: list[list[dict[str, Any]]] = []
 
     async def run(self, sink: Sink) -> None:
-        """Do what is wanted, and tell what it leads to, until cancelled."""
+        """Carry out what pages ask for, and send the results to the sink, until cancelled."""
         async with self._watched.listened(self._changed):
             if not self._is_begun or (self._own is None and self._made is not self._watched.made):
                 await self._begin(self._watched.made)
@@ -429,7 +429,7 @@ class Playground:
 
 
 def _run_of(made: SynthesizedModel, beginning: int) -> tuple[Run | SystemRun, EdgesTaken | None]:
-    """Return a run of a model, and what tells the edges that its events take, of automata."""
+    """Return a run of a model; for automata, also the object that finds the edges which its events take."""
     if not isinstance(made.supervisor, SystemSupervisor):
         return Run(made.supervisor), None
     parts = made.beginnings[beginning].parts

@@ -139,7 +139,7 @@ class Choice:
     Attributes:
         event: The event.
         line: The event with its data, as it was wanted.
-        ways: States that it can lead to, by what tells them apart.
+        ways: States that it can lead to, each by the values in which it differs from the others.
     """
 
     event: str

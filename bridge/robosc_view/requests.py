@@ -79,7 +79,7 @@ class Restart:
     """Begin a run that is stepped by hand again.
 
     Attributes:
-        beginning: Number of the state to begin in, of those that the definition tells; None: the same as before.
+        beginning: Number of the state to begin in, among those that the definition lists; None: the same as before.
     """
 
     beginning: int | None

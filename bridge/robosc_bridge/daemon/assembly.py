@@ -382,7 +382,7 @@ def assemble(
         raise AssemblyError(f"to wait in standby, the bridge needs {needed}")
     limits = safety_limits(configuration)
     safety = SafetyLayer(limits)
-    # Who can be reached can be told to start again.
+    # A bridge with an endpoint can be started again by a call.
     is_layer = deployment is Deployment.LAYER
     job = Job(
         supervisor,

@@ -54,7 +54,7 @@ class LivenessMonitor:
         self._reported: set[str] = set()
 
     def watch(self, endpoint: Endpoint) -> None:
-        """From now on this one, too: who cannot be reached cannot be told to stop."""
+        """Watch this endpoint, too: a robot whose endpoint has ended takes no stop from it."""
         self._endpoints = (*self._endpoints, endpoint)
 
     def are_alive(self) -> bool:

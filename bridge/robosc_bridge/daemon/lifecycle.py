@@ -88,7 +88,7 @@ class Lifecycle:
     def connect(
         self, hurry: Callable[[], None], reset_drive: Callable[[], None], are_alive: Callable[[], bool]
     ) -> None:
-        """Tell how the drive base's thread is told to hurry and to reset its motors, and whether all threads live."""
+        """Set the functions that wake the drive base's thread, reset its motors, and check that all threads live."""
         self._hurry = hurry
         self._reset_drive = reset_drive
         self._are_alive = are_alive
@@ -121,13 +121,13 @@ class Lifecycle:
             self._fault(f"the drive base is lost: {report.problem}")
 
     def safety_changed(self, notice: SafetyNotice) -> None:
-        """Tell a person why nothing moves; what only a person can end ends the run."""
+        """Log the reasons why nothing moves; a reason that only a person can clear ends the run."""
         known, self._latches.notice = self.notice.warnings, notice
         for warning in notice.warnings:
             if warning not in known:
                 _log.warning("%s", warning)
         for reason in notice.reasons:
-            # Before the start, nothing has told anything yet.
+            # Before the start, no device has reported anything yet.
             is_news = self.state is State.RUNNING and reason not in _ORDINARY
             _log.log(logging.WARNING if is_news else logging.DEBUG, "%s", reason)
         latched = self._latches.latched
@@ -197,7 +197,7 @@ class Lifecycle:
         if self.state is State.FAULT:
             return f"the robot is in fault: {self.problem}; reset it first"
         if self._orders.is_halt_coming:
-            return "it was told to stop meanwhile"
+            return "a stop was requested meanwhile"
         if self._orders.is_waiting(Until.RESET):
             return "the motors are being reset"
         latched = self._latches.held(is_stopped=self._switch.is_stopped)
@@ -250,7 +250,7 @@ class Lifecycle:
         self._reset_drive()
 
     def reset_done(self, problem: str) -> None:
-        """The drive base has reset its motors, and told how they are; forget what has latched if nothing is wrong."""
+        """Clear what has latched, if the drive base has reset its motors and reports no problem."""
         if self._orders.is_waiting(Until.RESET):
             problem = problem or self._latches.release()
             if not problem:
@@ -304,7 +304,7 @@ class Lifecycle:
         if self.state is State.RUNNING and not self._are_alive():
             self._fault("a thread of a device or a remote endpoint has ended")
         if self._failed_rotation and self.state is State.RUNNING:
-            self._fault(f"a rotation has failed, and no message of the model tells it so: {self._failed_rotation}")
+            self._fault(f"a rotation has failed, and the model has no message for that: {self._failed_rotation}")
         self._failed_rotation = ""
         executor = self._execution.executor
         if self.state is State.RUNNING and executor is not None and executor.is_faulty:

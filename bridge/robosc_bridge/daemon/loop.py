@@ -148,12 +148,12 @@ class Daemon:
     def connect(
         self, hurry: Callable[[], None], reset_drive: Callable[[], None], are_alive: Callable[[], bool]
     ) -> None:
-        """Tell how the drive base's thread is told to hurry and to reset its motors, and whether all threads live."""
+        """Set the functions that wake the drive base's thread, reset its motors, and check that all threads live."""
         self._hurry = hurry
         self._lifecycle.connect(hurry, reset_drive, are_alive)
 
     def post(self, item: Report | Key | OperatorCommand | Order | FromProgram) -> None:
-        """Tell the loop something; from any thread or signal handler, never waits."""
+        """Put an item into the inbox of the loop; from any thread or signal handler, never waits."""
         if isinstance(item, FromProgram):
             self._from_programs.put(item)
             return

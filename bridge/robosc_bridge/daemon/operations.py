@@ -24,7 +24,7 @@ class Inbox(Protocol):
     """Function that puts an item into the inbox of the loop."""
 
     def __call__(self, item: Order | FromProgram, /) -> None:
-        """Tell it something; never waits."""
+        """Put an item into the inbox; never waits."""
 
 
 class Operations:

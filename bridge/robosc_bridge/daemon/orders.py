@@ -85,7 +85,7 @@ def answer(order: Order, why: str) -> None:
         _log.exception("an answer could not be given")
 
 
-# An operator's stop is no fault; what is wrong with the supervisor is told by itself.
+# An operator's stop is no fault; a fault of the supervisor is reported separately.
 _GRAVE = frozenset(LATCHING) - {Reason.OPERATOR_STOP, Reason.SUPERVISOR_FAULT}
 
 

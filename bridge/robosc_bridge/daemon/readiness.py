@@ -32,7 +32,7 @@ class Readiness:
 
     @property
     def has_torque(self) -> bool:
-        """True if the motors hold, as far as anybody can tell."""
+        """True if the motors have torque, by the last reading of a drive base that works."""
         return self.is_drive_there and self.reading is not None and self.reading.is_torque_on
 
     def device_up(self, device: Device) -> bool:

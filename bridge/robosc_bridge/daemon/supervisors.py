@@ -207,7 +207,10 @@ def _signed(
 
 
 def _require_deployment(supervisor: Supervisor, deployment: Deployment, place: str) -> None:
-    """Without actions both deployments are the same, but for what a layer must be able to tell apart."""
+    """Check that a supervisor fits the deployment.
+
+    Without actions both deployments have the same supervisors, except that a layer must be able to tell messages apart.
+    """
     if supervisor.deployment is deployment:
         return
     model = supervisor.model
@@ -218,7 +221,7 @@ def _require_deployment(supervisor: Supervisor, deployment: Deployment, place: s
     if deployment is Deployment.LAYER:
         for item, other in confusable(model):
             raise NoSupervisorError(
-                f"{place}: made for the deployment controller; as a layer it could not tell whether a message on "
+                f"{place}: made for the deployment controller; as a layer it could not determine whether a message on "
                 f"'{item.identifier}' is '{item.name}' or '{other.name}'"
             )
 

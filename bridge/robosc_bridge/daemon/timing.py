@@ -19,7 +19,7 @@ SHOWN_S = 1.0
 
 MEANINGS = {
     "scan_to_wheel": "from the last byte of a revolution until the bytes of the new velocity that was decided on it "
-    "have been written to the line of the drive base; of a driver that does not tell, until the end of its exchange",
+    "have been written to the line of the drive base; if its driver does not report that, until the exchange ends",
     "scan_to_decision": "from the last byte of a revolution until the supervisor has decided on it",
     "decision_period": "from one decision of the supervisor to the next",
     "queueing": "from the last byte of a reading until the loop takes it up",

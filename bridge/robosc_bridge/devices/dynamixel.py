@@ -141,7 +141,7 @@ class DynamixelBase:
     def open(self) -> None:
         """Find both motors, check that they can be driven, and set them up; wheels at rest, torque off.
 
-        Hardware errors do not keep it from opening: they are told by `exchange`, and `reset` is what they need.
+        Hardware errors do not keep it from opening: `exchange` reports them, and `reset` clears them.
 
         Raises:
             LineError: The line cannot be used.
@@ -219,7 +219,7 @@ class DynamixelBase:
 
         Raises:
             LineError: The line is gone.
-            DeviceSilentError: A motor did not answer, also when asked again; the other one has been told to stop.
+            DeviceSilentError: A motor did not answer, also when asked again; a stop has been sent to the other one.
         """
         pair, bus = self._opened()
         bus.begin(self._exchange_limit_s)
@@ -231,7 +231,7 @@ class DynamixelBase:
             raise
 
     def reset(self) -> None:
-        """Restart the motors that tell of a hardware error; torque is off afterwards.
+        """Restart the motors that report a hardware error; torque is off afterwards.
 
         Raises:
             LineError: The line is gone.

@@ -152,7 +152,7 @@ class DynamixelBus:
         self.stranger = None
 
     def silence_of(self, names: str, verb: str) -> DeviceSilentError:
-        """The error to tell: who does not answer, and who does instead."""
+        """The error for devices that do not answer; it names the device that answers instead."""
         other = "" if self.stranger is None else f", but device {self.stranger} does"
         return DeviceSilentError(f"{names} {verb} not answer{other}")
 

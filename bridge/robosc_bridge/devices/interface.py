@@ -167,7 +167,7 @@ class DriveBase(Protocol):
         """
 
     def reset(self) -> None:
-        """Reboot motors that have switched themselves off, when told to by a person; torque is off afterwards.
+        """Reboot motors that have switched themselves off, at a person's request; torque is off afterwards.
 
         Raises:
             LineError: The line is gone.
@@ -203,7 +203,7 @@ CONSTANT: VelocitySource = _ConstantSource()
 
 @runtime_checkable
 class AttentiveDriveBase(DriveBase, Protocol):
-    """A drive base that commands a newer velocity also during an exchange, and tells when a velocity was written.
+    """A drive base that commands a newer velocity also during an exchange, and reports when a velocity was written.
 
     Of any other drive base, a velocity counts as written when its exchange is over, and a newer one waits for that.
     """
@@ -295,7 +295,7 @@ class RangeScanner(Protocol):
         """Let a `receive` that waits in another thread return at once."""
 
     def restart(self) -> None:
-        """Stop and start a motor that has fallen silent, where the device can be told so."""
+        """Stop and start a motor that has fallen silent, where the device has commands for that."""
 
     def close(self) -> None:
         """Stop the motor, give the line back; never raises, may be called at any time and again."""

@@ -177,7 +177,7 @@ class Lidar[Frame]:
             line.wake()
 
     def restart(self) -> None:
-        """Stop and start a motor that has fallen silent; an LDS-02 cannot be told so, and nothing happens.
+        """Stop and start a motor that has fallen silent; an LDS-02 has no command for that, and nothing happens.
 
         Does not wait: where a pause is due between the two, `receive` sends the start after it.
 

@@ -146,7 +146,7 @@ class VehicleLink:
         return self._lost is not None
 
     def wait(self, is_so: Callable[[VehicleState], bool], limit_s: float) -> bool:
-        """Wait until the vehicle has told something; whether it has, in time.
+        """Wait for a state of the vehicle; returns whether it came in time.
 
         Raises:
             LineLostError: The line is gone.

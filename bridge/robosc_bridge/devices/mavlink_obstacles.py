@@ -110,7 +110,7 @@ class MavlinkObstacles:
             link.wake()
 
     def restart(self) -> None:
-        """Ask the vehicle once more to tell of obstacles.
+        """Ask the vehicle once more to report obstacles.
 
         Raises:
             LineError: The line is gone.
@@ -156,7 +156,7 @@ class MavlinkObstacles:
         return self._after_sensor(obstacle.content, obstacle.time_s)
 
     def _after_sensor(self, content: SectorDistance, time_s: float) -> Scan | None:
-        """A round of them is complete when the first one tells again."""
+        """Return a scan when a round of the sensors is complete: when its first sensor reports again."""
         sector = sensor_sector(content)
         if sector is None or time_s - self._ring_s <= STALE_AFTER_S:
             return None
@@ -177,7 +177,7 @@ class MavlinkObstacles:
             tuple(sector.range_m for sector in sectors),
             (math.nan,) * len(sectors),
         )
-        # Nothing rotates that it could tell the speed of.
+        # Fixed sensors have no rotation whose speed could be given: it is NaN.
         min_m = min(sector.min_m for sector in sectors)
         max_m = max(sector.max_m for sector in sectors)
         return Scan(time_s, nearest_in_sectors(sectors), raw, math.nan, min_m, max_m)

@@ -67,7 +67,8 @@ _REST_LIMIT_S = 1.0
 _TORQUE_LIMIT_S = 1.0
 _REFRESHED_MS = 45  # Two refreshes, every 20 ms, of what the board knows of its motors.
 _POLL_S = 0.01
-# Differences between the board's time and the computer's, from one reading to the next, that a restart is told from.
+# Differences between the board's time and the computer's, from one reading to the next, beyond which the board counts
+# as restarted.
 _LEAD_S = 0.7
 _LAG_S = 1.0
 
@@ -429,7 +430,7 @@ class OpenCrBase:
         self._await_refresh()
 
     def _await_refresh(self) -> None:
-        # After a calibration, which another program may have begun, the board first tells an uptime from before it.
+        # After a calibration, which another program may have begun, the board first reports an uptime from before it.
         self._host.sleep(_REFRESHED_MS / 1000)
 
     def _comes_to_rest(self) -> bool:
@@ -454,7 +455,7 @@ class OpenCrBase:
         while True:
             self._host.sleep(_POLL_S)
             block = self._cycle(STANDSTILL)
-            # Before, the board tells what was written or how it was, and not what the motors do.
+            # Before a refresh, the board reports what was written or an earlier state, and not what the motors do.
             is_refreshed = (block.uptime_ms - begin_ms) % UPTIME_MODULUS >= _REFRESHED_MS
             if is_refreshed and is_done(block):
                 return True

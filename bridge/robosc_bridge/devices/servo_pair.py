@@ -24,7 +24,7 @@ _REST_RAW = 2
 _REST_LIMIT_S = 1.0
 _REBOOT_LIMIT_S = 2.0
 _POLL_S = 0.01
-# What a servo's LED tells a person, and us: the bridge has it, and it has not restarted since.
+# Value of a servo's LED, on since the bridge has opened it: a servo that has restarted since has it off.
 _OURS = b"\1"
 
 
@@ -152,7 +152,7 @@ class ServoPair:
             raise
 
     def switch_leds_off(self) -> None:
-        """Switch off what tells a person that the bridge has them."""
+        """Switch off the LEDs, which show a person that the bridge has the motors."""
         self._bus.sync_write(servo.LED, dict.fromkeys(self.motors, b"\0"))
 
     def halt(self) -> None:
@@ -224,7 +224,7 @@ class ServoPair:
         return self.hardware[motor]
 
     def restart_faulty(self) -> tuple[bool, bool]:
-        """Restart those that tell of a hardware error.
+        """Restart the motors that report a hardware error.
 
         Returns:
             Whether the left and the right one were.

@@ -50,10 +50,10 @@ BridgeServiceServicer = bridge_pb2_grpc.BridgeServiceServicer
 add_service = bridge_pb2_grpc.add_BridgeServiceServicer_to_server
 
 MAXIMUM_SUPERVISOR_BYTES = 8 * 2**20
-"""A larger supervisor is not told: a watcher takes 16 MiB in a message, and has to do without reasons then."""
+"""Size above which a supervisor is not sent: watchers take messages of 16 MiB, and do without reasons then."""
 
 MAXIMUM_TEXT = 1000
-"""Characters of a name, identifier, id or reason in what a program tells."""
+"""Most characters of a name, identifier, id or reason that a program sends."""
 
 _KINDS = {kind: f"COMMUNICATION_KIND_{kind.name}" for kind in CommunicationKind}
 _STATES = {state: f"BRIDGE_STATE_{state.name}" for state in State}
@@ -255,7 +255,7 @@ def program_of(hello: pb.Hello, name: str, send: Callable[[programs.ToProgram], 
     Args:
         hello: Message in which it says who it is.
         name: Name for the log.
-        send: Function that tells it something.
+        send: Function that sends an item to the program.
         operations: The daemon.
 
     Raises:
@@ -278,7 +278,7 @@ def program_of(hello: pb.Hello, name: str, send: Callable[[programs.ToProgram], 
 
 
 def item_of(request: pb.AttachRequest, program: programs.Program) -> programs.FromProgram | None:
-    """Return the item that a program tells the loop; None: only that it is there.
+    """Return the item that a program sends to the loop; None: only a sign of life.
 
     Raises:
         RequestError: It makes no sense.
@@ -336,7 +336,7 @@ def refused(why: str) -> pb.AttachResponse:
 
 
 def response_of(item: programs.ToProgram) -> pb.AttachResponse:
-    """Return the response for an item that the loop tells a program."""
+    """Return the response for an item that the loop sends to a program."""
     match item:
         case programs.MessageSent(name, identifier, data):
             message = pb.ModelMessage(name=name, identifier=text_of(identifier), data=value_of(data))

@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
-# gRPC's own log would tell once more, in its words, what we tell; it is read at its import.
+# The log of gRPC would repeat in other words what the bridge reports; gRPC reads this variable when it is imported.
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 import grpc.aio
@@ -56,7 +56,7 @@ _LOOK_S = 1.0
 
 
 class RemoteError(BridgeError):
-    """The remote endpoint cannot listen as it is told to."""
+    """The remote endpoint cannot listen at its address, or with its certificates."""
 
 
 @dataclass(frozen=True, slots=True)

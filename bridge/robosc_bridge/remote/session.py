@@ -94,7 +94,7 @@ class ProgramSession:
                 task.result()
         finally:
             self._is_over = True
-            # Told before anything is awaited: whatever becomes of this task, the loop knows.
+            # Posted before anything is awaited, so that the loop learns of it even if this task is cancelled.
             self._operations.post(Detached(self._program))
             _log.info("%s is gone", self._program.name)
             for task in tasks:

@@ -56,7 +56,7 @@ class ScanCoverageMonitor:
 
     def __init__(self, min_share: float) -> None:
         self._min_share = min_share
-        # Without any scan, nobody can tell that a part of it is missing.
+        # Without any scan, it is not known that a part of the view is missing.
         self._is_blind_ahead = self._is_blind_behind = False
 
     def update(self, ranges_m: Sequence[float]) -> None:

@@ -1,4 +1,4 @@
-"""Finds a line on the floor in pictures of a camera, and tells how to steer along it. Needs OpenCV and numpy."""
+"""Finds a line on the floor in pictures of a camera, and computes how to steer along it. Needs OpenCV and numpy."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -52,7 +52,7 @@ class LineDetector:
             return LOST if aside is None else Line(self._correction_rad_s(aside))
         if time_s - self._seen_s < self._settings.timeout_s:
             return None
-        # Told again after as long: a model that starts anew learns of it.
+        # Reported again after each timeout, so that a model that starts anew learns of the lost line.
         self._seen_s = time_s
         return LOST
 

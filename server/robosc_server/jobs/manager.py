@@ -44,7 +44,7 @@ class Caller:
     """Caller of the server.
 
     Attributes:
-        name: Name that tells callers apart.
+        name: Name that distinguishes callers.
         is_admin: True if the caller may see and cancel the jobs of all callers.
     """
 

@@ -36,7 +36,7 @@ _RESULT, _CANCELLED = "RESULT", "CANCELLED"
 """Outcomes of tasks, beside the reasons of failures."""
 
 _COLLECT_S = 4.0
-"""Time for the event loop to tell the metrics, in seconds: less than a connection has."""
+"""Time limit for the event loop to collect the metrics, in seconds: less than that of a connection."""
 
 
 class MethodMetrics:
@@ -265,7 +265,7 @@ class _LabelledCollector:
     def collect(self) -> Iterable[Metric]:
         return self._metrics.labelled_metrics()
 
-    # By the names that this tells, a scraper can ask for a part of the metrics.
+    # The names that this returns let a scraper ask for a part of the metrics.
     describe = collect
 
 

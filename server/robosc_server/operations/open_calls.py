@@ -44,7 +44,7 @@ class OpenCalls(Layer):
         limits: Limits, health checks aside.
         identify: Function that returns the caller behind the call of a context.
         health: Limits of health checks.
-        arrivals: Layer that is told of which connection each open call is; None: none.
+        arrivals: Layer to which the connection of each open call is reported; None: none.
     """
 
     def __init__(

@@ -215,7 +215,7 @@ class DaskWorkers:
                 async with asyncio.timeout(_CANCEL_S):
                     if future.done():
                         future.release()
-                    else:  # This tells the worker to stop.
+                    else:  # A cancelled future stops its worker.
                         await future.cancel()
                     await asyncio.gather(*works, return_exceptions=True)
 

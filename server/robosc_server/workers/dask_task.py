@@ -25,7 +25,7 @@ BEGUN = "begun"
 REPORTS = "reports"
 CPU_TIME = "spent"
 
-_TELL_EVERY_ASKS = 5  # A tenth of a second.
+_REPORT_EVERY_ASKS = 5  # A tenth of a second.
 _KEPT_REPORTS = 16
 _UNDER_WAY = ("executing", "long-running")
 
@@ -75,7 +75,7 @@ def run_on_cluster(
     def is_abandoned() -> bool:
         nonlocal asks
         asks += 1
-        if asks % _TELL_EVERY_ASKS == 0 and kept:
+        if asks % _REPORT_EVERY_ASKS == 0 and kept:
             reports = [kept.popleft() for _ in range(len(kept))]
             sent = [[report.stage, report.message] for report in reports]
             worker.log_event(topic, {"is": REPORTS, "task": name, "reports": sent})

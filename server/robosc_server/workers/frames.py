@@ -149,7 +149,7 @@ class AnswerReader:
             case Tag.REPORT:
                 self._reports += 1
                 if self._reports > REPORTS_BURST + REPORTS_PER_SECOND * (self._clock() - self._begun_s):
-                    raise FrameError(f"{self._reports} reports, which is more than a task has to tell")
+                    raise FrameError(f"{self._reports} reports, which is more than a task may send")
                 if length > _REPORT_BYTES:
                     raise FrameError(f"a report of {length} bytes")
             case Tag.FAILURE:
@@ -189,7 +189,7 @@ def _failure(values: dict[str, Any]) -> Failure:
     except ValueError:
         raise FrameError("a failure of no known reason") from None
     if reason not in _WORKER_REASONS:
-        raise FrameError(f"a failure whose reason {reason} is not for workers to tell")
+        raise FrameError(f"a failure whose reason {reason} workers may not report")
     return Failure(reason, _text(values, "message", _TEXT_LIMIT), _text(values, "details", _DETAILS_LIMIT))
 
 

@@ -186,7 +186,7 @@ def check(configuration: Configuration, mapping: ChannelMapping) -> None:
 
 
 def test_a_line_that_nobody_tells_is_lost_is_refused() -> None:
-    with pytest.raises(AssemblyError, match=r"'correction' \('/line'\) is mapped to 'line', and nothing tells when"):
+    with pytest.raises(AssemblyError, match=r"'correction' \('/line'\) is mapped to 'line', and no message reports a"):
         check(*mapped(lost="{channel: none}"))
     check(*mapped("execution: {max_age_s: {/line: 0.5}}\n", lost="{channel: none}"))
     check(*mapped())

@@ -414,7 +414,7 @@ def test_a_model_without_a_supervisor_and_one_with_errors(tmp_path: Path, capsys
     [
         (["--log", "run.jsonl", "--model", "tank.cif"], "--log: event logs are of robots, not of automata"),
         (["--ros2", "--model", "tank.gen"], "--ros2: a node is generated from a model of a robot"),
-        (["--bridge", "127.0.0.1:1", "--model", "tank.cif"], "a bridge tells its model itself"),
+        (["--bridge", "127.0.0.1:1", "--model", "tank.cif"], "a bridge sends its model itself"),
         (["tank.wmod", "--scene", "room"], "--scene: automata are nowhere"),
         (["tank.cif", "-L", "."], "-L: automata import no libraries"),
         (["tank.cif", "--deployment", "layer"], "--deployment: automata are not a node"),

@@ -92,7 +92,7 @@ def test_wrong_use(files: tuple[Path, Path], tmp_path: Path) -> None:
 
     assert "what is shown?" in why()
     assert "needs --model" in why("--log", log)
-    assert "tells its model itself" in why("--bridge", "127.0.0.1:1", "--model", model)
+    assert "sends its model itself" in why("--bridge", "127.0.0.1:1", "--model", model)
     assert "--ros2" in why("--bridge", "127.0.0.1:1", "--namespace", "x")
     assert "cannot read" in why("--log", str(tmp_path / "none"), "--model", model)
     assert "there is no file" in why("--log", log, "--model", str(tmp_path / "none.rscd"))

@@ -148,7 +148,7 @@ class ProgramChannel:
                 executor.on_call_failed(item.number, why)
 
     def receive(self, item: MessageReceived, executor: Supervised | None) -> None:
-        """A program tells the model something; while nothing is executed, nobody listens."""
+        """Pass a program's message to the model; it is dropped while nothing is executed."""
         if item.identifier not in self._heard:
             self._clients.refuse(item.program, f"the model hears nothing on '{item.identifier:.255}' from programs")
         elif executor is not None:

@@ -85,7 +85,7 @@ class ProgramInbox:
         self._waiting: dict[Program, _Waiting] = {}
 
     def put(self, item: FromProgram) -> None:
-        """Tell the loop something; waits for nobody but another `put` or `take`."""
+        """Put an item of a program into the inbox; waits for nothing but another `put` or `take`."""
         # Here and not in the loop: looking through data takes time.
         is_always_taken = isinstance(item, Attached | Detached)
         arrived, weight = (item, 0) if is_always_taken else self._looked_through(item)

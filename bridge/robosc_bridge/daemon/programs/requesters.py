@@ -94,7 +94,7 @@ class Requesters:
         self._goals.clear()
 
     def detach(self, program: Program, layer: Layer | None) -> None:
-        """A program is gone: what it asked for ends, and it is told nothing of that."""
+        """End what a program that is gone has asked for, without an answer to it."""
         if layer is not None:
             self._end(program, layer, _GONE)
         self._calls = {item: name for item, name in self._calls.items() if item[0] is not program}
@@ -182,7 +182,7 @@ class Requesters:
                 return "" if is_own else f"'{goal_id:.255}' is not a goal of '{action:.255}' in progress"
         return ""
 
-    # What the layer tells.
+    # Reports of the layer.
 
     def pass_on(self, identifier: str, message: Any) -> None:
         """A message of the robot, after the supervisor has seen it."""

@@ -183,7 +183,7 @@ class RobotAdapter:
     # The devices' side.
 
     def on_drive_reading(self, reading: DriveReading, executor: Supervised) -> None:
-        """The drive base told something: buttons first, then where the robot is."""
+        """Pass on a reading of the drive base: the buttons first, then the position."""
         self._motion.on_drive_reading(reading)
         self._saw_buttons(reading.buttons, executor)
         for identifier, _ in self._listeners.of(channels.OdometryChannel):
@@ -197,7 +197,7 @@ class RobotAdapter:
     def watch_buttons(self, buttons: Mapping[str, bool]) -> None:
         """Handle the operator's buttons while no supervisor is executed."""
         self._switch.on_buttons([name for name, is_held in buttons.items() if is_held], None)
-        # What was pressed meanwhile is no event for the next run, but bumpers are told at its start.
+        # Buttons pressed meanwhile are no events of the next run, but the state of bumpers is sent at its start.
         self._buttons = {}
 
     def on_scan(self, scan: Scan, executor: Supervised) -> None:
@@ -231,14 +231,14 @@ class RobotAdapter:
         self.deliver_pending(executor)
 
     def deliver_pending(self, executor: Supervised) -> None:
-        """Tell the executor what has become of its requests."""
+        """Report the outcomes of its requests to the executor."""
         self._rotations.poll()
         while self._pending:
             self._pending.popleft()(executor)
             self._rotations.poll()
 
     def report_rotation(self, executor: Supervised) -> None:
-        """Tell how far a rotation is that an action asked for."""
+        """Send the feedback of the rotation under way, if an action asked for it."""
         self._rotations.report(executor)
 
     def _saw_buttons(self, buttons: Mapping[str, bool], executor: Supervised) -> None:

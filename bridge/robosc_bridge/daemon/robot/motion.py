@@ -65,7 +65,7 @@ class MotionTarget:
             self._pass(self._wish, now_s)
 
     def on_drive_reading(self, reading: DriveReading) -> None:
-        """The drive base told where it is: a rotation goes on."""
+        """Go on with a rotation from a new reading of the drive base."""
         if self._rotate.is_rotating:
             self._pass(self._rotate.update(reading.pose.heading_rad, reading.time_s), reading.time_s)
 

@@ -67,7 +67,7 @@ class Rotations:
         return None if self._rotation is None else self._rotation.asked.name
 
     def forget(self) -> None:
-        """A new run: who asked for a rotation in an earlier one is not told."""
+        """Forget the rotation under way, for a new run: its end is not reported to the run that asked for it."""
         self._rotation = None
 
     def begin(self, asked: Communication, channel: RotateChannel, number: int | None, message: Any) -> None:
@@ -101,7 +101,7 @@ class Rotations:
             self._owe(lambda executor: executor.on_goal_ended(number, "cancelled"))
 
     def poll(self, *, is_own: bool = False) -> None:
-        """Check whether a rotation has ended; if so, whoever asked for it is told later."""
+        """Check whether a rotation has ended; if so, its end is reported later to whoever asked for it."""
         rotation = self._rotation
         if rotation is not None and self._motion.is_rotating and self._clock() >= rotation.end_s:
             self._motion.stop(self._clock(), "the rotation takes longer than a call may")
@@ -131,7 +131,7 @@ class Rotations:
             self._on_failed(reason)
 
     def report(self, executor: Supervised) -> None:
-        """Tell how far a rotation is that an action asked for."""
+        """Send the feedback of the rotation under way, if an action asked for it."""
         rotation = self._rotation
         if rotation is not None and rotation.number is not None and rotation.asked.kind is CommunicationKind.ACTION:
             left = self._motion.remaining_rad * (1.0 if rotation.channel.direction == "left" else -1.0)

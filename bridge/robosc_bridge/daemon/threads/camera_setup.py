@@ -27,10 +27,10 @@ def camera_problems(line: LineSettings, mapping: ChannelMapping, settings: Setti
     """Return the problems with how the line is to be seen; nobody may follow a line whose loss nobody reports."""
     found = []
     if needs_camera(mapping) and line.camera == "simulated":
-        found.append("skills.line.camera: tell where the simulator serves its pictures, as simulated:PATH")
+        found.append("skills.line.camera: write where the simulator serves its pictures, as simulated:PATH")
     if not mapping.mapped_to(LineLostChannel):
         found += [
-            f"'{item.name}' ('{item.identifier}') is mapped to 'line', and nothing tells when the line is lost: map a "
+            f"'{item.name}' ('{item.identifier}') is mapped to 'line', and no message reports a lost line: map a "
             f"message to 'line_lost', or set execution.max_age_s for '{item.identifier}'"
             for item, _ in mapping.mapped_to(LineChannel)
             if item.max_age is None and item.identifier not in settings.max_age_s

@@ -90,7 +90,7 @@ class CameraWorker:
         return now_s
 
     def _watch(self, picture: GreyRows | None) -> None:
-        """Tell what a picture shows, or that none has come for too long."""
+        """Report the line that a picture shows, or that no picture has come for too long."""
         now_s = self._clock()
         line = self._detector.update(picture, now_s)
         if line is None:

@@ -5,7 +5,7 @@ from robosc_bridge.host import Host
 
 
 class DeviceThread:
-    """Thread that takes a worker's steps when they are due, or at once when told to hurry.
+    """Thread that takes a worker's steps when they are due, or at once after `hurry`.
 
     Args:
         worker: Worker whose steps are taken.

@@ -86,7 +86,7 @@ class SafetyGate(Protocol):
         """Return the command for the drive base now."""
 
     def on_drive_reading(self, reading: DriveReading) -> None:
-        """The drive base told something."""
+        """Handle a reading of the drive base."""
 
     def drive_failed(self) -> None:
         """The drive base did not answer."""

@@ -89,7 +89,7 @@ _THREAD_LIMIT_S = 10.0
 
 
 class AssemblyError(BridgeError):
-    """A configuration asks for something that cannot be made; the message says what."""
+    """A configuration asks for a part that cannot be made; the message names it."""
 
 
 def safety_limits(configuration: Configuration) -> SafetyLimits:

@@ -169,7 +169,7 @@ class Daemon:
             self._drain()
 
     def run(self) -> None:
-        """Run cycles until somebody wants it to end."""
+        """Run cycles until an order, a signal or a fault ends the loop."""
         try:
             while self.state is not State.OVER:
                 try:
@@ -201,7 +201,7 @@ class Daemon:
             _refuse(item)
 
     def cycle(self, *items: Item) -> None:
-        """Handle what has come, and decide if it is time."""
+        """Handle the items of the inbox, and let the supervisor decide if a decision is due."""
         self._in_hand = items
         self._safety.loop_cycled(self._clock.monotonic())
         self._in_hand = ()

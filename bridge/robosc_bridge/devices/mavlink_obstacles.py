@@ -33,7 +33,7 @@ _INTERVAL_S = 0.1
 
 
 class MavlinkObstacles:
-    """A `RangeScanner`. It may share its line with a `MavlinkRover` of the same settings.
+    """`RangeScanner` that may share its line with a `MavlinkRover` of the same settings.
 
     Args:
         path: Path as of `MavlinkRover`.
@@ -70,7 +70,7 @@ class MavlinkObstacles:
         self._reported: set[int] = set()
 
     def open(self) -> None:
-        """Open the line, unless a drive base has it open already; waits for nothing.
+        """Open the line, unless a drive base has opened it already; waits for nothing.
 
         Raises:
             LineError: The line cannot be used.
@@ -119,7 +119,7 @@ class MavlinkObstacles:
         self._is_requested = False
 
     def close(self) -> None:
-        """Give the line back; never raises, may be called at any time and again."""
+        """Close the line; never raises, may be called at any time and again."""
         link, self._link = self._link, None
         if link is not None:
             release(link, as_driver=False)

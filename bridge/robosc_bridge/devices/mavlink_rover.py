@@ -179,7 +179,7 @@ class MavlinkRover:
             LineError: The line cannot be used.
             DeviceSilentError: No vehicle is heard.
             WrongDeviceError: It is no ArduPilot Rover.
-            DeviceFaultError: Somebody else drives it, or it does not know where it is, or does not disarm.
+            DeviceFaultError: Somebody else drives it, or it does not know its position, or does not disarm.
         """
         self.close()
         self._link = acquire(self._settings, as_driver=True, host=self._host)
@@ -205,7 +205,7 @@ class MavlinkRover:
             raise
 
     def set_torque(self, is_on: bool) -> None:
-        """Enter GUIDED and arm; or stop and disarm. A vehicle that somebody else has taken over is left to them.
+        """Enter GUIDED and arm; or stop and disarm. A vehicle that somebody else has taken over is left alone.
 
         Raises:
             LineError: The line is gone.
@@ -277,7 +277,7 @@ class MavlinkRover:
         return self._reading(state, report, is_obeying)
 
     def reset(self) -> None:
-        """See whether the vehicle arms in GUIDED again, and disarm it.
+        """Check whether the vehicle can be armed in GUIDED again, and disarm it.
 
         Raises:
             LineError: The line is gone.
@@ -288,7 +288,7 @@ class MavlinkRover:
         self.set_torque(False)
 
     def close(self) -> None:
-        """Stop, disarm, and give the line back; a vehicle that somebody else drives is left to them."""
+        """Stop, disarm, and close the line; a vehicle that somebody else drives is left alone."""
         if self._link is not None and self._is_torque_wanted:
             self._is_torque_wanted = False
             with contextlib.suppress(BridgeError):

@@ -139,7 +139,7 @@ class OpenCrBase:
         return BusCounters() if bus is None else bus.counters
 
     def attend(self, source: VelocitySource) -> None:
-        """Command what this source has that is newer, also during an exchange."""
+        """Command newer velocities of this source from now on, also during an exchange."""
         self._source = source
 
     def wake(self) -> None:
@@ -149,7 +149,7 @@ class OpenCrBase:
             line.wake()
 
     def open(self) -> None:
-        """Find the board and check that it is the one that is meant; wheels at rest, torque off.
+        """Find the board and check that it is the expected one; wheels at rest, torque off.
 
         Raises:
             LineError: The line cannot be used.
@@ -231,7 +231,7 @@ class OpenCrBase:
         )
 
     def set_torque(self, is_on: bool) -> None:
-        """Torque on from a standstill, or off after a stop.
+        """Switch torque on, from a standstill; or switch it off, after a stop.
 
         Raises:
             LineError: The line is gone.
@@ -343,7 +343,7 @@ class OpenCrBase:
                 )
 
     def reset(self) -> None:
-        """See whether both motors hold again; the board cannot restart them.
+        """Check whether both motors hold again; the board cannot restart them.
 
         Raises:
             LineError: The line is gone.
@@ -354,7 +354,7 @@ class OpenCrBase:
         self.set_torque(False)
 
     def close(self) -> None:
-        """Stop, torque off, and give the line back."""
+        """Stop the wheels, switch torque off, and close the line."""
         if self._bus is not None and self._is_slow:
             self._is_torque_wanted = False
             with contextlib.suppress(BridgeError):

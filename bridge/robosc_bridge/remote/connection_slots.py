@@ -12,7 +12,7 @@ _ESTABLISHED = "01"
 
 
 class ConnectionSlots:
-    """Watch that reports once that all places are taken, and again only after half of them were free.
+    """Monitor that logs once that all connections are taken, and again only after half of them were free.
 
     Args:
         port: Port on which callers come.

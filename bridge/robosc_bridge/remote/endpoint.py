@@ -61,12 +61,12 @@ class RemoteError(BridgeError):
 
 @dataclass(frozen=True, slots=True)
 class RemoteSettings:
-    """Settings for listening of the endpoint.
+    """Settings of the endpoint.
 
     Attributes:
         address: `HOST:PORT`; port 0 picks a free one.
         security: Certificates and tokens.
-        operator_timeout_s: Time without the operator after which the robot stops, in seconds; None: it needs none.
+        operator_timeout_s: Time without the operator after which the robot stops, in seconds; None: none is needed.
     """
 
     address: str
@@ -75,7 +75,7 @@ class RemoteSettings:
 
 
 def settings_of(configuration: Configuration) -> RemoteSettings | None:
-    """Return the settings of a configuration; None: there is to be no such endpoint."""
+    """Return the settings of a configuration; None: it has no remote endpoint."""
     remote = configuration.remote
     if remote.grpc_address is None:
         return None
@@ -110,7 +110,7 @@ class RemoteEndpoint(ServedEndpoint):
         """Listen.
 
         Raises:
-            RemoteError: It cannot.
+            RemoteError: The endpoint cannot listen.
         """
         super().start()
         _log.info("the remote endpoint listens on %s", self.address)
@@ -180,7 +180,7 @@ def serve(operations: Operations, settings: RemoteSettings) -> RemoteEndpoint:
         settings: Settings for listening.
 
     Raises:
-        RemoteError: It cannot.
+        RemoteError: The endpoint cannot listen.
     """
     endpoint = RemoteEndpoint(operations, settings)
     endpoint.start()

@@ -28,7 +28,7 @@ LOST = Line(None)
 
 
 class LineDetector:
-    """Detector that rotates pictures into corrections, and silence of the camera into a lost line.
+    """Detector that computes a correction from each picture, and reports the line as lost if no pictures come.
 
     Args:
         settings: Settings of what counts as a line, and how to steer.
@@ -40,7 +40,7 @@ class LineDetector:
         self._seen_s = time_s
 
     def update(self, picture: Picture | None, time_s: float) -> Line | None:
-        """Return the line that the model is given now; None: nothing new.
+        """Return the line that the model receives now; None: nothing new.
 
         Args:
             picture: Picture that came since the last call; None: there was none.

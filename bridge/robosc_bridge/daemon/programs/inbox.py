@@ -119,7 +119,7 @@ class ProgramInbox:
         return not self._waiting
 
     def take(self) -> Arrived | None:
-        """The next of what waits, one of each program in turn; None: nothing does."""
+        """Return the next item, one of each program in turn; None: no item waits."""
         with self._lock:
             if not self._waiting:
                 return None

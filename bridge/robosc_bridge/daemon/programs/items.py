@@ -50,7 +50,7 @@ class CallMade(_Weighed):
 
 @dataclass(frozen=True)
 class GoalMade(_Weighed):
-    """The model asks for an action that this program serves; `GoalAccepted`, then a `GoalEnded` are awaited."""
+    """The model sends a goal of an action that this program serves; `GoalAccepted`, then `GoalEnded` are awaited."""
 
     name: str
     number: int

@@ -72,7 +72,7 @@ class RequestChecker:
         """Return an item of a program as the layer receives it: data that is left out is zero, false or empty.
 
         Raises:
-            InvalidRequestError: The item asks for something that makes no sense, whatever the layer does.
+            InvalidRequestError: The item is an invalid request, whatever the state of the layer.
         """
         if not isinstance(item, ProgramRequest):
             return item

@@ -32,8 +32,8 @@ class Rotations:
 
     Args:
         motion: Motion of the wheels.
-        listeners: Identifiers that receive the end of a cycle that a message asked for.
-        owe: Function that takes reports to the executor, for the time when it is not at work.
+        listeners: Identifiers that receive the end of a rotation that a message asked for.
+        owe: Function that takes a report, which reaches the executor when it is not at work.
         on_failed: Function that is called with the reason of a failed rotation, if the model gets no message of it.
         service_timeout_s: Time after which a call fails for the executor, in seconds; None: never.
         clock: Clock that returns the time, in seconds.
@@ -58,7 +58,7 @@ class Rotations:
 
     @property
     def is_under_way(self) -> bool:
-        """True if somebody waits for the end of a cycle."""
+        """True if a rotation is under way whose end must be reported."""
         return self._rotation is not None
 
     @property
@@ -87,7 +87,7 @@ class Rotations:
         self._motion.rotate(math.radians(angle) if channel.unit == "degrees" else angle, self._clock())
 
     def end(self, reason: str, *, is_own: bool = False) -> None:
-        """End a rotation that is under way: it has failed; `is_own`: because the model asked for another motion."""
+        """End the rotation under way as failed; `is_own`: because the model asked for another motion."""
         if self._rotation is not None:
             self._motion.stop(self._clock(), reason)
             self.poll(is_own=is_own)
@@ -141,5 +141,5 @@ class Rotations:
 
 
 def service_response(reason: str) -> dict[str, Any]:
-    """The answer of the bridge's own services and actions: whether it is done, or why not."""
+    """Return the answer of the bridge's own services and actions: done, or the reason why not."""
     return {"success": not reason, "message": reason}

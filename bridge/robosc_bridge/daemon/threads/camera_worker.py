@@ -58,7 +58,7 @@ class CameraWorker:
         self._silent_end_s = 0.0
 
     def step(self, now_s: float) -> float:
-        """Open it, or wait for a picture."""
+        """Open the camera, or wait for a picture."""
         try:
             if self._is_open:
                 return self._look()
@@ -117,7 +117,7 @@ class CameraWorker:
         """Do nothing: no step waits for long."""
 
     def close(self) -> None:
-        """Give the camera back."""
+        """Close the camera."""
         try:
             self._camera.close()
         except Exception:

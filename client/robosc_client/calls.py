@@ -66,7 +66,7 @@ class Operation[Result]:
         reader: Function that makes the reader of a response; each attempt needs a new one.
         is_stream: True if the answer is a stream of messages.
         is_about_jobs: True if the method is of the service for jobs.
-        deadline_s: Seconds for all attempts together; None: any number.
+        deadline_s: Time limit for all attempts together, in seconds; None: no limit.
         on_progress: Callback that receives the progress.
     """
 
@@ -186,7 +186,7 @@ class JobPages:
         )
 
     def take(self, page: tuple[tuple[Job, ...], str]) -> tuple[Job, ...]:
-        """The jobs of a page.
+        """Return the jobs of a page.
 
         Raises:
             ServiceError: The list does not end.
@@ -223,10 +223,10 @@ class JobWatch:
         return Operation("WatchJob", request, lambda: UnaryReader(self.take), is_stream=True, is_about_jobs=True)
 
     def take(self, message: jobs_pb2.WatchJobResponse) -> Job:
-        """The job as it is now.
+        """Return the present state of the job.
 
         Raises:
-            ServiceError: It is another job, or nothing has changed.
+            ServiceError: The message is about another job, or about no change.
         """
         job = job_reader(self._job_id)(message)
         # The server sends a job that has ended even if nothing has changed.

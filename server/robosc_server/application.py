@@ -103,7 +103,7 @@ async def running_server(settings: Settings, workers: Workers | None = None) -> 
         workers: Workers that run the tasks, not started yet; None: as configured.
 
     Raises:
-        StartError: It cannot start as configured.
+        StartError: The server cannot start with these settings.
     """
     try:
         async with AsyncExitStack() as stack:

@@ -39,12 +39,12 @@ _CODES = {
 
 
 class RefusedError(Exception):
-    """A call that ends without an answer.
+    """Failure of a call that is answered by an error.
 
     Attributes:
-        reason: Reason why there is no answer.
+        reason: Reason of the failure.
         message: One sentence for the caller.
-        retry_after_s: Seconds after which it may be worth another try; None: it is not.
+        retry_after_s: Seconds after which another attempt may succeed; None: none will.
     """
 
     def __init__(self, reason: Reason, message: str, retry_after_s: float | None = None) -> None:

@@ -44,17 +44,17 @@ class ResultProvider(Protocol):
     """Provider of the results of accepted tasks."""
 
     def cached(self, key: str, caller: str) -> Result | None:
-        """The result of an equal task, if it is in memory.
+        """Return the result of an equal task, if it is in memory.
 
         Raises:
-            RefusedError: The caller has asked for too much.
+            RefusedError: The quota of the caller is used up.
         """
 
     async def result(self, task: Task, caller: str, on_report: OnReport) -> Result:
-        """The result: one that is kept, or what a worker makes; cancelling this ends the work.
+        """Return the result: a stored one, or that of a worker; cancelling this ends the work.
 
         Raises:
-            RefusedError: There is none.
+            RefusedError: There is no result.
         """
 
 
@@ -62,7 +62,7 @@ class SynthesisService:
     """Implementation of the service, which answers its calls.
 
     Args:
-        provider: ResultProvider that has tasks done.
+        provider: Provider of the results of tasks.
         sender: Sender of results.
         limits: Limits of a request.
         targets: The answer of ListTargets, serialized.

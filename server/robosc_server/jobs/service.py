@@ -44,7 +44,7 @@ class JobService(convert.JobServiceServicer):
     """Service that submits, reports on and cancels jobs.
 
     Args:
-        manager: Manager that has the jobs.
+        manager: Manager of the jobs.
         accept: Function that checks a request and returns its task, or raises RefusedError.
         identify: Function that returns the caller.
         admit: Function that counts a requested job for a caller's name, or raises RefusedError.

@@ -1,4 +1,4 @@
-"""Check of whether a server could start with given settings: everything that can be known without starting it.
+"""Check whether a server could start with given settings: everything that can be checked without starting it.
 
 Nothing is made or changed. Anything that another process holds now, such as the server that runs with the same
 settings, is a warning.
@@ -77,7 +77,7 @@ class Finding:
 
 
 def check_settings(settings: Settings) -> tuple[Finding, ...]:
-    """Return the findings about every part of the settings, in the order in which a server comes to them."""
+    """Return the findings about every part of the settings, in the order in which a server uses them."""
     parts: dict[str, Callable[[Settings], Iterator[tuple[Grade, str]]]] = {
         "listening": _listening,
         "certificates": _certificates,

@@ -67,7 +67,7 @@ class CallInterceptor(Layer):
         )
 
     def handler(self, inner: Any, details: Any) -> Any:
-        """The handler of a call, with everything around it."""
+        """Return the handler of a call inside this layer."""
         # The handler runs in the same task, and so sees what is set here.
         REQUEST_ID.set(request_id_of(details.invocation_metadata))
         if inner is None:
@@ -75,7 +75,7 @@ class CallInterceptor(Layer):
         return super().handler(inner, details)
 
     def wrap(self, inner: Any, method: str) -> Any:
-        """A handler with everything around it."""
+        """Return a handler inside this layer."""
         answer = behaviour_of(inner)
         if inner.response_streaming:
             answer = writing(answer)

@@ -98,14 +98,14 @@ class _CallSlots:
         self.taken = 0
 
     def take(self, caller: str, context: Any) -> None:
-        """Take one, until the call is over.
+        """Take a slot until the end of the call.
 
         Args:
             caller: Name of its caller.
             context: Context of the call.
 
         Raises:
-            RefusedError: There is none for this caller; none is taken.
+            RefusedError: There is no slot for this caller; none is taken.
         """
         count = self._by_caller.get(caller, 0)
         entry = ENTRY.get()

@@ -1,6 +1,7 @@
 """Migration of a database to the schema version of this server, by Alembic.
 
-The whole way is one transaction, on the server's own connection. Servers of the earlier version continue to work.
+All migrations together are one transaction, on the server's own connection. Servers of the earlier version continue to
+work.
 """
 
 import logging

@@ -1,4 +1,4 @@
-"""Errors that come of a lack of memory, whatever they are called by the library that raises them."""
+"""Recognition of errors that a lack of memory has caused, whatever their type."""
 
 import errno
 

@@ -1,4 +1,4 @@
-"""Check of the address of a cluster, before anything is connected."""
+"""Check of the address of a cluster, before a connection is made."""
 
 from robosc_api.security.addresses import is_loopback_host, split_address
 from robosc_server.workers import WorkersError
@@ -6,10 +6,10 @@ from robosc_server.workers.factory import CLUSTER
 
 
 def check_cluster(spec: str, *, is_insecure_allowed: bool) -> None:
-    """Check what can be known before a cluster is connected.
+    """Check the address of a cluster before a connection is made.
 
     Raises:
-        WorkersError: It is on another machine and has no TLS: its parts run what they are sent as programs.
+        WorkersError: The cluster is on another machine and has no TLS: whoever can reach it can run programs there.
     """
     found = CLUSTER.fullmatch(spec)
     if found is None or found[1] or is_insecure_allowed:

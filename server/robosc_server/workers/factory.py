@@ -16,8 +16,8 @@ def open_workers(
 
     Args:
         spec: `local`, `dask://HOST:PORT` or `dask+tls://HOST:PORT`.
-        processes: Tasks that this machine does at once; a cluster has its own number.
-        task_function: Function that does tasks, `package.module:name`.
+        processes: Maximum number of tasks that this machine runs at once; a cluster has its own number.
+        task_function: Function that runs tasks, `package.module:name`.
         must_be_confined: True to start none on a machine without complete confinement.
 
     Raises:

@@ -65,7 +65,7 @@ if TYPE_CHECKING:
     from robosc.pipeline.system_runs import ChoiceError, SystemRun
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
     from robosc.pipeline.verifying import verify
-    from robosc.pipeline.walking import Trouble, TroubleKind
+    from robosc.pipeline.walking import WalkFinding, WalkFindingKind
     from robosc.synthesis import UnknownEngineError
     from robosc.targets import GenerateOptions, OverwriteError, UnknownTargetError
 
@@ -109,8 +109,6 @@ _HOMES = {
     "SystemRun": "pipeline.system_runs",
     "SystemSupervisor": "pipeline.systems",
     "SystemSynthesis": "pipeline.systems",
-    "Trouble": "pipeline.walking",
-    "TroubleKind": "pipeline.walking",
     "UnknownCodeError": "diagnostics",
     "UnknownEngineError": "synthesis",
     "UnknownEventError": "pipeline.manual_run",
@@ -119,6 +117,8 @@ _HOMES = {
     "UnsupportedModelError": "errors",
     "Verification": "pipeline.results",
     "VerificationStatus": "pipeline.results",
+    "WalkFinding": "pipeline.walking",
+    "WalkFindingKind": "pipeline.walking",
     "check": "pipeline.checking",
     "explain": "pipeline.explaining",
     "explore": "pipeline.exploring",
@@ -169,8 +169,6 @@ __all__ = [
     "SystemRun",
     "SystemSupervisor",
     "SystemSynthesis",
-    "Trouble",
-    "TroubleKind",
     "UnknownCodeError",
     "UnknownEngineError",
     "UnknownEventError",
@@ -179,6 +177,8 @@ __all__ = [
     "UnsupportedModelError",
     "Verification",
     "VerificationStatus",
+    "WalkFinding",
+    "WalkFindingKind",
     "__version__",
     "check",
     "explain",

@@ -1,7 +1,7 @@
 """The source for a model that nothing executes: whoever opens a page steps it by hand, each a run of its own.
 
-The run is that of `robosc simulate`: events with data, undo and redo, walks by chance and until there is trouble, kept
-as an event log or a test. Of automata it is also chosen where to begin, and which of several outcomes an event has.
+The run is that of `robosc simulate`: events with data, undo and redo, walks by chance and until there is a finding,
+kept as an event log or a test. For automata, a person also chooses the initial state and the outcome of an event.
 When the model's file is saved, what was done so far is done again on the new model.
 """
 
@@ -239,12 +239,12 @@ class Playground:
             case Restart():
                 run.restart()
                 await self._show(sink, RunReport("step", ("back in the initial state",)))
-            case Walk(steps=steps, seed=seed, until_trouble=True):
+            case Walk(steps=steps, seed=seed, until_finding=True):
                 self._require_room(steps)
                 before_count = len(run)
-                trouble = await asyncio.to_thread(run.walk_until_trouble, steps, seed)
-                none = f"no trouble in {len(run) - before_count} steps"
-                await self._show(sink, RunReport("trouble", (str(trouble),)) if trouble else RunReport("step", (none,)))
+                finding = await asyncio.to_thread(run.walk_until_finding, steps, seed)
+                none = f"no finding in {len(run) - before_count} steps"
+                await self._show(sink, RunReport("finding", (str(finding),)) if finding else RunReport("step", (none,)))
             case Walk(steps=steps, seed=seed):
                 self._require_room(steps)
                 taken = await asyncio.to_thread(run.walk, steps, seed)
@@ -388,7 +388,7 @@ class Playground:
     async def _show(self, sink: Sink, report: RunReport) -> None:
         run = self._run
         history = run.history
-        # A trouble that is as it was when it was reported before is not reported again.
+        # A finding that is the same as when it was reported before is not reported again.
         same = 0
         while same < min(len(history), len(self._entries)) and self._reported[same] is history[same]:
             same += 1

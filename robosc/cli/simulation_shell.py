@@ -30,7 +30,7 @@ undo [N], redo [N]         take back the last events; take them again
 history                    the events so far
 restart                    begin again in the initial state
 random N [SEED]            N events by chance
-until-trouble [N] [SEED]   events by chance until there is trouble: a deadlock, a blocked request, something unknown
+until-finding [N] [SEED]   events by chance until there is a finding: a deadlock, a blocked request, something unknown
 save FILE                  the events so far, as an event log (.jsonl) or a test for pytest (.py)
 help, quit
 """
@@ -69,7 +69,7 @@ class Shell:
             "history": self._history,
             "restart": self._restart,
             "random": self._random,
-            "until-trouble": self._until_trouble,
+            "until-finding": self._until_finding,
             "save": self._save,
             "help": self._help,
         }
@@ -186,13 +186,13 @@ class Shell:
         ended = ["nothing more can happen"] if len(taken) < count else []
         write_lines([*ended, f"seed {seed}", *state_lines(self._run)])
 
-    def _until_trouble(self, words: Sequence[str]) -> None:
-        count, seed = _numbers("until-trouble", words, (DEFAULT_STEPS, self._walks))
+    def _until_finding(self, words: Sequence[str]) -> None:
+        count, seed = _numbers("until-finding", words, (DEFAULT_STEPS, self._walks))
         self._walks += 1
         before = len(self._run)
-        trouble = self._run.walk_until_trouble(count, seed)
+        finding = self._run.walk_until_finding(count, seed)
         self._print_walk(before)
-        write_lines([str(trouble) if trouble is not None else f"no trouble in {len(self._run) - before} steps"])
+        write_lines([str(finding) if finding is not None else f"no finding in {len(self._run) - before} steps"])
         write_lines([f"seed {seed}", *state_lines(self._run)])
 
     def _save(self, words: Sequence[str]) -> None:

@@ -13,7 +13,7 @@ from robosc.pipeline.files import FileAccessError, given_path, write_whole
 from robosc.pipeline.loading import FileName
 from robosc.pipeline.received_data import NO_DATA, DataField
 from robosc.pipeline.saved_runs import event_log
-from robosc.pipeline.walking import ALL_TROUBLE, Trouble, TroubleKind, Walker
+from robosc.pipeline.walking import ALL_FINDINGS, Walker, WalkFinding, WalkFindingKind
 from robosc.tables import html_table
 
 
@@ -249,19 +249,19 @@ class ManualRun(ABC):
         """
         return self._walker.walk(steps, seed)
 
-    def walk_until_trouble(
-        self, steps: int = 1000, seed: int = 0, kinds: Collection[TroubleKind] = ALL_TROUBLE
-    ) -> Trouble | None:
-        """Walk by chance until there is trouble, and return it; None if there was none.
+    def walk_until_finding(
+        self, steps: int = 1000, seed: int = 0, kinds: Collection[WalkFindingKind] = ALL_FINDINGS
+    ) -> WalkFinding | None:
+        """Walk by chance until there is a finding, and return it; None if there was none.
 
         What was found stays told: the next walk of this run goes on to something else.
 
         Args:
             steps: Most events to take.
             seed: Seed of the chance.
-            kinds: Kinds of trouble to look for.
+            kinds: Kinds of findings to look for.
         """
-        return self._walker.walk_until_trouble(steps, seed, kinds)
+        return self._walker.walk_until_finding(steps, seed, kinds)
 
     def save(self, file: FileName) -> Path:
         """Write the events so far, an event log (`.jsonl`) whose clock counts them, a second each; returns its path.

@@ -1,4 +1,4 @@
-"""A model that is played with, in a real browser: events and their data, undo, trouble, kept runs, links, new files."""
+"""A model that is played with, in a real browser: events and data, undo, findings, kept runs, links, new files."""
 
 from pathlib import Path
 
@@ -76,8 +76,8 @@ def test_a_model_is_played_with(browser: Browser, tmp_path: Path) -> None:
         page.reload()
         expect(told).to_have_text("what this page did before is here again")
         expect(page.locator("#stream-rows .row")).to_have_count(4)
-        page.locator("#play-trouble").click()
-        expect(told).to_contain_text("Trouble:")
+        page.locator("#play-finding").click()
+        expect(told).to_contain_text("Found:")
         for button, name in (("#play-log", "gate.jsonl"), ("#play-test", "test_gate.py")):
             with page.expect_download() as download:
                 page.locator(button).click()

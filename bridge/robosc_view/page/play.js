@@ -8,7 +8,7 @@ import { isAutomata, isModel, received, under } from "./received.js";
 /** The part of an address that holds a model: its language, where that is not RoboSC's, and the model. */
 const IN_LINK = /^#model(?:\.(\w+))?=(.*)$/;
 const FILTERED_FROM = 12;
-const LEADS = { __proto__: null, step: "", choose: "Which?", unknown: "Unknown:", trouble: "Trouble:", changed: "Saved:", wrong: "Not done:" };
+const LEADS = { __proto__: null, step: "", choose: "Which?", unknown: "Unknown:", finding: "Found:", changed: "Saved:", wrong: "Not done:" };
 
 /** One event: a button, a field for each part of its data, and why it cannot happen. */
 class PlayEvent {
@@ -141,15 +141,15 @@ export function startPlay(send, token) {
   };
   filter.addEventListener("input", narrow);
   for (const form of ["log", "test"]) byId(`play-${form}`).addEventListener("click", () => want({ type: "save", form }));
-  const walk = (untilTrouble) => {
+  const walk = (untilFinding) => {
     const seed = walks;
     walks += 1;
-    const steps = untilTrouble ? 1000 : Math.min(Math.max(Math.trunc(Number(byId("play-steps").value)) || 1, 1), 5000);
+    const steps = untilFinding ? 1000 : Math.min(Math.max(Math.trunc(Number(byId("play-steps").value)) || 1, 1), 5000);
     // Of a large system it takes its time.
-    if (want({ type: "walk", steps, seed, until_trouble: untilTrouble })) report("step", ["chance goes on…"]);
+    if (want({ type: "walk", steps, seed, until_finding: untilFinding })) report("step", ["chance goes on…"]);
   };
   byId("play-walk").addEventListener("click", () => walk(false));
-  byId("play-trouble").addEventListener("click", () => walk(true));
+  byId("play-finding").addEventListener("click", () => walk(true));
   byId("play-link").addEventListener("click", async () => {
     const { language, link } = received.definition.play;
     const address = `${location.origin}/#model${isAutomata() ? `.${language}` : ""}=${link}`;

@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from robosc.pipeline.findings import Findings
     from robosc.pipeline.generating import generate
     from robosc.pipeline.loading import LoadedAutomata, LoadedModel, load
-    from robosc.pipeline.manual_run import EventNotPossibleError, Step, UnknownEventError
+    from robosc.pipeline.manual_run import EventNotPossibleError, UnknownEventError
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.received_data import DataError
     from robosc.pipeline.results import (
@@ -60,6 +60,7 @@ if TYPE_CHECKING:
         VerificationStatus,
     )
     from robosc.pipeline.simulation import Run, simulate
+    from robosc.pipeline.steps import Step
     from robosc.pipeline.supervisors import Supervisor
     from robosc.pipeline.synthesis import Synthesis, synthesize
     from robosc.pipeline.system_runs import ChoiceError, SystemRun
@@ -99,7 +100,7 @@ _HOMES = {
     "RoboscError": "errors",
     "Run": "pipeline.simulation",
     "Severity": "errors",
-    "Step": "pipeline.manual_run",
+    "Step": "pipeline.steps",
     "Summary": "pipeline.results",
     "Supervisor": "pipeline.supervisors",
     "Synthesis": "pipeline.synthesis",

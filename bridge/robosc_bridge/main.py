@@ -22,14 +22,13 @@ from robosc.model.check import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import Deployment, Model
 from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
+from robosc_bridge.assembly import assemble, check_settings, safety_limits
 from robosc_bridge.captures.commands import add_commands as add_capture_commands
 from robosc_bridge.captures.commands import add_recording, make_recorder
 from robosc_bridge.captures.recorder import RecordingHost
 from robosc_bridge.configuration import init, load, map_channels, schema
 from robosc_bridge.configuration.structure import TURTLEBOTS
 from robosc_bridge.configuration.template import PORTS, UDEV_RULES, DriveDriver, ScannerDriver
-from robosc_bridge.daemon.assembly import assemble, check_settings, safety_limits
-from robosc_bridge.daemon.endpoints import make_endpoints
 from robosc_bridge.daemon.keyboard import Keyboard
 from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.supervisors import (
@@ -44,6 +43,7 @@ from robosc_bridge.daemon.supervisors import (
 )
 from robosc_bridge.daemon.view_settings import ADDRESS as VIEW_ADDRESS
 from robosc_bridge.driver_registry import Kind, available_drivers
+from robosc_bridge.endpoints import make_endpoints
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.first_drive.commands import add_commands as add_first_drive_commands
 from robosc_bridge.first_drive.ports import stable_name

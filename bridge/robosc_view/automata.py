@@ -10,8 +10,8 @@ from robosc.certification.supervisor_file import StateInWords
 from robosc.explanation.notation import value_text
 from robosc.expressions import TRUE
 from robosc.expressions.text import expression_text
-from robosc.pipeline.manual_run import Step
 from robosc.pipeline.received_data import data_field
+from robosc.pipeline.steps import Step
 from robosc.pipeline.systems import SystemSupervisor
 from robosc.source import visible
 from robosc_view.definition import (

@@ -19,10 +19,10 @@ from typing import Any, cast
 from robosc.certification.supervisor_file import StateInWords
 from robosc.errors import RoboscError
 from robosc.pipeline.event_scripts import parse_event
-from robosc.pipeline.manual_run import Step, changes_text, event_text
 from robosc.pipeline.received_data import NO_DATA
 from robosc.pipeline.saved_runs import ModelOfTest, entries_of, event_log, pytest_module, state_by_component
 from robosc.pipeline.simulation import Run
+from robosc.pipeline.steps import Step, changes_text, event_text
 from robosc.pipeline.system_runs import ChoiceError, SystemRun
 from robosc.pipeline.systems import SystemSupervisor
 from robosc_bridge.daemon.states import OperatorCommand
@@ -289,7 +289,7 @@ class Playground:
             raise RefusedError("a run of automata is not saved: event logs and tests are of robots")
         name = self._run.supervisor.model.name.lower()
         if form is Form.LOG:
-            return f"{name}.jsonl", event_log(self._run)
+            return f"{name}.jsonl", event_log(self._run.history)
         file = self._file if self._own is None else None
         # Seen from the folder of the model, where the test is expected to go.
         model = ModelOfTest(Path(f"{name}.rscd")) if file is None else file

@@ -10,6 +10,7 @@ from typing import Any
 
 import grpc
 
+from robosc.certification.progress import OnProgress, ignored
 from robosc_api.v1 import jobs_pb2
 from robosc_client.convert import jobs
 from robosc_client.convert.failures import Failure, failure_of
@@ -17,7 +18,6 @@ from robosc_client.convert.requests import list_request
 from robosc_client.convert.response_readers import MAXIMUM_BYTES, ResponseReader, UnaryReader
 from robosc_client.errors import malformed
 from robosc_client.jobs import Job, JobState, TaskKind
-from robosc_client.results import Progress
 from robosc_client.retry import Attempts, RetryPolicy
 
 KEEPALIVE_MS = 60_000
@@ -49,12 +49,6 @@ WATCH_INTERRUPTED = Failure(grpc.StatusCode.UNAVAILABLE, "the watch ended before
 
 _EMPTY_PAGES = 100
 
-type OnProgress = Callable[[Progress], None]
-
-
-def ignore_progress(progress: Progress) -> None:
-    """Ignore the progress."""
-
 
 @dataclass(frozen=True, slots=True)
 class Operation[Result]:
@@ -76,7 +70,7 @@ class Operation[Result]:
     is_stream: bool = False
     is_about_jobs: bool = False
     deadline_s: float | None = None
-    on_progress: OnProgress = ignore_progress
+    on_progress: OnProgress = ignored
 
 
 class RetriedCall[Result]:

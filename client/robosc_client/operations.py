@@ -10,16 +10,17 @@ from collections.abc import Callable, Sequence
 from typing import Any, get_args
 
 import robosc
-from robosc.pipeline.files import given_path, read_bounded
+from robosc.certification.progress import OnProgress, ignored
+from robosc.pipeline.files import FileName, given_path, read_bounded
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import FileName, ModelLike, loaded, property_file
+from robosc.pipeline.loading import ModelLike, loaded, property_file
 from robosc.source import SourceFile
 from robosc.supervisor import Supervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES, encode
 from robosc.targets import GenerateOptions, TargetInfo
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_client.calls import JobPages, JobWatch, OnProgress, Operation, ignore_progress, job_reader
+from robosc_client.calls import JobPages, JobWatch, Operation, job_reader
 from robosc_client.convert import jobs, response_fields
 from robosc_client.convert.requests import request_of, submit_request
 from robosc_client.convert.response_readers import (
@@ -77,7 +78,7 @@ def synthesize(
     *,
     is_modular: bool = False,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignore_progress,
+    on_progress: OnProgress = ignored,
 ) -> Operation[Synthesis]:
     """Synthesize and certify a supervisor; `is_modular` synthesizes automata in modules."""
     task = Synthesize(loaded(model), options, is_modular)
@@ -92,7 +93,7 @@ def generate(
     *,
     initial: str | None = None,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignore_progress,
+    on_progress: OnProgress = ignored,
 ) -> Operation[Generation]:
     """Synthesize a supervisor and generate the files of a target around it.
 
@@ -115,7 +116,7 @@ def explore(
     *,
     maximum_states: int | None = None,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignore_progress,
+    on_progress: OnProgress = ignored,
 ) -> Operation[Exploration]:
     """Explore the robot, or automata, under their supervisor, up to a maximum number of states."""
     task = Explore(loaded(model), options, maximum_states)
@@ -132,7 +133,7 @@ def verify(
     maximum_states: int | None = None,
     is_strict: bool = False,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignore_progress,
+    on_progress: OnProgress = ignored,
 ) -> Operation[Verification]:
     """Check a supervisor against its model, or verify properties of the robot under its supervisor.
 
@@ -188,7 +189,7 @@ def explain(
     state: str | None = None,
     after: str | None = None,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignore_progress,
+    on_progress: OnProgress = ignored,
 ) -> Operation[Explained]:
     """Explain what synthesis does to a model: what restricts its events, or what is to blame for no supervisor.
 

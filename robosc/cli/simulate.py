@@ -3,26 +3,26 @@
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robosc.cli import automata
 from robosc.cli.arguments import add_engine_options, add_model_arguments
 from robosc.cli.output import ESCAPED, CommandError, ExitCode, UsageError, has_unicode_output
+from robosc.cli.simulation_steps import parts_text, state_lines, step_lines, take_event, write_lines
 from robosc.cli.supervisor_argument import supervisor_of_arguments
 from robosc.model.structure import Deployment
 from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.certification.supervisor_file import StateInWords
-    from robosc.pipeline.manual_run import ManualRun, Step
+    from robosc.pipeline.manual_run import ManualRun
     from robosc.pipeline.saved_runs import ModelOfTest
     from robosc.pipeline.simulation import Run
+    from robosc.pipeline.steps import Step
     from robosc.pipeline.system_runs import SystemRun
     from robosc.pipeline.walking import WalkFinding
-
-DEFAULT_STEPS = 1000
 
 _DESCRIPTION = """\
 Step the robot under its supervisor by hand: you play the world, and choose among what the controller may do. Events
@@ -163,43 +163,11 @@ def _run_automata(arguments: argparse.Namespace, *, is_scripted: bool) -> int:
         initial = None if arguments.initial is None else state_parts(made.supervisor.system, arguments.initial)
         run_ = SystemRun(made.supervisor, initial)
     except ChoiceError as error:
-        choose = f"; choose one: --initial '{_parts_text(error.example)}'" if error.example else ""
+        choose = f"; choose one: --initial '{parts_text(error.example)}'" if error.example else ""
         raise CommandError(f"{error.problem}{choose}", ExitCode.FAILED) from error
     except UnknownNameError as error:
         raise UsageError(f"--initial: {error}") from error
     return _script(arguments, run_) if is_scripted else Shell(run_, None).loop(sys.stdin)
-
-
-def _parts_text(parts: Mapping[str, object]) -> str:
-    from robosc.explanation.notation import value_text
-
-    return ", ".join(f"{name} = {value_text(value)}" for name, value in parts.items())  # type: ignore[arg-type]
-
-
-def take_event(run_: "Run | SystemRun", name: str, data: object, target: str) -> "Step":
-    """Take an event as a person wrote it.
-
-    Args:
-        run_: The run.
-        name: Name of the event.
-        data: Data that it carries; NO_DATA for none.
-        target: Parts of the state that it is to lead to; of automata.
-
-    Raises:
-        RoboscError: It cannot happen so.
-    """
-    from robosc.pipeline.received_data import NO_DATA
-    from robosc.pipeline.simulation import Run
-    from robosc.pipeline.system_runs import ChoiceError, state_parts
-
-    event, given = run_.event_called(name), () if data is NO_DATA else (data,)
-    if isinstance(run_, Run):
-        return run_.step(event, *given)
-    try:
-        return run_.step(event, *given, to=state_parts(run_.supervisor.system, target) if target else None)
-    except ChoiceError as error:
-        choose = f"; choose one: {name} -> {_parts_text(error.example)}" if error.example else ""
-        raise ChoiceError(f"{error.problem}{choose}") from error
 
 
 def model_of_test(arguments: argparse.Namespace) -> "ModelOfTest":
@@ -341,11 +309,6 @@ class _JsonReport:
         )
 
 
-def write_lines(lines: Iterable[str]) -> None:
-    """Write lines to standard output, as a terminal can show them."""
-    sys.stdout.write("".join(visible(line) + "\n" for line in lines))
-
-
 def _print_line(document: Mapping[str, Any]) -> None:
     from robosc.execution.runtime.event_log import plain
 
@@ -365,25 +328,3 @@ def state_json(state: "StateInWords") -> dict[str, object]:
 def finding_json(finding: "WalkFinding") -> dict[str, object]:
     """WalkFinding as JSON values."""
     return {"kind": str(finding.kind), "event": finding.event, "why": list(finding.why), "steps": finding.steps}
-
-
-def step_lines(number: int, step: "Step", before: "StateInWords") -> list[str]:
-    """A step in lines: the event with its data, what it changed, what a request sends, and what was unknown."""
-    from robosc.pipeline.manual_run import changes_text, event_text
-
-    lines = [f"{number:4}  {': '.join(filter(None, (event_text(step), changes_text(before, step.state))))}"]
-    if step.provided is not None:
-        lines.append(f"      sends {json.dumps(step.provided, default=str)}")
-    lines += [f"      unknown: {item}" for item in step.unknown]
-    lines += [f"      unknown: {item} keeps its value" for item in step.skipped]
-    return lines
-
-
-def state_lines(run_: "ManualRun") -> list[str]:
-    """Return the state and what can happen in it, in lines."""
-    others = [event for event in run_.possible if not run_.is_controllable(event)]
-    return [
-        f"now       {run_.state}{' (marked)' if run_.is_marked else ''}",
-        f"allowed   {', '.join(run_.enabled) or 'nothing'}",
-        f"can come  {', '.join(others) or 'nothing'}",
-    ]

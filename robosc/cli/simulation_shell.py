@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from robosc.cli.output import ExitCode
-from robosc.cli.simulate import DEFAULT_STEPS, state_lines, step_lines, take_event, write_lines
+from robosc.cli.simulation_steps import state_lines, step_lines, take_event, write_lines
 from robosc.errors import RoboscError
 from robosc.pipeline.event_scripts import parse_event, target_split
 from robosc.pipeline.received_data import DataField
 from robosc.source import visible
 
 if TYPE_CHECKING:
-    from robosc.pipeline.manual_run import Step
     from robosc.pipeline.saved_runs import ModelOfTest
     from robosc.pipeline.simulation import Run
+    from robosc.pipeline.steps import Step
     from robosc.pipeline.system_runs import SystemRun
 
 PROMPT = "> "
@@ -39,6 +39,7 @@ AUTOMATA_HELP = """\
 EVENT [DATA] [-> STATE]    an event: press, sensor true, take -> Buffer = full where it can lead to several states
 """ + "".join(line for line in HELP.splitlines(keepends=True)[1:] if not line.startswith("save"))
 
+_DEFAULT_STEPS = 1000
 _MOST = 1_000_000
 _MOST_TOLD = 20
 """Steps of a walk that are reported at once."""
@@ -187,7 +188,7 @@ class Shell:
         write_lines([*ended, f"seed {seed}", *state_lines(self._run)])
 
     def _until_finding(self, words: Sequence[str]) -> None:
-        count, seed = _numbers("until-finding", words, (DEFAULT_STEPS, self._walks))
+        count, seed = _numbers("until-finding", words, (_DEFAULT_STEPS, self._walks))
         self._walks += 1
         before = len(self._run)
         finding = self._run.walk_until_finding(count, seed)

@@ -22,8 +22,9 @@ from robosc.expressions.inference import has_type
 from robosc.expressions.text import expression_text
 from robosc.model.findings import did_you_mean
 from robosc.pipeline.conditions import unknown_event
-from robosc.pipeline.manual_run import ManualRun, Step
+from robosc.pipeline.manual_run import ManualRun
 from robosc.pipeline.received_data import NO_DATA, DataError, DataField, data_field, one_datum
+from robosc.pipeline.steps import Step
 from robosc.pipeline.systems import SystemSupervisor
 from robosc.pipeline.walking import Walker, WalkFinding, WalkFindingKind
 from robosc.supervisor.predicates import state_predicates

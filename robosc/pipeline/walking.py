@@ -1,19 +1,14 @@
 """Walks by chance through the controlled system, and the findings that they may end in."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from random import Random
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-from robosc.execution.interpreter import InterpretedSystem
-from robosc.model.structure import EventKind, Model, is_tau
-from robosc.pipeline.received_data import RandomData
-
-if TYPE_CHECKING:
-    from robosc.pipeline.manual_run import ManualRun, Step
-    from robosc.pipeline.simulation import Run
+from robosc.certification.supervisor_file import StateInWords
+from robosc.pipeline.steps import Step
 
 
 class WalkFindingKind(StrEnum):
@@ -55,6 +50,26 @@ class WalkFinding:
         return f"{self.kind}{place} after {self.steps} step{'s' if self.steps != 1 else ''}: {'; '.join(self.why)}"
 
 
+class WalkedRun(Protocol):
+    """Run as the walker that leads it sees it."""
+
+    @property
+    def state(self) -> StateInWords:
+        """The current state."""
+
+    @property
+    def is_marked(self) -> bool:
+        """True if the state counts as completed."""
+
+    @property
+    def enabled(self) -> tuple[str, ...]:
+        """Controllable events that are allowed now."""
+
+    @property
+    def possible(self) -> tuple[str, ...]:
+        """Every event that can happen now."""
+
+
 class Walker(ABC):
     """Walker of one run.
 
@@ -62,7 +77,7 @@ class Walker(ABC):
         run: The run that it leads.
     """
 
-    def __init__(self, run: "ManualRun") -> None:
+    def __init__(self, run: WalkedRun) -> None:
         self._run = run
         # Findings that were reported before.
         self._reported: set[tuple[WalkFindingKind, str, tuple[str, ...]]] = set()
@@ -82,7 +97,7 @@ class Walker(ABC):
         """Return False for an event that could happen, but would not be taken."""
 
     @abstractmethod
-    def _take(self, event: str, dice: Random) -> "Step":
+    def _take(self, event: str, dice: Random) -> Step:
         """Take an event, with data by chance."""
 
     @abstractmethod
@@ -93,9 +108,9 @@ class Walker(ABC):
         """Begin anew: every finding is new again."""
         self._reported.clear()
 
-    def walk(self, steps: int, seed: int) -> "tuple[Step, ...]":
+    def walk(self, steps: int, seed: int) -> tuple[Step, ...]:
         """Take events by chance; parameters as of `Run.walk`."""
-        dice, taken = Random(seed), list["Step"]()  # noqa: S311  # the same walk again, no secret
+        dice, taken = Random(seed), list[Step]()  # noqa: S311  # the same walk again, no secret
         while len(taken) < steps:
             candidates = [event for event in self._candidates() if self._is_issued(event)]
             if not candidates:
@@ -149,7 +164,7 @@ class Walker(ABC):
         why = f"nothing is allowed while {where}: it can only wait for {', '.join(left)}"
         return WalkFinding(WalkFindingKind.WAITING, "", (why,), count)
 
-    def _at_step(self, step: "Step", count: int) -> WalkFinding | None:
+    def _at_step(self, step: Step, count: int) -> WalkFinding | None:
         why = (*step.unknown, *(f"{variable} keeps its value: its update is unknown" for variable in step.skipped))
         return WalkFinding(WalkFindingKind.UNKNOWN, step.event, why, count) if why else None
 
@@ -161,70 +176,3 @@ class Walker(ABC):
         is_news = key not in self._reported
         self._reported.add(key)
         return is_news
-
-
-class ModelWalker(Walker):
-    """Walker of a robot's run: takes what an executor could in some world.
-
-    Args:
-        run: The run that it leads.
-        system: The system of that run.
-        model: Its model.
-        data: Data that the environment sends.
-    """
-
-    def __init__(self, run: "Run", system: InterpretedSystem, model: Model, data: RandomData) -> None:
-        super().__init__(run)
-        self._run: Run = run
-        self._system = system
-        self._data = data
-        self._identifiers = {event: item.identifier for item in model.communications for event in item.events}
-        self._sensors = {item.identifier for item in model.communications if item.max_age is not None}
-
-    def _candidates(self) -> Iterator[str]:
-        """Yield the events that an executor and its environment could have happen now."""
-        silent = self._system.enabled_silent()
-        if silent is not None:
-            yield silent
-            return
-        is_deaf = self._is_deaf()
-        for event in self._run.possible:
-            if not (is_deaf and _is_request(event)):
-                yield event
-
-    def _is_deaf(self) -> bool:
-        """Return True if a sensor with a `max_age` has told nothing yet."""
-        silent = set(self._sensors)
-        for step in self._run.history if silent else ():
-            silent.discard(self._identifiers.get(step.event, ""))
-            if not silent:
-                break
-        return bool(silent)
-
-    def _forbidden(self) -> Iterator[str]:
-        """Yield the requests that the behaviours could do and that are not enabled."""
-        if self._system.enabled_silent() is None:
-            for event in self._run.events:
-                if _is_request(event) and self._system.is_possible(event) and not self._system.enabled(event):
-                    yield event
-
-    def _is_issued(self, event: str) -> bool:
-        """Return False for a request whose data is unknown."""
-        return not _is_request(event) or self._system.provide(event.partition(".")[0])[0]
-
-    def _take(self, event: str, dice: Random) -> "Step":
-        return self._run.step(event, self._data.draw(event, dice))
-
-    def _at_event(self, event: str, count: int) -> WalkFinding | None:
-        if not _is_request(event):
-            return None
-        if not self._system.enabled(event):
-            return WalkFinding(WalkFindingKind.BLOCKED, event, self._run.reasons(event), count)
-        if not self._is_issued(event):
-            why = "what it sends is unknown, so that it is not issued"
-            return WalkFinding(WalkFindingKind.UNKNOWN, event, (why,), count)
-        return None
-
-
-def _is_request(event: str) -> bool:
-    return not is_tau(event) and event.rpartition(".")[2] == EventKind.REQUEST

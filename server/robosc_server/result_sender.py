@@ -9,8 +9,7 @@ from collections.abc import AsyncIterable, Callable
 from typing import Any
 
 from robosc_api.security import caller_of
-from robosc_server.failures import RefusedError
-from robosc_server.tasks.task import Reason
+from robosc_server.tasks.task import Reason, RefusedError
 
 SMALL_BYTES = 64 * 1024
 """Maximum size of results that are not counted, since the number of open calls bounds them."""

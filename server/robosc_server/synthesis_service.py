@@ -15,10 +15,9 @@ from google.protobuf.message import DecodeError
 
 from robosc_api.security import caller_of
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.failures import RefusedError
 from robosc_server.result_sender import ResultSender
 from robosc_server.tasks.requests import NOT_A_MESSAGE, QUICK_BYTES, RequestCache, RequestLimits, require_short
-from robosc_server.tasks.task import Reason, Report, Result, Task, TaskKind, own_key
+from robosc_server.tasks.task import Reason, RefusedError, Report, Result, Task, TaskKind, own_key
 
 _SERVICE = pb.DESCRIPTOR.services_by_name["SynthesisService"]
 SERVICE_NAME = _SERVICE.full_name

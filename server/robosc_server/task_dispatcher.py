@@ -1,10 +1,10 @@
 """Dispatcher of accepted tasks: a task gets its result from the cache or from a worker."""
 
-from robosc_server.failures import RefusedError, public_failure
 from robosc_server.jobs import ResultCache, Scheduler
+from robosc_server.operations.failures import public_failure
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.quotas import Quotas
-from robosc_server.tasks.task import Failure, Result, Task, TaskLimits
+from robosc_server.tasks.task import Failure, RefusedError, Result, Task, TaskLimits
 from robosc_server.workers import OnReport
 
 

@@ -13,18 +13,18 @@ from typing import assert_never
 from robosc.execution.runtime.clock import Clock
 from robosc.execution.runtime.event_log import EventLog
 from robosc_bridge.daemon.execution import Execution, Job
+from robosc_bridge.daemon.executor_inputs import Listeners
 from robosc_bridge.daemon.feed import Feed, WatchedLog
 from robosc_bridge.daemon.lifecycle import OVER, Lifecycle
 from robosc_bridge.daemon.orders import HALTS, Orders, answer, unanswered
+from robosc_bridge.daemon.program_dispatcher import ProgramDispatcher
 from robosc_bridge.daemon.programs.channel import ProgramChannel
-from robosc_bridge.daemon.programs.dispatcher import ProgramDispatcher
 from robosc_bridge.daemon.programs.inbox import ProgramInbox
 from robosc_bridge.daemon.programs.items import Clients, FromProgram
 from robosc_bridge.daemon.programs.request_checker import RequestChecker
 from robosc_bridge.daemon.programs.requesters import Requesters
 from robosc_bridge.daemon.readiness import Readiness
 from robosc_bridge.daemon.robot.adapter import RobotAdapter
-from robosc_bridge.daemon.robot.executor_inputs import Listeners
 from robosc_bridge.daemon.robot.motion import MotionTarget
 from robosc_bridge.daemon.robot.stop_switch import StopSwitch
 from robosc_bridge.daemon.snapshots import Snapshots

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robosc.doctor import Finding, Grade, Machine, Purpose, examine, is_ready
+from robosc_bridge.assembly import drive_base, range_scanner
 from robosc_bridge.configuration import ConfigurationError, load
 from robosc_bridge.configuration.structure import Configuration
-from robosc_bridge.daemon.assembly import drive_base, range_scanner
-from robosc_bridge.devices.options import DriverOptionError
 from robosc_bridge.devices.robots import ROBOTS
+from robosc_bridge.driver_options import DriverOptionError
 from robosc_bridge.errors import BridgeError, DeviceError
 from robosc_bridge.first_drive import calibration
 from robosc_bridge.first_drive.calibration import CalibrationError

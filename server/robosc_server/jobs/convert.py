@@ -10,12 +10,12 @@ from google.protobuf.message import DecodeError
 
 from robosc_api.v1 import jobs_pb2 as pb
 from robosc_api.v1 import jobs_pb2_grpc, synthesis_pb2
-from robosc_server.failures import RefusedError, code_of
 from robosc_server.jobs.manager import ServiceLoad
+from robosc_server.operations.failures import code_of
 from robosc_server.store import JobFilter, JobRecord, JobState
 from robosc_server.tasks.fields import nested_of
 from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestLimits, require_parsable, require_short
-from robosc_server.tasks.task import Reason, TaskKind
+from robosc_server.tasks.task import Reason, RefusedError, TaskKind
 
 JOB_SERVICE_NAME: str = pb.DESCRIPTOR.services_by_name["JobService"].full_name
 JOB_METHODS: tuple[str, ...] = tuple(method.name for method in pb.DESCRIPTOR.services_by_name["JobService"].methods)

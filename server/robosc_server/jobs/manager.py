@@ -16,7 +16,6 @@ from typing import Self
 
 from robosc_api.security.callers import network_of
 from robosc_server.clock import monotonic
-from robosc_server.failures import RefusedError
 from robosc_server.jobs.lease_monitor import LeaseMonitor
 from robosc_server.jobs.result_cache import ResultCache
 from robosc_server.jobs.retention import JobLimits, Retention
@@ -26,7 +25,7 @@ from robosc_server.jobs.watchers import Watchers
 from robosc_server.operations.tracing import NO_TRACING, Tracing
 from robosc_server.store import JobFilter, JobRecord, JobState, Store, StoreUnavailableError
 from robosc_server.store.records import OwnerLoad, messages_of
-from robosc_server.tasks.task import Reason, Task, TaskKind, TaskLimits, shared_key
+from robosc_server.tasks.task import Reason, RefusedError, Task, TaskKind, TaskLimits, shared_key
 
 _log = logging.getLogger(__name__)
 

@@ -6,9 +6,8 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from robosc_server.failures import RefusedError
 from robosc_server.store import JobState, Store, StoreUnavailableError
-from robosc_server.tasks.task import Reason, Result
+from robosc_server.tasks.task import Reason, RefusedError, Result
 
 _log = logging.getLogger(__name__)
 

@@ -8,16 +8,16 @@ from collections.abc import Collection, Coroutine, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from robosc_server.failures import RefusedError, fault_message, public_failure
 from robosc_server.jobs.result_cache import ResultCache
 from robosc_server.jobs.retention import Retention
 from robosc_server.jobs.scheduler import Place, Scheduler
 from robosc_server.jobs.watchers import Watchers
+from robosc_server.operations.failures import fault_message, public_failure
 from robosc_server.operations.logs import log_fault
 from robosc_server.operations.tracing import Tracing
 from robosc_server.store import JobRecord, JobState, Store, StoreUnavailableError
 from robosc_server.store.records import STEP
-from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskLimits
+from robosc_server.tasks.task import Failure, Outcome, Reason, RefusedError, Report, Result, Task, TaskLimits
 from robosc_server.workers import WorkerLostError, WorkersError
 
 _RETRY_S = 0.5

@@ -15,8 +15,7 @@ from typing import Protocol
 
 from robosc_api.security.callers import network_of
 from robosc_server.clock import monotonic
-from robosc_server.failures import RefusedError
-from robosc_server.tasks.task import Failure, Outcome, Reason, Task, TaskLimits
+from robosc_server.tasks.task import Failure, Outcome, Reason, RefusedError, Task, TaskLimits
 from robosc_server.workers import OnReport, WorkerLostError, Workers, WorkersError
 
 _POLL_S = 1.0

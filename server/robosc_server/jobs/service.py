@@ -10,12 +10,11 @@ import grpc.aio
 
 from robosc_api import security
 from robosc_api.v1 import jobs_pb2 as pb
-from robosc_server.failures import RefusedError
 from robosc_server.jobs import convert
 from robosc_server.jobs.manager import Caller, JobManager
 from robosc_server.store import JobRecord
 from robosc_server.tasks.requests import RequestLimits
-from robosc_server.tasks.task import Reason, Task, TaskKind, own_key
+from robosc_server.tasks.task import Reason, RefusedError, Task, TaskKind, own_key
 
 _ID_CHARACTERS = 64
 _JOBS_AT_ONCE = 20

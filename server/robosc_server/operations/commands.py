@@ -60,7 +60,7 @@ def run_command(words: Sequence[str]) -> int | None:
 
 def make_whole_parser() -> Parser:
     """Return the parser of all command lines, for completion in shells; each command has a parser of its own, too."""
-    from robosc_server import health_check
+    from robosc_server.operations import health_check
 
     parser = make_parser()
     commands = parser.add_subparsers(metavar="COMMAND")
@@ -71,7 +71,7 @@ def make_whole_parser() -> Parser:
 
 
 def _health(argv: Sequence[str]) -> int:
-    from robosc_server.health_check import main
+    from robosc_server.operations.health_check import main
 
     return main(argv)
 

@@ -16,11 +16,11 @@ from robosc_api.layers import Layer, behaviour_of, with_behaviour, writing
 from robosc_api.security import CALLER
 from robosc_api.security.host_sample import HostSample
 from robosc_server.clock import monotonic
-from robosc_server.failures import RefusedError, abort, code_of, fault_message
+from robosc_server.operations.failures import abort, code_of, fault_message
 from robosc_server.operations.logs import REQUEST_ID, REQUEST_ID_HEADER, log_fault, request_id_of
 from robosc_server.operations.metrics import MethodMetrics, Metrics
 from robosc_server.operations.tracing import NO_TRACING, Tracing
-from robosc_server.tasks.task import Reason
+from robosc_server.tasks.task import Reason, RefusedError
 
 _HEALTH = "/grpc.health."
 _REFUSED_RETRY_S = 1.0

@@ -8,8 +8,7 @@ from typing import Any
 from robosc_api.connection_watch import Arrivals
 from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.security import ENTRY, caller_of, is_loopback_peer, network_of
-from robosc_server.failures import RefusedError
-from robosc_server.tasks.task import Reason
+from robosc_server.tasks.task import Reason, RefusedError
 
 HEALTH_CALLS = 1000
 """Health checks that are open at once, from this machine and from elsewhere: they need no token, and so have slots of

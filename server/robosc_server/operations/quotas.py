@@ -8,8 +8,7 @@ from collections.abc import Callable
 
 from robosc_api.security import Quota, TokenFile
 from robosc_server.clock import monotonic
-from robosc_server.failures import RefusedError
-from robosc_server.tasks.task import Reason
+from robosc_server.tasks.task import Reason, RefusedError
 
 _MINUTE_S = 60.0
 _HOUR_S = 3600.0

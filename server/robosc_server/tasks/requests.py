@@ -19,9 +19,8 @@ from robosc._version import __version__
 from robosc.dd_modules import has_cudd
 from robosc.source import visible
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.failures import RefusedError
 from robosc_server.tasks.fields import Nested, has_few_fields, nested_of
-from robosc_server.tasks.task import Reason, Task, TaskKind
+from robosc_server.tasks.task import Reason, RefusedError, Task, TaskKind
 
 NOT_A_MESSAGE = "the request is not a valid message of this service"
 

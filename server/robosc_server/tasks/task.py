@@ -121,12 +121,29 @@ class Failure:
     details: str = ""
 
 
+class RefusedError(Exception):
+    """A call that ends without an answer.
+
+    Attributes:
+        reason: Reason why there is no answer.
+        message: One sentence for the caller.
+        retry_after_s: Seconds after which it may be worth another try; None: it is not.
+    """
+
+    def __init__(self, reason: Reason, message: str, retry_after_s: float | None = None) -> None:
+        super().__init__(message)
+        self.reason = reason
+        self.message = message
+        self.retry_after_s = retry_after_s
+
+
 type Outcome = Result | Failure
 
 __all__ = [
     "Failure",
     "Outcome",
     "Reason",
+    "RefusedError",
     "Report",
     "Result",
     "Task",

@@ -28,8 +28,8 @@ from figures import text_table  # noqa: E402  # found through the path above
 from robosc.execution.runtime.event_log import NullLog  # noqa: E402
 from robosc.execution.runtime.executor import Executor  # noqa: E402
 from robosc.model.structure import Deployment  # noqa: E402
+from robosc_bridge.assembly import Machine, assemble  # noqa: E402
 from robosc_bridge.configuration import map_channels, parse  # noqa: E402
-from robosc_bridge.daemon.assembly import Machine, assemble  # noqa: E402
 from robosc_bridge.daemon.states import State  # noqa: E402
 from robosc_bridge.daemon.supervisors import Source, obtain  # noqa: E402
 from robosc_bridge.safety import SafetyLayer  # noqa: E402

@@ -15,8 +15,8 @@ from robosc.cli.output import CommandError
 from robosc.execution.runtime.event_log import json_line
 from robosc_api.security import add_client_arguments
 from robosc_bridge.configuration import parse
-from robosc_bridge.daemon.endpoints import is_remote, is_startable
 from robosc_bridge.daemon.view_settings import ADDRESS, settings_of
+from robosc_bridge.endpoints import is_remote, is_startable
 from robosc_view import command
 from support.hostile_models import products
 from support.live import LiveRobot, large_model, supervisor_without_synthesis

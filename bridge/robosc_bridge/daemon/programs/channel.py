@@ -11,6 +11,7 @@ from typing import Any
 from robosc.model.structure import Communication, CommunicationKind
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
+from robosc_bridge.daemon.executor_inputs import Listeners, Supervised
 from robosc_bridge.daemon.programs.items import (
     CallFailed,
     CallMade,
@@ -25,7 +26,6 @@ from robosc_bridge.daemon.programs.items import (
     Program,
     Replied,
 )
-from robosc_bridge.daemon.robot.executor_inputs import Listeners, Supervised
 
 _log = logging.getLogger(__name__)
 

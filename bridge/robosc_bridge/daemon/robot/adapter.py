@@ -11,8 +11,7 @@ from typing import Any
 
 from robosc_bridge.configuration import channels
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
-from robosc_bridge.daemon.programs.channel import ProgramChannel
-from robosc_bridge.daemon.robot.channel_data import (
+from robosc_bridge.daemon.channel_data import (
     battery_data,
     finite,
     imu_data,
@@ -22,7 +21,8 @@ from robosc_bridge.daemon.robot.channel_data import (
     shaped,
     velocity_of,
 )
-from robosc_bridge.daemon.robot.executor_inputs import Listeners, Supervised
+from robosc_bridge.daemon.executor_inputs import Listeners, Supervised
+from robosc_bridge.daemon.programs.channel import ProgramChannel
 from robosc_bridge.daemon.robot.motion import MotionTarget
 from robosc_bridge.daemon.robot.rotations import Rotations, service_response
 from robosc_bridge.daemon.robot.stop_switch import StopSwitch

@@ -7,8 +7,8 @@ from typing import Any
 
 from robosc.model.structure import Communication, CommunicationKind
 from robosc_bridge.configuration.channels import RotateChannel, RotatedChannel
-from robosc_bridge.daemon.robot.channel_data import angle_of
-from robosc_bridge.daemon.robot.executor_inputs import Listeners, Supervised
+from robosc_bridge.daemon.channel_data import angle_of
+from robosc_bridge.daemon.executor_inputs import Listeners, Supervised
 from robosc_bridge.daemon.robot.motion import MotionTarget
 
 _log = logging.getLogger(__name__)

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection
 
 from robosc_bridge.configuration.channels import EmergencyStopChannel
-from robosc_bridge.daemon.robot.executor_inputs import Listeners, Supervised
+from robosc_bridge.daemon.executor_inputs import Listeners, Supervised
 from robosc_bridge.skills import EmergencyStop, StopEvent
 
 STOP_HELD = "a button that stops the robot is pressed"

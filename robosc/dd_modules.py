@@ -27,7 +27,7 @@ def load_dd(name: str) -> ModuleType:
     with _LOCK:
         if _DRAWS in sys.modules:
             return importlib.import_module(whole)
-        # What Python is told to take for missing (https://docs.python.org/3/reference/import.html#the-module-cache).
+        # None makes Python take the module for missing (https://docs.python.org/3/reference/import.html#the-module-cache).
         sys.modules[_DRAWS] = None  # type: ignore[assignment]
         try:
             return importlib.import_module(whole)

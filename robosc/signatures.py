@@ -6,7 +6,7 @@ that says what is signed, and the file. What the supervisor is for stands in the
 and the digest of the texts; the signature binds them with the rest.
 
 Keys are in the formats of other tools: a public one is a line as OpenSSH's (`ssh-ed25519 AAAA... comment`, so that
-`ssh-keygen -lf` tells its fingerprint), a private one PKCS #8 in PEM, readable by its owner alone. The package
+`ssh-keygen -lf` prints its fingerprint), a private one PKCS #8 in PEM, readable by its owner alone. The package
 `cryptography` makes, reads and checks them all; it is imported when a signature is needed (extra `signing`).
 """
 

@@ -4,8 +4,8 @@ Definitions after Ouedraogo, Kumar, Malik and Akesson, "Nonblocking and safe con
 systems modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569. Automata synchronise
 on shared events; guards may read the locations and variables of every automaton.
 
-This structure knows nothing of RoboSC: a component is an automaton like any other. In expressions,
-`VariableRead(component=A, variable=v)` is variable v of automaton A, `StateTest(A, l)` tells whether
+This structure does not depend on RoboSC: a component is an automaton like any other. In expressions,
+`VariableRead(component=A, variable=v)` is variable v of automaton A, `StateTest(A, l)` is true if
 A is in location l, and `Received(path)` is the event's input of that path.
 """
 

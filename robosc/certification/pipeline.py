@@ -57,8 +57,7 @@ class SynthesisOutcome:
     Attributes:
         status: Status at the end.
         supervisor: The supervisor, or None.
-        diagnostics: Every finding about the model, sorted by place; with a supervisor, also what only synthesis
-            can tell.
+        diagnostics: Every finding about the model, sorted by place; with a supervisor, also those of synthesis.
         statistics: Figures of the synthesis, or None where there was none.
         reason: Reason why there is no supervisor, in one sentence; empty where there is one.
         explanation: Explanation of what is to blame where no supervisor exists.

@@ -225,7 +225,7 @@ def _false_claims(certificate: Certificate, found: Verification) -> list[str]:
         ("transitions", certificate.transitions, found.transitions),
     ):
         if stated is not None and counted is not None and int(stated) != counted:
-            claims.append(f"it tells of {stated} {what}, there are {counted}")
+            claims.append(f"it states {stated} {what}, there are {counted}")
     for name in PROPERTIES:
         if getattr(certificate, name) == "passed" and getattr(found, name) is CheckOutcome.FAILED:
             claims.append(f"it says '{name.replace('_', ' ')}: passed', which is false")

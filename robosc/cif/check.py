@@ -41,7 +41,7 @@ def load_cif(path: Path, text: str | None = None) -> Bundle:
         try:
             return SourceFile(name, read_source(path.parent / name, name))
         except OSError:
-            # `check_cif` tells where it is imported.
+            # `check_cif` reports the missing file where it is imported.
             return None
 
     files, _ = _imported(main, read, Findings())

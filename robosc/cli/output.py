@@ -78,9 +78,9 @@ def has_unicode_output() -> bool:
 
 
 def print_diagnostics(diagnostics: Sequence[Diagnostic], bundle: Bundle | None) -> None:
-    """Findings with source line and caret on standard error, and a closing line that counts them.
+    """Print findings with source line and caret on standard error, and a last line that counts them.
 
-    On a terminal that line also tells where to read more; what a program reads stays bare.
+    On a terminal the last line also says where to read more.
     """
     for diagnostic in diagnostics:
         sys.stderr.write(diagnostic.render(bundle) + "\n")

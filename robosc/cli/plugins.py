@@ -85,7 +85,7 @@ def _loaded(item: "EntryPoint") -> Plugin:
 
 
 def _naming_missing_package(name: str, run: Callable[[argparse.Namespace], int]) -> Callable[[argparse.Namespace], int]:
-    """The command, with a package that it misses only when it runs told in the same sentence."""
+    """The command, with a clear message if a package is missing when it runs."""
 
     def guarded(arguments: argparse.Namespace) -> int:
         try:

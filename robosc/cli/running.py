@@ -51,7 +51,7 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
-        """Tell what is wrong.
+        """Raise an error that says what is wrong.
 
         Raises:
             WrongArguments: Always.
@@ -140,7 +140,7 @@ def guarded(program: str, run: Callable[[], int], *, as_json: bool = False) -> i
 
 
 def _complain(program: str, problem: object) -> str:
-    """Tell what is wrong on standard error; returns that."""
+    """Print what is wrong on standard error, and return it."""
     message = visible(str(problem))
     sys.stderr.write(f"{program}: {message}\n")
     return message

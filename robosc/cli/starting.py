@@ -78,7 +78,7 @@ def start(program: str, load: Callable[[], Callable[[], int]], extra: str | None
         if is_heard:
             signal.signal(signal.SIGINT, leave)
     if status == INTERRUPTED:
-        # The command has told it.
+        # The command has already reported the interrupt.
         with contextlib.suppress(AttributeError, OSError, ValueError):
             sys.stdout.flush()
         os._exit(status)

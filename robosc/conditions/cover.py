@@ -83,7 +83,7 @@ def cover(space: Space, words: Words, wanted: Node, forbidden: Node, *, most: in
 
     Args:
         space: The store of both.
-        words: Sizes of tests, which tell which cubes are short.
+        words: Sizes of tests, by which cubes are compared for length.
         wanted: Node of the states where they must be true.
         forbidden: Node of the states where they must be false; disjoint from `wanted`.
         most: Number of cubes that there may be before some of them are dropped.

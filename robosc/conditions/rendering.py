@@ -104,7 +104,7 @@ class Formulas:
     def _is_longer(self, formula: Expression, diagram: DecisionDiagram) -> bool:
         """Return True if a formula that is not short takes more tests than its diagram, written line by line."""
         most = operands(formula)
-        # Every line takes a test at least: those of very many need not be told to be counted.
+        # Every line has at least one test: very many lines need not be built to be counted.
         if most <= SHORT or len(_order(*_branches(diagram, self.domains), diagram.root)) >= most:
             return False
         return most > sum(line.operands for line in diagram_lines(diagram, self.vocabulary))

@@ -1,10 +1,10 @@
 """Data that the events of one middleware message can carry together.
 
-Several communications may read one message (semantics 3.1): then what they receive comes from the same fields. Enum
-rules are read as conditions over *terms*: a field that is compared with constants, or anything more difficult, which
-then counts as one term that may have any value. Values of a term that no comparison tells apart are one, so all
-choices can be gone through. The reported data is never too little: terms that are written differently are taken to be
-independent, although they may read the same fields.
+Several communications may read one message (semantics 3.1): then they receive data from the same fields. Enum rules are
+read as conditions over *terms*. A term is a field that is compared with constants, or a more difficult expression,
+which may have any value. Values that no comparison distinguishes are represented by one of them, so that all choices
+can be enumerated. The result contains every possible combination, and may contain impossible ones: terms that are
+written differently are taken to be independent, although they may read the same fields.
 """
 
 import math
@@ -98,7 +98,7 @@ def _has_field(model: Model, type_: Type | None, name: str) -> bool:
 
 
 class _Terms:
-    """Terms that conditions use, with the values that the conditions tell apart."""
+    """Terms that conditions use, with the values that the conditions distinguish."""
 
     def __init__(self) -> None:
         self._kinds: dict[Hashable, Type | None] = {}
@@ -118,7 +118,7 @@ class _Terms:
         return prod(len(self.values(key)) for key in keys)
 
     def values(self, key: Hashable) -> tuple[Value | None, ...]:
-        """One value of each kind that is told apart; to be asked once all are known."""
+        """One value of each class that the conditions distinguish; call it only when all conditions are known."""
         if key not in self._values:
             unknown = (None,) if key in self._may_be_unknown else ()
             self._values[key] = (*self._known(key), *unknown)
@@ -203,7 +203,7 @@ class _Event:
         self._readings: list[_Reading] = []
         self._is_input = {one.path for one in inputs}
         for one in inputs:
-            # A field with too many values to tell them all apart would leave nothing to go through.
+            # A field with too many values would make too many combinations to enumerate.
             if one.may_be_unknown or len(domain(one.type)) > MAXIMUM_CHOICES:
                 self._free.append(one)
             else:

@@ -1,7 +1,7 @@
-"""Forward search of the controller automaton, and what it tells about finite response and nonblocking.
+"""Forward search of the controller automaton, and its result for finite response and nonblocking.
 
-Stable states are visited by the number of events that lead to them (E. W. Dijkstra, "A note on two problems in
-connexion with graphs", Numerische Mathematik 1, 1959, pp. 269-271), so a trace has as few events as there can be.
+Stable states are visited in the order of the number of events that lead to them (E. W. Dijkstra, "A note on two
+problems in connexion with graphs", Numerische Mathematik 1, 1959, pp. 269-271), so every trace is a shortest one.
 """
 
 from collections import defaultdict

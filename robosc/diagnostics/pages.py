@@ -229,7 +229,7 @@ Every finding of RoboSC has a code, which stays the same from version to version
 behind the message, and `robosc explain CODE` prints its chapter of this document. An *error* makes a model unusable. A
 *warning* is very likely a mistake; `robosc check --strict` fails for one. A *note* is worth knowing.
 
-The *stage* tells who finds it: reading the *text*, checking the *model*, the *synthesis* of the supervisor, its
+The *stage* says who finds it: reading the *text*, checking the *model*, the *synthesis* of the supervisor, its
 *explanation* by `robosc explain-synthesis`, or what is made for one *target* or deployment. In the examples the finding
 is reported at the line that ends in `// <- here`.
 """

@@ -11,7 +11,7 @@ def no_supervisor(reason: str, place: Location) -> Diagnostic:
         reason: Reason in one sentence.
         place: Place of the robot's name.
     """
-    fix = "Run 'robosc synth': it tells what is to blame."
+    fix = "Run 'robosc synth': it shows what is to blame."
     return Diagnostic(Severity.WARNING, "no-supervisor", reason.rstrip("."), place, fix)
 
 

@@ -127,7 +127,8 @@ class _Checking:
         # Actions that were requested: their goals may be under way for longer than the model knows.
         self._requested: set[str] = set()
         model = replay.model
-        # What nothing is requested before; the executor asks again in another run, which a log does not tell whole.
+        # Identifiers whose first message must come before any request. Not checked after a restart: a log does not
+        # record every message of a later run.
         self._awaited = {item.identifier for item in model.communications if item.max_age is not None}
         self._identifiers = {event: item.identifier for item in model.communications for event in item.events}
         self._unknown_kinds: set[str] = set()
@@ -246,7 +247,7 @@ class _Checking:
         names = ", ".join(f"{item.name}.request" for item in candidates)
         match why:
             case "not allowed now":
-                # Which of several messages it was the log does not tell: one that is forbidden is reason enough.
+                # The log does not say which of several messages it was: one forbidden message is reason enough.
                 if not any(self._replay.refusal(f"{item.name}.request") for item in candidates):
                     self._wrong(entry, f"a request on {identifier} was held back, but {names} was allowed")
             case "stopped":

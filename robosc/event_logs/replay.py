@@ -283,7 +283,7 @@ class Replay:
         for component, behaviour in self._behaviours.items():
             entry = logged.get(component)
             if entry is None:
-                found.append(f"nothing is told of {component}")
+                found.append(f"the state of {component} is missing")
                 continue
             location = self.state[self._places[Subject(component)]]
             if entry["state"] != location:

@@ -155,12 +155,12 @@ def explain_problem(place: Workspace, monitor: BoundedMonitor, problems: Problem
     if fixed_point.initial == false:
         return EmptyExplanation(_NOWHERE, (), is_minimal=True, removal=(), is_of_automata=words.is_of_automata)
     fixed_point.solution(problem, false)
-    # What one synthesis takes, encoding and all, tells how large the problem is.
+    # The steps of one synthesis, encoding included, measure the size of the problem.
     monitor.limit = max(LEAST_EFFORT, EFFORT * monitor.steps)
     with place.reordering():
         blame = find_blame(problems, constraints, false, monitor)
     monitor.limit = None
-    # The trouble is that of what is blamed alone: so both tell one story.
+    # The counterexample is computed under the blamed constraints alone, so that it fits the blame.
     blamed = set(blame.conflict)
     dropped = (item for place, item in enumerate(constraints) if place not in blamed)
     analysis = Analysis(encoding, monitor, problems, constraints, false, dropped)

@@ -279,7 +279,7 @@ class Requests:
                 continue
             part = components.get(name)
             if not isinstance(part, Mapping):
-                raise StateError(f"nothing is told about component '{name}'")
+                raise StateError(f"the state of component '{name}' is missing")
             found.append(self._value(subject, part))
         return tuple(found)
 
@@ -300,7 +300,7 @@ class Requests:
         raw = variables.get(subject.variable) if isinstance(variables, Mapping) else None
         value = read_value(type_, raw)
         if value is None:
-            raise StateError(f"{subject} is not told as a value of {type_text(type_)}")
+            raise StateError(f"the value of {subject} is missing or is no {type_text(type_)}")
         return value
 
     # Why

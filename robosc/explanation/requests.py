@@ -155,7 +155,7 @@ class ModelQuestionReader(Requests):
         owner, name = found["owner"], found["name"]
         plants = {item.name: communication_plant_name(item) for item in self._model.communications}
         if found["kind"]:
-            # The word tells a service or action from a component of the same name.
+            # The word distinguishes a service or action from a component of the same name.
             automaton = f"{found['kind']} {owner}"
             plants = {name: plant for name, plant in plants.items() if plant.startswith(f"{found['kind']} ")}
             if automaton not in plants.values():

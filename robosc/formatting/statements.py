@@ -86,7 +86,7 @@ def find_structure(tokens: Tokens, tree: syntax.File) -> Structure:
 
     Args:
         tokens: Its tokens.
-        tree: Its syntax tree; it tells what words alone do not: which requirements are invariants.
+        tree: Its syntax tree, which shows what tokens alone do not: which requirements are invariants.
     """
     walker = _Walker(tokens, tree)
     walker.file()

@@ -148,7 +148,7 @@ def nested_types(parts: tuple[Part, ...]) -> frozenset[str]:
 
 
 def ros_version_of(parts: tuple[Part, ...], package: str) -> int | None:
-    """Return 1 or 2 if a definition is of that ROS alone, as far as its text tells, else None.
+    """Return 1 or 2 if the text of a definition fits only that version of ROS, else None.
 
     Args:
         parts: Parts of the definition.

@@ -1,8 +1,8 @@
 /* Decision diagrams over finitely many values: the operations of conditions/multivalued.py that take most of its time.
  *
  * Each operation takes the same steps in the same order as its twin in Python, and makes the same nodes with the same
- * numbers. Steps are counted: an operation is given how many there are left, and tells how many it took; it ends once
- * these are more.
+ * numbers. Steps are counted: an operation gets the number of steps that are left, and returns the number that it took.
+ * It fails when it needs more.
  */
 #include "kernel.h"
 

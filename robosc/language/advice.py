@@ -305,7 +305,7 @@ _ENDS_OF_LISTS = ({"','", "'}'"}, {"an operator", "','", "'}'"})
 
 
 def _of_what_is_missing(token: str, expected: Sequence[str]) -> str:
-    """Advice where nothing tells more than what is expected."""
+    """Advice if only the expected tokens are known."""
     if token in RESERVED_WORDS and any(word in expected for word in ("a name", "an expression", "a type")):
         return f"If '{token}' is meant as a name, write '^{token}'."
     if len(set(expected)) == 1 and expected[0][0] == "'":

@@ -34,8 +34,8 @@ _WHY = {
     Family.REPEAT: "what is allowed is requested again anyway",
     Family.KEEP_RUNNING: "what is allowed is requested again anyway",
     Family.RUN_ONCE: "what happens once leads to a state that nothing leaves",
-    Family.TIMEOUT: "the deployment's settings 'service_timeout' and 'action_timeout' tell how long a reply may take",
-    Family.RATE: "the deployment's setting 'period' tells how often it is decided",
+    Family.TIMEOUT: "the deployment's settings 'service_timeout' and 'action_timeout' say how long a reply may take",
+    Family.RATE: "the deployment's setting 'period' says how often it is decided",
     Family.TREE: "what is in a robot needs nothing around it",
 }
 
@@ -87,7 +87,7 @@ def why(family: Family) -> str:
 
 
 def advise(node: Node, declared: Declared, place: Place, written: str) -> str:
-    """Return the sentence that tells what a control node is in this language.
+    """Return the sentence that says what a control node is in this language.
 
     Args:
         node: The node.

@@ -21,7 +21,7 @@ _NEARBY = 3
 """Folders of a model that are searched: its own and those above it, where the packages of a workspace lie."""
 
 _GENERATED = ("idl",)
-"""Endings of definitions that are not read, but tell that a type exists."""
+"""Endings of definitions that are not read, but show that a type exists."""
 
 
 def interface_folders() -> tuple[Path, ...]:

@@ -42,9 +42,9 @@ def is_negation(texts: Sequence[str], kinds: Sequence[int], index: int, word: st
 
 
 def _is_conditional(texts: Sequence[str], kinds: Sequence[int], index: int) -> bool:
-    """Return True if the `if` at a token has a `then`: else it is the condition of a provide statement.
+    """Return True if the `if` at a token has a `then`; if not, it is the condition of a provide statement.
 
-    Operands and what stands behind them take turns, which tells the word `then` from a name.
+    Operands and operators alternate, which distinguishes the keyword `then` from a name.
     """
     conditions = depth = 0
     is_operand_next = True

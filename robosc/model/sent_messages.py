@@ -109,7 +109,7 @@ class SentMessages:
 
 
 def _leaves_frame_empty(value: ProvidedValue) -> bool:
-    """True if a provided value holds an empty frame: by name, where no definition tells headers from other fields."""
+    """True if a provided value holds an empty frame; without a definition, a field counts as a frame by its name."""
     if not isinstance(value, ObjectValue):
         return False
     return any(

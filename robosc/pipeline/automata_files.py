@@ -15,7 +15,7 @@ SUFFIXES = frozenset({_CIF, ".gen", ".wmod"})
 
 
 def is_automata(path: Path) -> bool:
-    """Return True if a file holds automata: the ending of its name tells."""
+    """Return True if a file holds automata, by the ending of its name."""
     return path.suffix in SUFFIXES
 
 

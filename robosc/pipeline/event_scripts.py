@@ -1,8 +1,8 @@
-"""Events with their data as a person writes them, one a line, or as an event log tells them.
+"""Events with their data, written by a person, one a line, or recorded in an event log.
 
 A line is the name of an event, and then nothing, data in JSON, or properties: `scan.response`, `level.response 3`,
 `scan.response {"front": 0.7}`, `scan.response front=0.7 word="two words"`. A word that is no JSON is a text, so that
-the value of an enum needs no quotes. Empty lines and those that begin with `#` say nothing.
+the value of an enum needs no quotes. Empty lines and lines that begin with `#` are ignored.
 """
 
 import json
@@ -28,7 +28,7 @@ _WORD = re.compile(r"\S+")
 
 
 class ScriptError(RoboscError, ValueError):
-    """Text that tells no event; the message says why."""
+    """Text that names no event; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -39,7 +39,7 @@ class ScriptedEvent:
         line: Number of its line, from 1.
         event: Its name; empty: the model begins again.
         data: Data that it carries; NO_DATA where none is reported.
-        target: Parts of the state that it leads to, as told; of events of automata.
+        target: Parts of the state that the event leads to, as they are written; only for automata.
     """
 
     line: int
@@ -54,11 +54,11 @@ def read_script(stream: BinaryIO, name: str, model: Model | None) -> tuple[Scrip
     Args:
         stream: The file, at its beginning.
         name: Name of the file, for messages.
-        model: Model that the events are of; None: they are of automata, of which there are no logs, and what follows
-            the name of an event, its data, may tell where it leads.
+        model: Model of the events. None for automata: they have no logs, and the state that an event leads to may
+            follow its name and data.
 
     Raises:
-        ScriptError: A line tells no event, or there is too much; the message begins with the place.
+        ScriptError: A line names no event, or the script is too large; the message begins with the place.
         OSError: It cannot be read.
     """
     content = stream.read(MAXIMUM_BYTES + 1)

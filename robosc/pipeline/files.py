@@ -35,7 +35,7 @@ def read_bounded(path: Path, most: int) -> bytes:
     """
     try:
         with path.open("rb") as stream:
-            # One byte more than is allowed tells that there are too many; a device could go on for ever.
+            # Reading one byte more than is allowed shows that the file is too large; a device might never end.
             return stream.read(most + 1)
     except OSError as error:
         raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error

@@ -73,11 +73,11 @@ def load(
     library_paths: Sequence[FileName] = (),
     interface_paths: Sequence[FileName] = (),
 ) -> LoadedModel:
-    """Load a model, library or automata, with all that is imported; `check` tells what is wrong with it.
+    """Load a model, library or automata, with all imported files; `check` reports what is wrong with it.
 
-    Libraries are looked for in the model's folder, in its sibling `../shared` and in `library_paths`; those of a text
-    as if it were a file of the current folder. A name that ends in `.cif`, `.gen` or `.wmod` is that of automata, which
-    are a `LoadedAutomata`; files that a CIF model imports are found from the folder of the file that imports them.
+    Libraries are looked for in the model's folder, in its sibling `../shared` and in `library_paths`. A text without a
+    file counts as a file of the current folder. A name that ends in `.cif`, `.gen` or `.wmod` names automata, which
+    become a `LoadedAutomata`. Files that a CIF model imports are found from the folder of the importing file.
 
     Args:
         path: File of the model.

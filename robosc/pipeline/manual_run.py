@@ -254,7 +254,7 @@ class ManualRun(ABC):
     ) -> Trouble | None:
         """Walk by chance until there is trouble, and return it; None if there was none.
 
-        What was found stays told: the next walk of this run goes on to something else.
+        Trouble that was found is not reported again: the next walk of this run looks for other trouble.
 
         Args:
             steps: Most events to take.

@@ -35,7 +35,7 @@ class VerificationStatus(StrEnum):
     NOT_CHECKED = "not checked"
     """No check failed, and not all were made."""
     PROPERTY_ERRORS = "property errors"
-    """A property cannot be understood: the diagnostics tell."""
+    """A property cannot be understood; the diagnostics say why."""
     NO_SUPERVISOR = "no supervisor"
     """The model has errors, or no supervisor exists."""
     UNSUPPORTED_MODEL = "unsupported model"

@@ -44,7 +44,7 @@ def event_log(run: "ManualRun") -> str:
 
 
 def entries_of(step: "Step", number: int) -> Iterator[dict[str, Any]]:
-    """Yield the entries of an event log that tell a step.
+    """Yield the entries of an event log that record a step.
 
     Args:
         step: The step.
@@ -67,7 +67,7 @@ def entries_of(step: "Step", number: int) -> Iterator[dict[str, Any]]:
 
 
 def state_by_component(state: "StateInWords") -> dict[str, dict[str, Any]]:
-    """The state and variables of each component with a behaviour, as event logs and executors tell them."""
+    """The state and variables of each component with a behaviour, in the form of event logs and executors."""
     found: dict[str, dict[str, Any]] = {
         name: {"state": place, "variables": {}} for name, place in state.components.items()
     }

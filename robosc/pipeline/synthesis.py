@@ -74,7 +74,7 @@ def synthesize(  # type: ignore[overload-overlap]
 ) -> SystemSynthesis: ...
 
 
-# The name of a file alone tells no type checker what is in it; modules are of automata.
+# A type checker cannot know from a file's name what is in it. Modules are made of automata only.
 @overload
 def synthesize(
     model: ModelLike,

@@ -1,7 +1,8 @@
-"""Simulation by hand of automata under their supervisor, on their explicit meaning (`robosc.automata.Semantics`).
+"""Manual simulation of automata under their supervisor, on their explicit semantics (`robosc.automata.Semantics`).
 
-Automata may leave open what happens: an uncontrollable event may have several edges, received data any value, and there
-may be several ways to begin. Nothing is chosen in silence: who leads the run says which, or is told the ways there are.
+Automata may be nondeterministic: an uncontrollable event may have several edges, received data may have any value, and
+there may be several initial states. The run never chooses by itself: its caller chooses, or gets an error that lists
+the choices.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -51,11 +52,11 @@ class ChoiceError(RoboscError, ValueError):
 
 
 def state_parts(system: System, text: str) -> dict[str, Value]:
-    """The parts of a state that a text tells, such as `Buffer = full, Buffer.count = 2`.
+    """The parts of a state that a text names, such as `Buffer = full, Buffer.count = 2`.
 
     Raises:
         UnknownNameError: There is no such part; the message names the nearest one.
-        ChoiceError: A part has no such value, or the text tells none.
+        ChoiceError: A part has no such value, or the text gives none.
     """
     found: dict[str, Value] = {}
     known = {str(subject): subject for subject in subjects(system)}
@@ -155,8 +156,8 @@ class SystemRun(ManualRun):
     ) -> Step:
         """Take an event; where that is not possible, nothing changes.
 
-        What is left out of the data may have any value; None is unknown. An event that can lead to several states is
-        told which by its data, or by parts of the state it is to lead to.
+        Data that is left out may have any value; None means unknown. If the event can lead to several states, its data
+        or parts of the target state choose one of them.
 
         Args:
             event: The event.
@@ -242,7 +243,7 @@ class SystemRun(ManualRun):
         raise ChoiceError(f"{what} can {verb} {len(found)} states: {offered}", example, keyword)
 
     def _alternatives(self, states: Sequence[State]) -> str:
-        """States by what tells them apart; of very many the first."""
+        """Text that lists states by the values in which they differ; the first ones if there are very many."""
         places = _varying(states) if len(states) > 1 else range(len(self._subjects))
         offered = [
             ", ".join(f"{self._subjects[place]} = {value_text(state[place])}" for place in places)

@@ -362,7 +362,7 @@ def verify_system(
     # The figure in a file is not believed either; that of a wrong supervisor says nothing more.
     stated, counted = supervisor.states, found.states
     is_miscounted = stated > 0 and counted not in (None, stated) and not found.failures
-    miscount = f"it tells of {stated}, and there are {counted}" if is_miscounted else ""
+    miscount = f"it states {stated}, and there are {counted}" if is_miscounted else ""
     status = (
         VerificationStatus.FAILED
         if found.failures or miscount

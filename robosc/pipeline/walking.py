@@ -152,7 +152,7 @@ class Walker(ABC):
         return Trouble(TroubleKind.UNKNOWN, step.event, why, count) if why else None
 
     def _is_news(self, found: Trouble | None, kinds: Collection[TroubleKind]) -> bool:
-        """Return True if there is trouble of a kind that is looked for, and it was not told before."""
+        """Return True if there is trouble of a kind that is looked for, and it was not reported before."""
         if found is None or found.kind not in kinds:
             return False
         key = (found.kind, found.event, found.why)
@@ -191,7 +191,7 @@ class ModelWalker(Walker):
                 yield event
 
     def _is_deaf(self) -> bool:
-        """Return True if a sensor with a `max_age` has told nothing yet."""
+        """Return True if a sensor with a `max_age` has sent no message yet."""
         silent = set(self._sensors)
         for step in self._run.history if silent else ():
             silent.discard(self._identifiers.get(step.event, ""))

@@ -35,7 +35,7 @@ class Bits:
         names: Current-state variables, most significant first.
         domain: The values, in the order of their indices.
         type: Type of the value, or None for a location.
-        known: Variable that tells whether the value is known at all, or None if it always is.
+        known: Variable that is true if the value is known, or None if it always is.
     """
 
     names: tuple[str, ...]

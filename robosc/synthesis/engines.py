@@ -221,7 +221,7 @@ def limited(manager: Manager, maximum_nodes: int | None) -> Iterator[None]:
             raise
     # Outside of the handler: the error would keep the frames, and they the nodes of a manager that is to end.
     if has_failed:
-        # Which of CUDD's error codes it was, dd does not tell. Tables of the operation alone are free again already.
+        # dd does not report CUDD's error code. The tables of the failed operation are already free again.
         if _memory_of(manager) < _NEARLY * allowed_bytes:
             raise MemoryError("the decision diagrams were refused memory")
         raise node_limit_error(maximum_nodes)

@@ -31,7 +31,7 @@ def _never() -> bool:
 
 
 def _silent(progress: SynthesisProgress) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 def synthesize(

@@ -144,7 +144,7 @@ class EventTable:
 
     Attributes:
         event: The event.
-        field: The bits that tell what it does, those that it changes included.
+        field: The bits that decide what the event does, and those that it changes.
         known: For the values of these bits met so far, what each possible step changes: bits to turn over. Nothing
             where the plants, the ranges or, for a controllable event, its conditions do not let it happen.
         bad: The values with which the event makes a state bad.

@@ -160,7 +160,7 @@ class InterpretedSystem:
         return True, None
 
     def matches(self, communication: str, data: Any) -> Match:
-        """Tell whether a message is an incoming message, by its condition `when`."""
+        """Return whether a message is an incoming message, by its condition `when`."""
         rule = self._when.get(communication)
         if rule is None:
             return MATCHES
@@ -194,7 +194,7 @@ class InterpretedSystem:
         }
 
     def signature(self) -> Any:
-        """A value that tells states apart."""
+        """Return a hashable value that differs between states."""
         return tuple(self._state.values())
 
     def _successor(self, rule: EventRule, data: Data) -> _Successor | None:

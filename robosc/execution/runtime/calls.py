@@ -120,7 +120,7 @@ class Goals:
     """
     Goals under way, by id; at most one of an action.
 
-    :param system: Tells which requirements hold.
+    :param system: The system, which decides which requirements hold.
     :param actions: Names of the actions, in source order.
     :param timeout_s: Seconds until a goal counts as failed, or None.
     """

@@ -56,7 +56,7 @@ class Layer(Runner):
     :param clock: The only source of time; the computer's if None.
     :param log: The event log; none if None.
     :raises DeploymentError: The model has actions and the supervisor was made for a controller, or
-        the model does not tell its incoming messages on one identifier apart.
+        it does not distinguish its incoming messages on one identifier.
     :raises SettingsError: A setting is wrong, or names what the model does not have.
     """
 
@@ -243,7 +243,7 @@ class Layer(Runner):
                 self._notify(self._caller.end_goal, waiting.action, waiting.goal_id, end, data)
 
     def _finish(self) -> None:
-        """Tell the caller what has failed, or turned against its requirements. Never raises."""
+        """Report calls and goals that failed or violate a requirement. Never raises."""
         for call in self._callers.close_failed_calls():
             self._notify(self._caller.answer_default, call.service, call.call_id)
         for goal in self._callers.close_failed_goals():
@@ -338,7 +338,7 @@ class Layer(Runner):
         self._notify(self._caller.blocked, identifier)
 
     def _notify(self, method: Callable[..., None], *arguments: Any) -> None:
-        """Tell the caller something; what fails is a fault. Never raises."""
+        """Notify the caller; a failure of the call is a fault. Never raises."""
         try:
             method(*arguments)
         except Exception as error:

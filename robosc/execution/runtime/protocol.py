@@ -201,16 +201,16 @@ class ControlledSystem(Protocol):
 
     def matches(self, communication: str, data: Any) -> Match:
         """
-        Tell whether a message is an incoming message, by its condition `when`.
+        Return whether a message is an incoming message, by its condition `when`.
 
         Never raises for any data.
         """
 
     def requirements(self, communication: str) -> Tuple[bool, ...]:
-        """Tell of each requirement on a communication's request whether it holds, in order."""
+        """Return for each requirement on a communication's request whether it holds, in order."""
 
     def conjuncts(self, communication: str) -> Tuple[bool, ...]:
-        """For each top-level conjunct of those requirements: whether it holds now."""
+        """Return for each top-level conjunct of those requirements whether it holds now."""
 
     def location(self, communication: str) -> str:
         """Location of a service's or action's plant."""
@@ -219,7 +219,7 @@ class ControlledSystem(Protocol):
         """Return {component: {"state": s, "variables": {v: value}}} for those with a behaviour."""
 
     def signature(self) -> Any:
-        """Return a hashable value that tells states apart."""
+        """Return a hashable value that differs between states."""
 
 
 class RobotSide(Protocol):
@@ -272,7 +272,7 @@ class LayerMiddleware(Protocol):
         """Pass on a message of the robot, unchanged, after the supervisor has seen it."""
 
     def blocked(self, identifier: str) -> None:
-        """Tell that a request on an identifier was held back."""
+        """Report that a request on an identifier was held back."""
 
     def answer(self, communication: str, call_id: Any, data: Any) -> None:
         """Pass on the service's reply to a call, unchanged."""

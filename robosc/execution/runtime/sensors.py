@@ -30,12 +30,11 @@ class _Sensor:
 
 class Sensors:
     """
-    Tells which sensors are stale. Several messages of the model may come on one identifier.
+    Monitor of stale sensors. Several messages of the model may come on one identifier.
 
     :param messages: Name and identifier of every outgoing message, in source order, and its
         maximum age in seconds as the model has it, or None.
-    :param max_age_s: Maximum age by identifier, as the deployment has it: it stands above the
-        model.
+    :param max_age_s: Maximum age by identifier, from the deployment: it overrides the model's.
     """
 
     __slots__ = ('_sensors',)

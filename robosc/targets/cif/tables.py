@@ -24,7 +24,7 @@ MAXIMUM_TRIED = 20 * MAXIMUM_COMBINATIONS
 """Combinations beyond which nothing more of one model is tried out."""
 
 MAXIMUM_CASES = 1_000
-"""Cases that one table may tell apart."""
+"""Cases that one table may have."""
 
 
 class TableTooLargeError(Exception):
@@ -123,7 +123,7 @@ class _Builder:
         sources: Sources that are read.
         domains: Their values.
         values: Results of all combinations, the last source changing fastest.
-        cases: Runs of values told apart so far.
+        cases: Cases so far, each a run of equal values.
     """
 
     sources: Sequence[Source]

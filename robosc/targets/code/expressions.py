@@ -144,7 +144,7 @@ def integer(value: int) -> Code:
 
 
 def double(value: float) -> Code:
-    """A double in the fewest digits that tell it apart."""
+    """A double in the fewest digits that distinguish it from every other."""
     return literal(repr(value), Sort.DOUBLE, is_signed=copysign(1, value) < 0)
 
 

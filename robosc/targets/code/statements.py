@@ -21,7 +21,7 @@ class Let(NamedTuple):
     Attributes:
         place: The variable.
         value: Its value.
-        type: Its type where that is not told by the sort of the value, for a language that declares types.
+        type: Its type, for a language that declares types, if the sort of the value does not determine it.
     """
 
     place: Code

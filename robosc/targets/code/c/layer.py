@@ -9,7 +9,7 @@ _SENT = "{prefix}_sent_t what"
 
 
 def request_parameters(layout: Layout, identifier: str) -> dict[str, tuple[str, Type]]:
-    """Parameter and type, by C type, of the data that the messages on an identifier are told apart by."""
+    """Parameter and type, by C type, of the data that distinguishes the messages on an identifier."""
     types: dict[str, Type] = {}
     for item in recognized_by_data(layout.model, identifier):
         data = request_data(item)

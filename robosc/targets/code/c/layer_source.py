@@ -34,9 +34,10 @@ def request_functions(unit: Unit) -> list[list[str]]:
 
 
 def _match_function(unit: Unit, item: Communication) -> list[str]:
-    """The function that tells by its condition whether a message is an incoming message of the model.
+    """The function that decides by the condition `when` whether a message is an incoming message of the model.
 
-    Every part that the condition reads is converted first, whether it decides or not: what is unknown is noted.
+    Every part that the condition reads is converted first, even one that does not decide, so that every unknown part
+    is noted.
     """
     layout, data = unit.layout, request_data(item)
     if item.when is None:

@@ -253,7 +253,7 @@ def recognized_by_data(model: Model, identifier: str) -> tuple[Communication, ..
 
 
 def request_data(item: Communication) -> Type | None:
-    """Type of the data that an incoming message is told apart by, if any."""
+    """Type of the data that an incoming message carries, which `when` reads; None without data."""
     return None if isinstance(item.request, NoneType) else item.request
 
 

@@ -113,7 +113,7 @@ def _read(text: str, lines: Sequence[str]) -> Iterator[tokenize.TokenInfo]:
 
 
 def _broken(line: str, tokens: Sequence[_Token], is_inside: bool) -> Iterator[str]:
-    """A line as several; `is_inside` tells that it stands between brackets."""
+    """A line as several; `is_inside` is true if it stands between brackets."""
     if len(line) <= WIDTH or line.endswith(_MARK):
         yield line
         return

@@ -24,7 +24,7 @@ def matches_method(writer: Writer, communication: Communication) -> list[str]:
         reader.read(path)
     name, words = (
         writer.layout.methods["matches", communication.name],
-        f"Tell whether a message is {communication.name}.",
+        f"Return whether a message is {communication.name}.",
     )
     holds = Return(call("Match", reader.scope.truth(condition), *reader.noted))
     body = [*reader.take(), Comment(f"when: {expression_text(condition)}"), holds]

@@ -170,7 +170,7 @@ class ActionGoals:
             abandoned.handle.cancel()
 
     def _abandon(self, goal_id: int) -> None:
-        """Tell that a goal is lost; it may be running, or on its way, and it is not forgotten."""
+        """Report a goal as lost, and keep it: it may be running, or on its way to the server."""
         self._abandoned[goal_id] = AbandonedGoal(self._goals[goal_id].handle)
         self._end(goal_id, 'lost')
 

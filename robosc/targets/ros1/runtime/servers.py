@@ -183,7 +183,7 @@ class ServedAction:
         self._try_to('rejection', self._forgotten(number).set_rejected)
 
     def feedback(self, number: int, data: Any) -> None:
-        """Tell how far a goal is."""
+        """Publish feedback on a goal."""
         handle = self._goals[number]
         self._try_to('feedback', lambda: handle.publish_feedback(data))
 

@@ -205,7 +205,7 @@ class ActionGoals:
             self._cancel_abandoned(goal_id)
 
     def _abandon(self, goal_id: int) -> None:
-        """Tell that a goal is lost; an accepted one may be running, and is not forgotten."""
+        """Report a goal as lost, and keep it if it was accepted: it may still be running."""
         handle = self._goals[goal_id].handle
         if handle is not None:
             self._abandoned[goal_id] = AbandonedGoal(handle)

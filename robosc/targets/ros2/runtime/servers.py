@@ -213,7 +213,7 @@ class ServedAction:
         self._goals[number] = _Goal()
 
     def feedback(self, number: int, data: Any) -> None:
-        """Tell how far a goal is."""
+        """Publish feedback on a goal."""
         goal = self._goals.get(number)
         if goal is None or goal.handle is None:
             return

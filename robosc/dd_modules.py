@@ -1,7 +1,7 @@
-"""The engines of dd, loaded without what they would only draw with.
+"""The engines of dd, loaded without the package that they only draw with.
 
-dd imports networkx wherever that is installed, to offer its graphs; that takes three times as long as the rest of it,
-and nobody here asks for one. dd goes on without it.
+dd imports networkx if it is installed, to offer its graphs. This import takes three times as long as the rest of dd,
+and RoboSC uses no such graph. dd works without networkx.
 """
 
 import importlib

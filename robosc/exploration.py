@@ -1,7 +1,7 @@
-"""The graph of everything the controlled system may do: as JSON values, as a table, as a drawing.
+"""The graph of all states and transitions of the controlled system: as JSON values, as a table, as a drawing.
 
-Everything allowed is in it, not only what an executor would choose. It works on plants, requirements and
-added conditions alone, so it says nothing that synthesis could have hidden.
+The graph has everything that is allowed, not only what an executor would choose. It is made from plants, requirements
+and added conditions alone, independently of synthesis.
 """
 
 from collections.abc import Callable, Mapping

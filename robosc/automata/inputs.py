@@ -1,7 +1,7 @@
 """All the data that one occurrence of an event can carry.
 
-The environment chooses a value for each received datum, and for each array how long it is: an element
-is unknown when its index, or the index of an array around it, lies outside.
+The environment chooses a value for each received datum, and a length for each array. An element is unknown if its
+index, or the index of an enclosing array, is beyond the length.
 """
 
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,7 @@
 """From a bundle of texts to a certified supervisor: the whole pipeline in one call.
 
-Every door to the product (command line, service, tests) goes through `make_supervisor`, so the same
-bundle gives the same supervisor wherever it is made.
+The command line, the service and the tests all call `make_supervisor`, so the same bundle gives the same supervisor
+everywhere.
 """
 
 from collections.abc import Callable

@@ -1,8 +1,9 @@
 """Verification of an untrusted supervisor file against its model.
 
-Nothing in the file is believed: its model is compared with the one that is read anew from the texts, its added
-conditions are verified on that one, and its certificate is compared with what is found. A digest in a file proves
-nothing, since whoever changes the file can change the digest: a difference is reported, but decides nothing.
+Nothing in the file is trusted. Its model is compared with the model that is read again from the texts, its added
+conditions are verified on the model from the texts, and its certificate is compared with the result of that
+verification. A digest in a file proves nothing, because a person who changes the file can change the digest, too: a
+different digest is reported, but does not change the verdict.
 """
 
 from collections.abc import Callable

@@ -1,4 +1,4 @@
-"""CIF models, checked: every finding, and the automata of a model without errors."""
+"""Check of CIF models: every finding, and the automata of a model without errors."""
 
 import os
 import posixpath

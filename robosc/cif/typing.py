@@ -1,4 +1,4 @@
-"""Types of CIF's names: of what is declared, with its static value or the expression that it becomes."""
+"""Types of CIF's names: the type of each declaration, with its static value or the expression that it becomes."""
 
 from dataclasses import replace
 

@@ -1,8 +1,8 @@
 """Output of the commands, and the exit codes: shared by `robosc` and `robosc-client`.
 
-Results go to standard output, findings and progress to standard error; with `--json` one JSON document
-goes to standard output and holds the findings too. Where a command cannot do what it was asked, that document is
-`{"error": ...}`, and the message goes to standard error all the same.
+Results go to standard output, findings and progress to standard error. With `--json`, one JSON document goes to
+standard output and also holds the findings. If a command fails, the document is `{"error": ...}`, and the message goes
+to standard error as well.
 """
 
 import codecs

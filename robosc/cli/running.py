@@ -1,6 +1,6 @@
-"""Running of a command: arguments are read, output arrives or its loss is reported, errors become a message.
+"""Running of a command: it reads arguments, reports lost output, and turns errors into a message.
 
-It loads no command, so that programs beside `robosc` run theirs in the same way.
+The module loads no command, so that other programs than `robosc` run their commands in the same way.
 """
 
 import argparse

@@ -1,8 +1,7 @@
 """The supervisor's conditions in the model's words: a short formula, else the decision diagram node by node.
 
-The diagram is written as numbered lines that read from the top down, each in the language's own `if ... then ... else`,
-where `[n]` stands for line n; a line is written once however often it is needed, so the text is never larger than the
-diagram.
+The diagram is written as numbered lines, from the top down. Each line is an `if ... then ... else` of the language, in
+which `[n]` stands for line n. Each line is written only once, so the text is never larger than the diagram.
 """
 
 import re

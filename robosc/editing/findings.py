@@ -1,4 +1,4 @@
-"""Findings of editors, which show findings alone, where the command line says something in words."""
+"""Findings for editors, which show only findings, about results that the command line prints as text."""
 
 from robosc.errors import Diagnostic, Severity
 from robosc.source import Location

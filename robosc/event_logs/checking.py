@@ -1,10 +1,10 @@
 """Check whether the events that a log reports could have happened under a supervisor.
 
-The events are replayed from the initial state on the automata: each request must have been allowed by plants, ranges,
-requirements and what synthesis has added in the state that the events before it led to, each other event must have
-been possible, and each logged state must be the one that they lead to. Resets, cancels and tau transitions stand in a
-log as events like any other; a request is wrong while one of the resets or taus was still to be taken, since the
-executor takes them first. Where something is wrong the replay goes on from what the log reports.
+The events are replayed from the initial state on the automata. Each request must be allowed in the state before it, by
+plants, ranges, requirements and the conditions of the supervisor. Each other event must be possible, and each logged
+state must be the state that the events lead to. Resets, cancels and tau transitions are logged like other events. A
+request is wrong if an enabled reset or tau was not taken before it, because the executor takes these first. After a
+violation, the replay continues from the logged state.
 """
 
 import json

@@ -1,6 +1,6 @@
-"""Layouts of Foxglove for converted logs: its panels, filled with the topics of one log.
+"""Layouts of Foxglove for converted logs: panels that show the topics of one log.
 
-The file is what Foxglove imports as a layout (`Import from file`): panels by name, and how they share the window.
+Foxglove imports the file as a layout (`Import from file`): it has the panels by name, and their places in the window.
 """
 
 from collections.abc import Mapping, Sequence

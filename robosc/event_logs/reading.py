@@ -1,4 +1,4 @@
-"""Reads event logs, which may come from anywhere: every size is bounded, and errors are reported with their lines."""
+"""Reader of event logs. Logs are untrusted: every size is bounded, and errors are reported with their lines."""
 
 import json
 from collections.abc import Iterator, Mapping

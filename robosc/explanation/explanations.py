@@ -1,6 +1,6 @@
-"""Explanations as values: what commands print, services send and programs read; `document` makes JSON values of them.
+"""Explanations as values: commands print them, services send them, programs read them; `document` makes JSON of them.
 
-They travel from a service to its client, so they are frozen values of plain types that msgspec can validate.
+A service sends them to its client, so they are frozen values of plain types that msgspec can validate.
 """
 
 from dataclasses import dataclass
@@ -18,8 +18,8 @@ class Part:
     """A part of the model.
 
     Attributes:
-        kind: `requirement`, `invariant`, `condition`, `range`, `marking`; `component`, `communication`, `state`; of
-            automata that are no model's also `plant`.
+        kind: `requirement`, `invariant`, `condition`, `range`, `marking`; `component`, `communication`, `state`; for
+            automata without a model also `plant`.
         text: Description of the part, in the model's words.
         location: Place of the part.
     """
@@ -36,8 +36,8 @@ class StateValues:
     Attributes:
         components: State of every component with a behaviour.
         variables: Value of every synthesis variable, by `Component.variable`.
-        communications: Location of every service and action; of one that is called like a component, by
-            `service name` or `action name`.
+        communications: Location of every service and action, by name; by `service name` or `action name` if a component
+            has the same name.
     """
 
     components: dict[str, str]
@@ -67,9 +67,9 @@ class Reason:
     Attributes:
         kind: `behaviour`, `range`, `requirement` or `supervisor`.
         message: Reason in one sentence.
-        part: The part of the model, or None where it is the supervisor.
-        way: A shortest run to a state where it is so, or None where the state is given.
-        trouble: Counterexample that would follow, where the supervisor forbids it.
+        part: The part of the model, or None if the supervisor is the reason.
+        way: A shortest run to a state where the reason applies, or None if the state is given.
+        trouble: Counterexample that would follow, if the supervisor forbids the event.
     """
 
     kind: str
@@ -81,13 +81,13 @@ class Reason:
 
 @dataclass(frozen=True, slots=True)
 class Stopped:
-    """A way to some goal by the behaviours alone, and where it is stopped.
+    """A way of the behaviours alone to some goal, and the place where it is stopped.
 
     Attributes:
         events: Events of the whole way.
-        stopped_at: Place of the event, from 0, that must not happen.
+        stopped_at: Place, from 0, of the event that must not happen.
         state: The state before that event.
-        reasons: Reasons why it must not happen; none where it is uncontrollable and leads into trouble.
+        reasons: Reasons why it must not happen; none if it is uncontrollable and leads into trouble.
     """
 
     events: tuple[str, ...]
@@ -101,14 +101,14 @@ class CounterexampleReport:
     """A run into trouble.
 
     Attributes:
-        kind: `bad`, where an invariant, a range or a condition is broken at the end; `blocking`, where no marked state
-            can be reached from there; `nowhere`, where no run begins, since there is no initial state.
+        kind: `bad` if an invariant, a range or a condition is violated at the end; `blocking` if no marked state can be
+            reached from there; `nowhere` if there is no run, because there is no initial state.
         way: The run.
         is_forced: True if nothing can prevent it: all of its events are uncontrollable.
         messages: Sentences that say what the trouble is.
-        parts: Parts of the model that are broken.
-        stopped: Way that the behaviours would have to a marked state, for a state that blocks; None where they have
-            none, or finding one takes too long, which is then one of the messages.
+        parts: Parts of the model that are violated.
+        stopped: Way of the behaviours to a marked state, for a state that blocks; None if they have none, or if the
+            search takes too long, which one of the messages then says.
     """
 
     kind: str
@@ -125,7 +125,7 @@ class Blamed:
 
     Attributes:
         part: The part.
-        suffices: True if there is a supervisor without this part alone; None where that was not found out.
+        suffices: True if removing only this part gives a supervisor; None if that is not known.
     """
 
     part: Part
@@ -138,10 +138,9 @@ class EmptyExplanation:
 
     Attributes:
         trouble: A run into trouble.
-        blamed: Parts of the model that, without any other requirement, range or marking, leave no supervisor.
+        blamed: Parts of the model that alone, without any other requirement, range or marking, leave no supervisor.
         is_minimal: True if it is known that each of them is needed for that.
-        removal: The fewest parts, in the sense that none of them can stay, without which there is a supervisor; empty
-            where that was not found out, or there are very many.
+        removal: A minimal set of parts without which there is a supervisor; empty if it is not known, or very large.
         left_out: Number of blamed parts that are not listed.
         is_of_automata: True if it is about automata that are no model's: their plants are no behaviours.
     """
@@ -172,12 +171,12 @@ class EventReport:
     Attributes:
         event: The event.
         is_controllable: True if the supervisor may disable it.
-        status: `free`, where it can happen wherever the behaviours let it; `restricted`; `never`, where it can happen
-            nowhere.
-        reasons: Reasons that keep it from happening, each with a shortest run to a state where it does.
-        stopped: Way to where the behaviours would let it happen, for an event that they never let happen, and why
-            that is stopped.
-        unfound: Sentence in place of that way, where finding one takes too long; else empty.
+        status: `free` if it can happen wherever the behaviours allow it; `never` if it can happen nowhere; else
+            `restricted`.
+        reasons: Reasons that block it, each with a shortest run to a state where the reason applies.
+        stopped: Way to a state in which the behaviours would allow it, for an event that can never happen, and the
+            reason why the way is stopped.
+        unfound: Sentence in place of that way, if the search takes too long; else empty.
     """
 
     event: str
@@ -204,8 +203,8 @@ class StateReport:
 
     Attributes:
         way: A run to it.
-        fitting: Number of states of the controlled system that fit what was asked, as a decimal number.
-        events: The events asked for.
+        fitting: Number of states of the controlled system that fit the description, as a decimal number.
+        events: The requested events.
     """
 
     way: Path
@@ -220,9 +219,9 @@ class Remark:
     Attributes:
         kind: `never-enabled`, `unused-requirement`, `unreachable-state`, `only-uncontrollable` or `deadlock`.
         message: One sentence.
-        location: Place in the text, or None where it is about no single part.
-        way: A shortest run to such a state, where there is one.
-        stopped: Way that the behaviours would have to a state that is not reachable, and where it is stopped.
+        location: Place in the text, or None if the remark is about no single part.
+        way: A shortest run to such a state, if there is one.
+        stopped: Way of the behaviours to a state that is not reachable, and the place where it is stopped.
     """
 
     kind: str
@@ -237,10 +236,10 @@ class Explanation:
     """Explanation of what synthesis did to a model.
 
     Attributes:
-        empty: Explanation why there is no supervisor, or None where there is one.
-        events: The events asked for; where none was, every controllable event. Empty where a state was asked for.
-        state: Report on what can happen in the state asked for.
-        remarks: Warnings, where neither an event nor a state was asked for.
+        empty: Explanation why there is no supervisor, or None if there is one.
+        events: Reports on the requested event, or on every controllable event; empty if a state was requested.
+        state: Report on what can happen in the requested state.
+        remarks: Warnings, if neither an event nor a state was requested.
         is_of_automata: True if it is about automata that are no model's: their plants are no behaviours.
     """
 
@@ -273,12 +272,12 @@ def document(explanation: Explanation | EmptyExplanation) -> dict[str, Any]:
 
 
 def to_text(explanation: Explanation | EmptyExplanation) -> str:
-    """An explanation as one JSON text, which `whole_from_text` reads, or `from_text` where it is of no supervisor."""
+    """An explanation as one JSON text, for `whole_from_text`, or for `from_text` if there is no supervisor."""
     return msgspec.json.encode(explanation).decode()
 
 
 def from_text(text: str) -> EmptyExplanation:
-    """The explanation that a text holds, validated.
+    """The explanation, why there is no supervisor, from a text; it is validated.
 
     Raises:
         ValueError: It holds none.
@@ -287,7 +286,7 @@ def from_text(text: str) -> EmptyExplanation:
 
 
 def whole_from_text(text: str) -> Explanation:
-    """The explanation of what synthesis did that a text holds, validated.
+    """The explanation of what synthesis did, from a text; it is validated.
 
     Raises:
         ValueError: It holds none.

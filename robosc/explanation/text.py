@@ -1,4 +1,4 @@
-"""Explanations as texts for a terminal: a thought a line, places as `file:line:column`."""
+"""Explanations as texts for a terminal: one statement on each line, places as `file:line:column`."""
 
 from collections.abc import Iterator
 
@@ -41,7 +41,7 @@ class _Text:
     """Lines about one explanation.
 
     Args:
-        is_of_automata: True if it is about automata that are no model's.
+        is_of_automata: True if it is about automata that come from no model.
     """
 
     def __init__(self, *, is_of_automata: bool) -> None:
@@ -100,7 +100,7 @@ class _Text:
         Args:
             item: The trouble.
             start: Place where a run begins, in words.
-            here: The place where there is no run, in words.
+            here: The place in words if there is no run.
         """
         if not item.way.events:
             yield f"{here}:"

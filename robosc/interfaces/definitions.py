@@ -1,6 +1,6 @@
 """Reader of ROS interface definitions: the texts of `.msg`, `.srv` and `.action` files, of ROS 1 and of ROS 2.
 
-The format is that of genmsg (ROS 1) and of rosidl_adapter (ROS 2), which are alike but for bounds and default values.
+The formats are those of genmsg (ROS 1) and rosidl_adapter (ROS 2). They differ only in bounds and default values.
 """
 
 import re

@@ -1,6 +1,6 @@
-"""Advice on how to fix a syntax error: the word that was meant, or what a habit of another language should be here.
+"""Advice on how to fix a syntax error: the word that was meant, or how to write a construct of another language here.
 
-Whoever obeys it to the letter gets rid of the error: an editor does so (`robosc.editing.fixes`).
+Advice that is followed literally removes the error; editors apply it automatically (`robosc.editing.fixes`).
 """
 
 import difflib

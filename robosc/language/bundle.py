@@ -1,4 +1,4 @@
-"""Finds the files of a run: the model, and the libraries that it imports from (language A.4)."""
+"""Search for the files of a run: the model, and the libraries that it imports from (language A.4)."""
 
 import os
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""Control nodes of behaviour trees and SMACH in a text: which words they are, and what stands in them.
+"""Control nodes of behaviour trees and SMACH in a text: their words and their content.
 
 The language has no control nodes, but people who know behaviour trees write them. `control_node_advice` says how to
 write such a node in this language, with the names that it uses.

@@ -1,10 +1,10 @@
-"""A place among the tokens of a text, and what a recursive-descent parser does there.
+"""A place among the tokens of a text, with the basic operations of a recursive-descent parser.
 
-It knows what words were expected, reports syntax errors, and goes on behind them.
+It remembers the expected words, reports syntax errors, and continues after them.
 
-After an error the parser goes on in panic mode (A. V. Aho, M. S. Lam, R. Sethi, J. D. Ullman, Compilers, 2nd ed., 2006,
-sec. 4.8): it skips to a word that can begin an item of one of the lists that are open, or to the brace that closes
-the innermost one.
+After an error the parser continues in panic mode (A. V. Aho, M. S. Lam, R. Sethi, J. D. Ullman, Compilers, 2nd ed.,
+2006, sec. 4.8): it skips to a word that can begin an item of one of the open lists, or to the brace that closes the
+innermost list.
 """
 
 import difflib

@@ -1,6 +1,6 @@
-"""Finds the definitions of the middleware types that a model uses: the `.msg`, `.srv` and `.action` files of ROS.
+"""Search for the definitions of the middleware types that a model uses: the `.msg`, `.srv` and `.action` files of ROS.
 
-ROS itself is not needed for that, only its files.
+It needs only the files of ROS, not ROS itself.
 """
 
 import os

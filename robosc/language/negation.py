@@ -1,6 +1,6 @@
-"""The word `not` where an operand begins: an operator before what could not follow a name, else a name.
+"""The word `not` at the beginning of an operand: a name if a token that can follow a name comes next, else an operator.
 
-So a model in which something is called `not` keeps its meaning, and `^not` is always a name.
+So a model that uses `not` as a name keeps its meaning; `^not` is always a name.
 """
 
 from collections.abc import Sequence

@@ -1,4 +1,4 @@
-"""Facts about a text without reading it by the grammar, so of broken texts too: the libraries it is about."""
+"""Facts about a text that need no parser and so work for broken texts, too: the libraries that it imports."""
 
 from collections.abc import Iterator
 

@@ -1,4 +1,4 @@
-"""Collects what the checks find."""
+"""Collection of the findings of all checks."""
 
 import re
 from collections.abc import Collection, Iterable

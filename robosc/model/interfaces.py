@@ -1,9 +1,9 @@
 """Communications against the definitions of their middleware types (language A.5).
 
-Whatever a generated node would refuse at its start is reported here, and is an error for the ROS packages with such
-nodes (`robosc.targets.ros.errors`): a supervisor can be made all the same, for whatever runs without ROS. That holds
-for definitions of the user's own, too, which say for certain that a node would not start: what a model means does not
-depend on the packages that are installed where it is read.
+Each mismatch that would keep a generated node from starting is reported here. It is an error for the ROS packages with
+such nodes (`robosc.targets.ros.errors`), but a supervisor can still be made, for targets without ROS. The same holds
+for the user's own definitions, although with them it is certain that a node would not start: the meaning of a model
+must not depend on the packages that are installed on the machine that reads it.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence

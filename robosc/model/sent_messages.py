@@ -1,4 +1,4 @@
-"""Messages that a controller sends: headers that nothing stamps, and values that do not fit into their fields."""
+"""Messages that a controller sends: headers without a stamp, and values that do not fit their fields."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence

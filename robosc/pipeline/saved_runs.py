@@ -1,4 +1,4 @@
-"""Runs that are kept: as an event log, and as a test for pytest that leads a run the same way."""
+"""Saved runs: as an event log, and as a test for pytest that takes the same events."""
 
 import math
 import os
@@ -23,7 +23,7 @@ _WIDTH = 112
 
 @dataclass(frozen=True, slots=True)
 class ModelOfTest:
-    """A model, or a supervisor's file, as a test loads it.
+    """A model, or a supervisor's file, that a test loads.
 
     Attributes:
         path: Its file.
@@ -39,7 +39,7 @@ class ModelOfTest:
 
 
 def event_log(run: "ManualRun") -> str:
-    """Return the text of an event log of a run; its clock counts the events, a second each."""
+    """Return the text of an event log of a run, with one second for each event."""
     return "".join(json_line(entry) for number, step in enumerate(run, start=1) for entry in entries_of(step, number))
 
 
@@ -48,7 +48,7 @@ def entries_of(step: "Step", number: int) -> Iterator[dict[str, Any]]:
 
     Args:
         step: The step.
-        number: Its number in the run, from 1, which is its time in seconds, too.
+        number: Its number in the run, from 1, which is also its time in seconds.
     """
     values = step.provided if step.is_controllable else dict(step.data)
     if step.unknown:
@@ -117,12 +117,12 @@ _SYNTHESIZED = """\
 
 
 def pytest_module(run: "Run", model: ModelOfTest, file: Path) -> str:
-    """Return the text of a test for pytest that leads a run through the same events.
+    """Return the text of a test for pytest that takes the same events.
 
     Args:
         run: The run.
         model: The model that the test loads.
-        file: File that the test will stand in: the model is named as seen from there.
+        file: File of the test: the path of the model is relative to it.
     """
     from robosc.pipeline.simulation import Run
 
@@ -164,7 +164,7 @@ def _is_same(a: object, b: object) -> bool:
 
 
 def _plain(given: Any) -> Any:
-    """Data as literals of Python; ... where none was given."""
+    """Data as literals of Python; `...` if none was given."""
     if given is NO_DATA:
         return ...
     if isinstance(given, Mapping):
@@ -176,7 +176,7 @@ def _plain(given: Any) -> Any:
 
 
 class _Text(str):
-    """A number that Python has no literal for, as the expression that stands for it."""
+    """A number without a literal in Python, as an expression."""
 
     def __repr__(self) -> str:
         return str(self)

@@ -1,4 +1,4 @@
-"""Walks by chance through the controlled system, and the trouble that they may end in."""
+"""Random walks through the controlled system, and the trouble that they may find."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterable, Iterator
@@ -22,13 +22,13 @@ class TroubleKind(StrEnum):
     DEADLOCK = "deadlock"
     """No event at all can happen, in a state that is not marked."""
     WAITING = "waiting"
-    """No event is allowed and no service or action is under way, in a state that is not marked: only a message from
-    outside can go on."""
+    """No event is allowed and no service or action is under way, in a state that is not marked: the robot waits for a
+    message from outside."""
     BLOCKED = "blocked"
-    """The behaviours could do a request that requirements or the supervisor forbid."""
+    """The behaviours allow a request that requirements or the supervisor forbid."""
     UNKNOWN = "unknown"
-    """Data was unknown: an enum fell to its default past an unknown rule, a number was moved into its range, an
-    update was skipped, or what a request sends is unknown, so that it is not issued."""
+    """Data was unknown: an enum got its default because a rule was unknown, a number was moved into its range, an
+    update was skipped, or the data of a request is unknown, so that it is not issued."""
 
 
 ALL_TROUBLE = frozenset(TroubleKind)
@@ -36,13 +36,13 @@ ALL_TROUBLE = frozenset(TroubleKind)
 
 @dataclass(frozen=True, slots=True)
 class Trouble:
-    """Trouble that a walk has ended in.
+    """Trouble that has ended a walk.
 
     Attributes:
         kind: Kind of trouble.
-        event: The event that was blocked, or at which something was unknown; empty: it is about the state.
-        why: Sentences that say what is the matter; at least one.
-        steps: Number of events that the walk took before, that of the trouble included.
+        event: The event that was blocked, or whose data was unknown; empty if the trouble is about the state.
+        why: Sentences that describe the trouble; at least one.
+        steps: Number of events of the walk, including the event of the trouble.
     """
 
     kind: TroubleKind
@@ -83,18 +83,18 @@ class Walker(ABC):
 
     @abstractmethod
     def _take(self, event: str, dice: Random) -> "Step":
-        """Take an event, with data by chance."""
+        """Take an event with random data."""
 
     @abstractmethod
     def _at_event(self, event: str, count: int) -> Trouble | None:
-        """Trouble with an event that is therefore not taken."""
+        """Trouble with an event, which is then not taken."""
 
     def forget(self) -> None:
-        """Begin anew: all trouble is news again."""
+        """Forget all reported trouble, so that it is reported again."""
         self._reported.clear()
 
     def walk(self, steps: int, seed: int) -> "tuple[Step, ...]":
-        """Take events by chance; parameters as of `Run.walk`."""
+        """Take random events; parameters as of `Run.walk`."""
         dice, taken = Random(seed), list["Step"]()  # noqa: S311  # the same walk again, no secret
         while len(taken) < steps:
             candidates = [event for event in self._candidates() if self._is_issued(event)]
@@ -121,7 +121,7 @@ class Walker(ABC):
         return None
 
     def _chosen(self, dice: Random, count: int, kinds: Collection[TroubleKind]) -> tuple[str | None, Trouble | None]:
-        """An event by chance, with the trouble that there is with it; no event where nothing can happen."""
+        """A random event, with its trouble if there is any; no event if nothing can happen."""
         candidates = [*self._candidates(), *(self._forbidden() if TroubleKind.BLOCKED in kinds else ())]
         while candidates:
             event = dice.choice(candidates)
@@ -162,7 +162,7 @@ class Walker(ABC):
 
 
 class ModelWalker(Walker):
-    """Walker of a robot's run: takes what an executor could in some world.
+    """Walker of a robot's run: it takes events that an executor could take in some world.
 
     Args:
         run: The run that it leads.
@@ -180,7 +180,7 @@ class ModelWalker(Walker):
         self._sensors = {item.identifier for item in model.communications if item.max_age is not None}
 
     def _candidates(self) -> Iterator[str]:
-        """Yield the events that an executor and its environment could have happen now."""
+        """Yield the events that an executor and its environment could cause now."""
         silent = self._system.enabled_silent()
         if silent is not None:
             yield silent
@@ -200,7 +200,7 @@ class ModelWalker(Walker):
         return bool(silent)
 
     def _forbidden(self) -> Iterator[str]:
-        """Yield the requests that the behaviours could do and that are not enabled."""
+        """Yield the requests that the behaviours allow and that are not enabled."""
         if self._system.enabled_silent() is None:
             for event in self._run.events:
                 if _is_request(event) and self._system.is_possible(event) and not self._system.enabled(event):

@@ -1,4 +1,4 @@
-"""Plain automata as they are read: with the places of their parts, and names that may be wrong."""
+"""Plain automata as they are read from a file: with the places of their parts, and names that are not checked yet."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field

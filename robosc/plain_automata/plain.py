@@ -1,4 +1,4 @@
-"""Plain automata of others: those of a system, and the graph of a controlled system as one automaton."""
+"""Plain automata of a system, and the graph of a controlled system as one plain automaton."""
 
 from robosc.automata import System
 from robosc.errors import UnsupportedModelError

@@ -1,7 +1,7 @@
 """The supervisor: one frozen value that holds all that a target or an executor needs.
 
-It is the checked model, the conditions that synthesis adds to controllable events, and the
-certificate of what was checked. Its JSON form (`robosc.supervisor.codec`) is untrusted input.
+It contains the checked model, the conditions that synthesis adds to controllable events, and the certificate. Its JSON
+form (`robosc.supervisor.codec`) is untrusted input.
 """
 
 from functools import cached_property

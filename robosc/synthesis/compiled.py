@@ -1,4 +1,4 @@
-"""The kernel at work on predicates: the diagrams of CUDD inside dd."""
+"""The kernel's functions for predicates, on the diagrams of CUDD inside dd."""
 
 from collections.abc import Callable, Sequence
 from functools import cache

@@ -1,4 +1,4 @@
-"""Answers to questions about the controlled system, on predicates: no state is ever looked at by itself."""
+"""Answers to questions about the controlled system, computed on predicates instead of single states."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any

@@ -1,7 +1,7 @@
 """Engines for binary decision diagrams, found by name.
 
-dd offers one interface over CUDD (C) and over plain Python. `Manager` writes down what synthesis uses of it;
-what the two do differently (counting, restricting, complemented edges) is not used but done on the nodes.
+dd offers one interface over CUDD (C) and over plain Python. `Manager` declares the part that synthesis uses. Operations
+in which the two differ (counting, restricting, complemented edges) are not used, but implemented on the nodes.
 """
 
 import importlib

@@ -1,9 +1,9 @@
-"""The fixed point of synthesis, and what the controlled system can reach.
+"""The fixed point of synthesis, and the reachable states of the controlled system.
 
 Source: L. Ouedraogo, R. Kumar, R. Malik and K. Akesson, "Nonblocking and safe control of discrete-event systems
 modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569, Algorithm 1, on predicates instead of
-guards. Predecessors are found by substitution, forward images with a relation for each event; `closure` says in which
-order.
+guards. Predecessors are computed by substitution, forward images with a relation for each event; `closure` determines
+the order of the events.
 """
 
 from collections.abc import Callable, Iterable, Iterator

@@ -1,4 +1,4 @@
-"""Questions about a controlled system beside its supervisor, and the answers: plain values."""
+"""Questions about a controlled system, and their answers, as plain values."""
 
 from dataclasses import dataclass
 from enum import StrEnum

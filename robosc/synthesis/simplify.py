@@ -1,10 +1,11 @@
-"""Short condition that the supervisor adds to an event, of those that do the same in every state that matters.
+"""Short condition that the supervisor adds to an event, out of those that are equal in every state that matters.
 
-A condition matters where the controlled system can be, the plant enables the event and the requirements allow it.
-Among those that agree there, candidates are found in five ways: by restricting, by leaving out places of the state (of
-those that restricting leaves, and, where that does not read well, of all), as relations between variables, and as sums
-of products for what is wanted and for what is not. The one with the shortest formula is kept, and without any the one
-with the smallest diagram. What is kept is what the supervisor holds, so its formula is right in all states.
+A state matters if the controlled system can reach it, the plant enables the event there and the requirements allow it.
+Candidates that are equal in these states are found in five ways: by restricting; by leaving out places of the state
+(those that are left after restricting, or all places if that gives no readable result); as relations between variables;
+and as sums of products for the wanted states and for the unwanted ones. The candidate with the shortest formula is
+kept, or the one with the smallest diagram if none has a formula. The supervisor holds the kept candidate itself, so its
+formula is correct in all states.
 
 Source: O. Coudert and J. C. Madre, "A unified framework for the formal verification of sequential circuits", IEEE
 ICCAD 1990, pp. 126-129 (restrict).

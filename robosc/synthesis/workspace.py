@@ -1,4 +1,4 @@
-"""Basis of all work on predicates: an engine, a system encoded in it, and the caller that waits for the result."""
+"""Basis of all work on predicates: an engine, a system encoded in it, and the monitor of the waiting caller."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager

@@ -1,7 +1,7 @@
-"""Generated files as values, and the one place that writes them.
+"""Generated files as values, and the only function that writes them.
 
-A manifest beside the files remembers what was generated, so that generating again replaces files that
-nobody touched and never loses a user's change.
+A manifest beside the files records what was generated, so that a later generation replaces unchanged files and never
+loses a user's change.
 """
 
 import contextlib

@@ -1,4 +1,4 @@
-"""Paths into received data: in words, and where they lead."""
+"""Paths into received data: their text, and the types of the parts that they lead to."""
 
 from robosc.errors import InternalError
 from robosc.expressions import ArrayType, ObjectType, Type

@@ -1,8 +1,8 @@
-"""States as whole numbers, and what events do to them, remembered: the explicit search's forms of both.
+"""States as whole numbers, and remembered effects of events on them, for the explicit search.
 
-Each place of a state has a field of bits that holds the index of its value. What an event does depends on few
-places, so it is worked out once for each of their values, by the explicit semantics, and found again with one
-mask and one look-up.
+Each place of a state has a field of bits with the index of its value. The effect of an event depends on few places, so
+the explicit semantics computes it once for each combination of their values. After that, one mask and one look-up find
+it.
 """
 
 from collections.abc import Callable, Iterable

@@ -71,11 +71,11 @@ class Sensors:
         return True
 
     def are_all_seen(self) -> bool:
-        """Return True if every one of the sensors came at least once."""
+        """Return True if every sensor has sent at least one message."""
         return all(sensor.was_seen for sensor in self._sensors.values())
 
     def unseen(self) -> Tuple[str, ...]:
-        """Return identifiers of the sensors that have not come since the start, each once."""
+        """Return identifiers of the sensors without a message since the start, each once."""
         return tuple(
             dict.fromkeys(item.identifier for item in self._sensors.values() if not item.was_seen)
         )

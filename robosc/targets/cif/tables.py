@@ -1,7 +1,7 @@
-"""Expressions that CIF cannot compute with, taken apart by trying every value of what they read.
+"""Tables for expressions that CIF cannot compute, made by evaluating every combination of the values that they read.
 
-Doubles, what may exceed 32 bits and what has no counterpart in CIF are evaluated here, with the meaning that RoboSC
-gives them. What is left is a decision over the few locations, variables and data that the expression reads.
+Expressions with doubles, with results that may exceed 32 bits, or without a counterpart in CIF are evaluated here, with
+the semantics of RoboSC. The result is a decision over the few locations, variables and data that the expression reads.
 """
 
 from collections.abc import Callable, Iterator, Sequence

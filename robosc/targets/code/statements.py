@@ -1,6 +1,6 @@
-"""Statements of generated code: values that hold typed expressions, and that each language prints in its own way.
+"""Statements of generated code: values that contain typed expressions, printed for each language in its own way.
 
-A generator builds them, asks them what they read, and prints them at the end, as it does with expressions.
+A generator builds statements, asks them which variables they read, and prints them at the end, as with expressions.
 """
 
 from collections.abc import Iterator, Sequence

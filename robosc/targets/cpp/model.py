@@ -1,4 +1,4 @@
-"""The generated `model.hpp`: tables of one robot, its data as JSON, and between its data and messages of any class."""
+"""The generated `model.hpp`: tables of one robot, its data as JSON, and conversions between data and messages."""
 
 import json
 from collections.abc import Iterable, Iterator

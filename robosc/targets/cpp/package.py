@@ -1,4 +1,4 @@
-"""The files that every C++ package has, and what the templates of a package speak of."""
+"""The files that every C++ package has, and the values for its templates."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

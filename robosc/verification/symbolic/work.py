@@ -1,4 +1,4 @@
-"""Bound on the work of a symbolic check: counted in nodes, so that it ends alike on every machine."""
+"""Bound on the work of a symbolic check: counted in nodes, so that it ends at the same point on every machine."""
 
 from collections.abc import Callable
 from typing import Any

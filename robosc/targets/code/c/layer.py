@@ -1,4 +1,4 @@
-"""The functions of a supervision layer through which the caller's requests come: their heads, with their words."""
+"""Declarations, with comments, of the functions of a supervision layer that take the caller's requests."""
 
 from robosc.expressions import Type
 from robosc.model.structure import CommunicationKind

@@ -1,4 +1,4 @@
-"""The functions of a supervision layer in C: what the caller asks for, and what comes back from the robot."""
+"""The functions of a supervision layer in C: for requests of the caller, and for replies of the robot."""
 
 from robosc.errors import InternalError
 from robosc.expressions.text import expression_text

@@ -1,4 +1,4 @@
-"""Names of everything of a model in C, and the C types that hold it."""
+"""Names in C for all parts of a model, and their C types."""
 
 from dataclasses import dataclass, field
 

@@ -102,9 +102,9 @@ class Automaton:
         locations: Names, at least one.
         initial: The locations it may begin in; without any the system has no initial state.
         marked: Marked locations.
-        alphabet: Events it takes part in. Where no edge for one takes part, a plant cannot do it, and a requirement
-            forbids it.
-        edges: Its arcs. Where several for one event take part, it takes one of them, and nobody controls which.
+        alphabet: Events that it takes part in. Without a possible edge for an event, a plant cannot do it, and a
+            requirement forbids it.
+        edges: Its arcs. If several edges for one event are possible, it takes one of them nondeterministically.
         variables: Its variables.
         role: Its role, plant or requirement.
         monitors: Events of the alphabet that it neither blocks nor forbids: where no edge for one takes part, it stays

@@ -175,7 +175,7 @@ def verify_supervisor_file(
             on_progress=on_progress,
         )
 
-    # What the file says of its size decides only what is tried first: a false figure must not prevent the search.
+    # The stated number of states decides only which search is tried first: a false figure must not prevent it.
     stated = int(supervisor.certificate.states)
     report = verified_with(stated)
     if stated > limits.states and not report.is_complete:
@@ -243,7 +243,7 @@ def _false_properties(stated: ControllerProperties, found: ControllerProperties)
 
 
 def _beliefs(certificate: Certificate, found: Verification) -> list[str]:
-    """Return the claims of a certificate that nobody has checked here."""
+    """Return the claims of a certificate that were not checked here."""
     claimed = [
         name.replace("_", " ")
         for name in PROPERTIES

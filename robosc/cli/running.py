@@ -118,7 +118,7 @@ def guarded(program: str, run: Callable[[], int], *, as_json: bool = False) -> i
     except CommandError as error:
         status, message = error.status, _complain(program, error)
     except RoboscError as error:
-        # An engine or target that nobody has, or a folder that cannot be written, is no fault of the model.
+        # An unknown engine or target, or a folder that cannot be written, is no fault of the model.
         status = ExitCode.USAGE if isinstance(error, LookupError | OSError) else ExitCode.FAILED
         message = _complain(program, error)
     except KeyboardInterrupt:

@@ -387,7 +387,7 @@ class _Names:
             communication = self._inspected.communications.get(name_of(item[2]))
             if communication is not None:
                 return communication.request
-            # It is broken where somebody types.
+            # The declaration is incomplete while it is being typed.
             return self._named(name_of(item[item.index("type") + 2])) if "type" in item[:-2] else None
         return None
 

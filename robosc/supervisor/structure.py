@@ -95,7 +95,7 @@ class Certificate(msgspec.Struct, frozen=True, omit_defaults=True):
         maximally_permissive: Nothing more is disabled than needed.
         states: Reachable states of the controlled system, exact.
         transitions: Transitions between them, or None where they were not counted.
-        controller: Properties of the controller, or None where nobody asked.
+        controller: Properties of the controller, or None if they were not checked.
     """
 
     engine_version: str

@@ -76,7 +76,7 @@ class _Extractor:
                 raise _too_many_in_all(subject, self._maximum)
             for start, below in runs:
                 if start >= len(bits.domain):
-                    # Codes that stand for no value: what a predicate says of them is nobody's business.
+                    # Codes from here on stand for no value: the predicate is ignored there.
                     break
                 child = self._child(below, block, number + 1)
                 if not children or children[-1] != child:

@@ -255,7 +255,7 @@ class AutomataWriter(ABC):
             for edge in edges
         ]
         found: list[Statement] = []
-        # A requirement never stops what nobody controls: under its supervisor the system is in no state where it would.
+        # No requirement blocks an uncontrollable event: the supervisor avoids every state in which it would.
         if event.name not in automaton.monitors:
             possible = FALSE_CODE
             for test in tests:

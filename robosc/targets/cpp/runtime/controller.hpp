@@ -313,7 +313,7 @@ private:
     void take_in(const Take& take)
     {
         begin();
-        /* A message is data of somebody else: whatever goes wrong with it stops the robot, not the process. */
+        /* A message is foreign data: a failure with it stops the robot, not the process. */
         try {
             take(&robot_, began_us_, notes_);
         } catch (const std::exception& failure) {

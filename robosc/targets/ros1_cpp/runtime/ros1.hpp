@@ -297,7 +297,7 @@ inline bool found_master()
     std::_Exit(status);
 }
 
-/* End roscpp; a call that nobody answers is not waited for. */
+/* End roscpp, without waiting for unanswered calls. */
 inline void end_ros(const Shared& shared, int status)
 {
     ros::shutdown();

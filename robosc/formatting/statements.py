@@ -337,6 +337,7 @@ class _Walker(_Expressions):
         self.statements: list[Statement] = []
         requirements = (item for item in tree.items if isinstance(item, syntax.Requirement | syntax.Invariant))
         self._are_invariants = (isinstance(item, syntax.Invariant) for item in requirements)
+        # The words are those of the parser, whose table has what reads a statement; here is what lays it out.
         self._items: Mapping[str, Callable[[int], None]] = {
             "component": self._component,
             "datatype": self._data_type,

@@ -33,9 +33,9 @@ class Stranger:
         # The thread that answers sends, too: a frame must not get into the middle of another one.
         self._sending = threading.Lock()
         self.line = socket.create_connection((host, int(port)), source_address=(source, 0))
-        told = b"".join(struct.pack(">HI", number, value) for number, value in (settings or {}).items())
+        payload = b"".join(struct.pack(">HI", number, value) for number, value in (settings or {}).items())
         # At once: a server may end a connection that has begun and says nothing.
-        self._send(_PREFACE + _frame(SETTINGS, 0, 0, told))
+        self._send(_PREFACE + _frame(SETTINGS, 0, 0, payload))
         self.is_open = True
         self.frames: list[tuple[int, int, bytes]] = []
         self._thread = threading.Thread(target=self._answer)

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc.explanation import explanations
+from robosc.explanation import explanations, parts
 from support.tutorial import play_page
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -18,8 +18,12 @@ def test_the_page_is_true(tmp_path: Path) -> None:
 
 
 def test_every_key_is_explained() -> None:
+    homes = (explanations, parts)
     kinds = [
-        item for item in vars(explanations).values() if is_dataclass(item) and item.__module__ == explanations.__name__
+        item
+        for home in homes
+        for item in vars(home).values()
+        if is_dataclass(item) and item.__module__ == home.__name__
     ]
     names = {field.name for kind in kinds for field in fields(kind)}
     assert len(names) > 25

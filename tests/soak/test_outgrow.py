@@ -51,11 +51,11 @@ def test_a_wrong_result_is_found() -> None:
     assert made.problems == ["job a has a wrong result"]
 
 
-def test_a_caller_who_was_never_told_is_found() -> None:
+def test_a_caller_who_was_never_answered_is_found() -> None:
     made = ledger()
     made.results.clear()
-    assert made.counted([SOUND])["never_told"] == 1
-    assert made.problems == ["job a has ended and its caller was never told"]
+    assert made.counted([SOUND])["never_answered"] == 1
+    assert made.problems == ["job a has ended and its caller was never answered"]
 
 
 def test_a_key_has_one_job() -> None:

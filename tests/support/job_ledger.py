@@ -118,7 +118,7 @@ class Ledger:
             "wrong": len(wrong),
             "lost": len(lost),
             "ended_twice": len(twice),
-            "never_told": len(silent),
+            "never_answered": len(silent),
             "contradicted": len(contradicted) + len(lost_answers) + len(unnoted),
             "not_asked_for": len(strange),
             "given_up": dict(sorted((failed - Counter(unexpected)).items())),

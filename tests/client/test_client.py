@@ -273,11 +273,11 @@ class TestErrors:
                 ended.wait(PATIENCE_S)
 
         with scripted(Synthesize=[[stuck]]) as (address, _), connect(address) as client:
-            told: list[Any] = []
+            reports: list[Any] = []
             with pytest.raises(DeadlineError, match=r"within 0\.5 seconds"):
-                client.synthesize(BUNDLE, deadline_s=0.5, on_progress=told.append)
+                client.synthesize(BUNDLE, deadline_s=0.5, on_progress=reports.append)
             # On a slow machine the call may not even have begun by then.
-            assert len(told) <= 1
+            assert len(reports) <= 1
             assert not begun.is_set() or ended.wait(PATIENCE_S)
 
     def test_what_a_caller_raises_ends_the_work(self, connect: Any) -> None:
@@ -291,7 +291,7 @@ class TestErrors:
         class StopNowError(Exception):
             pass
 
-        def stop(told: Any) -> None:
+        def stop(report: Any) -> None:
             raise StopNowError
 
         with scripted(Synthesize=[[stuck]]) as (address, _), connect(address) as client:
@@ -514,7 +514,7 @@ class TestWatch:
     @pytest.mark.parametrize(
         "jobs", [(job(3), job(3)), (job(3), job(2)), (job(id="job-2"),), (job(0),), (job(state=0),), (job(kind=0),)]
     )
-    def test_what_no_server_tells(self, connect: Any, jobs: Any) -> None:
+    def test_what_no_server_reports(self, connect: Any, jobs: Any) -> None:
         with (
             scripted(WatchJob=[watched(*jobs)]) as (address, _),
             connect(address) as client,
@@ -585,7 +585,7 @@ class TestJobs:
             job(create_time={"seconds": 2**60}),
         ],
     )
-    def test_what_no_server_tells(self, connect: Any, message: Any) -> None:
+    def test_what_no_server_reports(self, connect: Any, message: Any) -> None:
         with (
             scripted(GetJob=[[jobs_pb2.GetJobResponse(job=message)]]) as (address, _),
             connect(address) as client,

@@ -437,10 +437,7 @@ async def test_a_saved_file_says_what_has_changed_and_the_run_happens_again() ->
 
 async def test_a_link_holds_the_model() -> None:
     files = Playing()
-    async with (
-        served(files.source, is_shared=False, robot=files.robot) as server,
-        opened(server.url) as page,
-    ):
+    async with served(files.source, is_shared=False, robot=files.robot) as server, opened(server.url) as page:
         token = token_of(server.url)
         link = (await page.told("definition"))["play"]["link"]
         assert unpacked(link) == GATE

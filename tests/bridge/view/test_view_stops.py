@@ -160,11 +160,7 @@ async def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(
     monkeypatch.setattr(remote_bridge, "FOLLOW_S", 0.01)
     # Whatever ends one, it is not its time.
     monkeypatch.setattr(client, "STOP_LIMIT_S", 10 * LIMIT_S)
-    async with (
-        Gate(address).standing() as gate,
-        remotely_viewed(gate.address) as server,
-        opened(server.url) as page,
-    ):
+    async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server, opened(server.url) as page:
         # What the robot is, and a stop; then one after the other, each on a way of its own.
         for count in range(2, 5):
             await press(page, 1)

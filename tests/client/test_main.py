@@ -607,12 +607,6 @@ class TestExitCodes:
 
 
 class TestPrograms:
-    def test_client_as_a_program(self, server: Any) -> None:
-        command = [sys.executable, "-m", "robosc_client.main", "check", str(EXAMPLES[0]), "--server", server]
-        outcome = subprocess.run(command, capture_output=True, text=True, timeout=PATIENCE_S, check=False)
-        assert outcome.returncode == 0
-        assert "Traceback" not in outcome.stderr
-
     @pytest.mark.parametrize(
         "command",
         [

@@ -73,12 +73,7 @@ class TestSignatures:
     @pytest.mark.parametrize("signature", [b"", b"by the server"])
     @pytest.mark.parametrize("command", [["synth", MODEL], ["get", "job-1"]])
     def test_what_cannot_be_written(
-        self,
-        run: Run,
-        tmp_path: Path,
-        monkeypatch: pytest.MonkeyPatch,
-        command: Any,
-        signature: bytes,
+        self, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Any, signature: bytes
     ) -> None:
         """Leaves the supervisor that was there, and its signature."""
         place, beside = tmp_path / "there.rsup", tmp_path / "there.rsup.sig"

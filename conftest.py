@@ -4,11 +4,14 @@ Programs that they start can be interrupted, random examples are those of the ch
 end of the run.
 """
 
+import asyncio
 import gc
 import importlib
+import inspect
 import os
 import signal
 from collections.abc import Generator
+from typing import Any
 
 import pytest
 
@@ -54,6 +57,21 @@ def pytest_collection_finish() -> None:
 def pytest_runtest_setup() -> None:
     """Forget what was made for the test before."""
     failing.forget()
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> None:
+    """Have a test that is a coroutine run in an event loop of its own: its fixture `loop`, if it has one."""
+    test = pyfuncitem.obj
+    if not inspect.iscoroutinefunction(test):
+        return
+
+    def run(**fixtures: Any) -> None:
+        loop = fixtures.get("loop")
+        with asyncio.Runner(loop_factory=None if loop is None else lambda: loop) as runner:
+            runner.run(test(**fixtures))
+
+    pyfuncitem.obj = run
 
 
 @pytest.hookimpl(wrapper=True)

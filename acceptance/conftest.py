@@ -14,7 +14,7 @@ def pytest_addoption(parser: pytest.Parser) -> None:
 
 @pytest.hookimpl(tryfirst=True)  # Before `-m` chooses.
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """A test in real time is tried again if the machine was late: only a calm one can tell."""
+    """A test in real time is tried again if the machine was late: only a calm one can judge."""
     for item in items:
         if item.get_closest_marker("real_time") is not None:
             item.add_marker(pytest.mark.flaky(reruns=4, only_rerun=[MachineLateError.__name__]))

@@ -9,13 +9,7 @@ from typing import Any
 
 import pytest
 
-from support.tutorial import (
-    Command,
-    Shell,
-    TutorialError,
-    play,
-    read_chapters,
-)
+from support.tutorial import Command, Shell, TutorialError, play, read_chapters
 
 pytestmark = pytest.mark.real_time
 

@@ -1,4 +1,4 @@
-"""The notes for Emacs, in a real one that is set up as they tell, with eglot."""
+"""The notes for Emacs, in a real one that is set up as they say, with eglot."""
 
 import re
 import subprocess
@@ -69,23 +69,23 @@ def emacs(eglot: None, home: Home) -> Iterator[Emacs]:
         yield emacs
 
 
-def finds(emacs: Emacs, told: str, words: str) -> bool:
+def finds(emacs: Emacs, message: str, words: str) -> bool:
     """Return True if something is found before long."""
-    return eventually(lambda: any(told in text and found == words for text, found in emacs.findings))
+    return eventually(lambda: any(message in text and found == words for text, found in emacs.findings))
 
 
 @needs_emacs
 def test_it_compiles_without_warnings(tmp_path: Path) -> None:
     copy = tmp_path / MODE.name
     copy.write_text(MODE.read_text("utf-8"), "utf-8")
-    told = batch("-Q", "--eval", "(setq byte-compile-error-on-warn t)", "-f", "batch-byte-compile", copy)
-    assert told.returncode == 0 and not told.stderr and copy.with_suffix(".elc").exists(), told.stderr
+    done = batch("-Q", "--eval", "(setq byte-compile-error-on-warn t)", "-f", "batch-byte-compile", copy)
+    assert done.returncode == 0 and not done.stderr and copy.with_suffix(".elc").exists(), done.stderr
 
 
 @needs_emacs
 def test_the_documentation_of_the_mode_is_in_order() -> None:
-    told = batch("-Q", "--eval", f'(progn (require \'checkdoc) (checkdoc-file "{MODE}"))')
-    assert told.returncode == 0 and not told.stderr, told.stderr
+    done = batch("-Q", "--eval", f'(progn (require \'checkdoc) (checkdoc-file "{MODE}"))')
+    assert done.returncode == 0 and not done.stderr, done.stderr
 
 
 @needs_eglot
@@ -143,10 +143,10 @@ def test_lines_are_indented_by_their_braces(home: Home) -> None:
 
 
 @needs_eglot
-def test_what_is_told_of_a_name_is_shown(emacs: Emacs) -> None:
+def test_hover_over_a_name_is_shown(emacs: Emacs) -> None:
     emacs.go("requirement wa|lk")
-    emacs.type("\x06")  # C-f: what it tells is that of where the cursor comes to.
-    # Not asked meanwhile: it tells when it has nothing else to do.
+    emacs.type("\x06")  # C-f: what it shows is that of where the cursor comes to.
+    # Not asked meanwhile: it shows it when it has nothing else to do.
     assert eventually(lambda: b'incoming message walk with identifier: "/cmd_vel"' in emacs.seen)
     emacs.type("\x08.")  # C-h .
     windows = """(mapconcat (lambda (window) (with-current-buffer (window-buffer window) (buffer-string)))

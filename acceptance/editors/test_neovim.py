@@ -1,4 +1,4 @@
-"""The notes for Neovim, in a real one that is set up as they tell."""
+"""The notes for Neovim, in a real one that is set up as they say."""
 
 import re
 from collections.abc import Iterator
@@ -111,7 +111,7 @@ def test_words_comments_and_texts_are_coloured(nvim: Neovim) -> None:
 
 
 @needs_neovim
-def test_what_is_told_of_a_name_is_shown(nvim: Neovim) -> None:
+def test_hover_over_a_name_is_shown(nvim: Neovim) -> None:
     nvim.go("requirement wa|lk")
     nvim.type("K")
     windows = """

@@ -86,11 +86,11 @@ def test_what_is_packaged(extension: Path) -> None:
         "syntaxes/robosc.tmLanguage.json",
     }
     assert "vscode-languageclient" in notices and "Permission is hereby granted" in notices
-    told = (EXTENSION_FOLDER / "README.md").read_text()
+    readme = (EXTENSION_FOLDER / "README.md").read_text()
     for name in manifest["contributes"]["configuration"]["properties"]:
-        assert f"`{name}`" in told
+        assert f"`{name}`" in readme
     for command in manifest["contributes"]["commands"]:
-        assert f"RoboSC: {command['title']}" in told or command["command"] == "robosc.showOutput"
+        assert f"RoboSC: {command['title']}" in readme or command["command"] == "robosc.showOutput"
 
 
 def test_it_starts_with_a_model(editor: VsCode, model: Path) -> None:
@@ -225,7 +225,7 @@ def test_visualize_a_bridge(editor: VsCode) -> None:
         assert editor.command("visualize", {"source": "bridge", "address": face.address}) is True
         frame = editor.live_view()
         frame.locator("#robot", has_text=daemon.operations.supervisor.model.name).wait_for()
-        # What was told before lies over the button.
+        # An earlier notification lies over the button.
         editor.do("command", name="notifications.clearAll")
         frame.get_by_role("button", name="Stop").first.click()
         editor.until(lambda: daemon.orders, "the robot was not stopped")
@@ -258,7 +258,7 @@ def test_visualize_a_node(editor: VsCode, tmp_path: Path) -> None:
             editor.do("set", name="robosc.programs", value=None)
 
 
-def test_what_cannot_be_shown_is_told(editor: VsCode) -> None:
+def test_what_cannot_be_shown_is_reported(editor: VsCode) -> None:
     broken = editor.folder / "broken.rscd"
     broken.write_text("robot R {")
     assert editor.command("showAutomata", broken) is True
@@ -280,7 +280,7 @@ def test_programs_elsewhere(editor: VsCode, model: Path, tmp_path: Path) -> None
     editor.do("hover", file=model, text="move with", until="incoming message")
 
 
-def test_a_language_server_that_cannot_be_started_tells_why(editor: VsCode, tmp_path: Path) -> None:
+def test_a_language_server_that_cannot_be_started_reports_why(editor: VsCode, tmp_path: Path) -> None:
     program = tmp_path / "robosc-lsp"
     program.write_text("#!/bin/sh\necho 'robosc-lsp: the language server needs <b>more</b>' >&2\nexit 1\n")
     program.chmod(0o755)

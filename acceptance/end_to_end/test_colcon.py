@@ -77,7 +77,7 @@ class Navigation:
         return self.at.run(command, [], program="/bin/bash")
 
     def component(self, name: str) -> Any:
-        """State and variables of a component, as the controller tells them."""
+        """State and variables of a component, as the controller reports them."""
         return json.loads(self._states[-1].data)["current"][name] if self._states else {"state": "", "variables": {}}
 
     def until_driving(self) -> None:
@@ -129,7 +129,7 @@ def test_the_robot_navigates_to_its_goal_and_stops_for_a_person(navigation: Navi
         lambda: math.dist((robot.x, robot.y), GOAL) < 0.06 and robot.speed == 0.0, "the goal", navigation.controller
     )
     at.until(lambda: robot.turn == 0.0 and abs(robot.yaw) < 0.06, "the goal's direction", navigation.controller)
-    # The state is told after each decision, and the next goal is asked for with the first one after the result.
+    # The state is published after each decision, and the next goal is asked for with the first one after the result.
     at.until(lambda: "navigate.response" in navigation.log(), "the result", navigation.controller)
     at.end()
     events = navigation.events()

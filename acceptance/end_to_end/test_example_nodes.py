@@ -221,7 +221,7 @@ def test_the_panel_takes_keys_from_a_terminal_and_stops_when_it_is_lost(at: Stag
     node = at.helper("stop_panel", "buttons:=['button=/button']", stdin=its)
     os.close(its)
     at.peer.wait_for_peers(["/emergency_stop/stop", "/emergency_stop/resume", "/button"])
-    at.until(lambda: "space: stop" in node.stdout, "the keys to be told", node)
+    at.until(lambda: "space: stop" in node.stdout, "the keys to be printed", node)
     at.peer.spin_for(0.3)
     for key, heard in ((b" ", panel.stop), (b"r", panel.resume), (b"B", panel.button)):
         os.write(ours, key)
@@ -288,7 +288,7 @@ def test_a_wrong_parameter_is_one_line_and_exit_status_2(at: Stage) -> None:
         assert all(other.startswith("[ERROR]") for other in others)
 
 
-def test_a_misspelt_parameter_is_told(at: Stage) -> None:
+def test_a_misspelt_parameter_is_reported(at: Stage) -> None:
     node = at.helper("announcer", "texd:=hello")
     at.until(lambda: "there is no parameter 'texd'; did you mean 'text'?" in node.stderr, "the warning", node)
 
@@ -310,14 +310,14 @@ def test_the_calibrator_wants_odometry_at_rest(at: Stage) -> None:
     assert answer() == (False, "0 poses within 20 s; there must be 5")
     at.robot = robot = KinematicRobot(at.peer, World())
     at.peer.wait_for_peers(["/odom"])
-    while (told := answer()) != (True, ""):
-        assert told[1].endswith(" poses within 20 s; there must be 5")
+    while (reply := answer()) != (True, ""):
+        assert reply[1].endswith(" poses within 20 s; there must be 5")
 
     def drive() -> None:
         robot.x += 0.005
 
     robot.on_step = drive
-    while (told := answer()) == (True, ""):
+    while (reply := answer()) == (True, ""):
         at.go_on(0.1)
-    assert told[0] is False
-    assert told[1].startswith("the robot has moved by 0.")
+    assert reply[0] is False
+    assert reply[1].startswith("the robot has moved by 0.")

@@ -58,7 +58,7 @@ def test_the_line_follower_follows_its_line_and_stops_for_the_panel(at: Stage) -
 
 
 def test_a_careless_line_follower_stands_still_behind_its_layer(at: Stage) -> None:
-    """The follower never heeds obstacles or the stop button itself; what it sends then is held back and told."""
+    """The follower never heeds obstacles or the stop button itself; what it sends then is held back and reported."""
     from std_msgs.msg import Empty, String
 
     blocked = at.peer.receive(String, "/blocked")

@@ -13,16 +13,7 @@ import pytest
 
 from support.models import EXAMPLES
 from support.process import Process
-from support.ros1_cpp import (
-    LIMIT_S,
-    Master,
-    Peer,
-    built_once,
-    missing,
-    node_command,
-    plain_environment,
-    supervisor_of,
-)
+from support.ros1_cpp import LIMIT_S, Master, Peer, built_once, missing, node_command, plain_environment, supervisor_of
 from support.waiting import wait_until
 
 pytestmark = [
@@ -190,7 +181,7 @@ def test_without_its_master_the_robot_is_stopped(workspace: Path, tmp_path: Path
             assert node.stderr == f"{PACKAGE}: the ROS master is lost\n"
 
 
-def test_a_fault_stops_the_robot_and_is_told_at_the_end(start: Start, peer: Peer) -> None:
+def test_a_fault_stops_the_robot_and_is_reported_at_the_end(start: Start, peer: Peer) -> None:
     node = start("period:=0.5", "on_unknown:=fault")
     robot = Robot(peer)
     robot.drive()

@@ -138,7 +138,7 @@ def test_what_is_sent_is_as_the_model_says_and_stamped(ready: Carrier, superviso
 
 
 def _assert_states_follow(supervisor: Supervisor, entries: list[Entry]) -> None:
-    """Every state that the log tells is what the model says comes of its events."""
+    """Every state that the log has is what the model says comes of its events."""
     from robosc.execution.interpreter import InterpretedSystem
 
     system = InterpretedSystem(supervisor)

@@ -85,7 +85,7 @@ def require_that_a_careless_controller_is_supervised(porter: Porter) -> None:
     assert len(porter.commands) == stood
 
 
-def told(output: str) -> list[Any]:
+def received(output: str) -> list[Any]:
     """Return everything that was reported to a careless controller."""
     return [json.loads(line) for line in output.splitlines() if line.startswith("[")]
 
@@ -97,13 +97,13 @@ def test_whatever_a_careless_controller_sends_the_robot_stands_still_unless_it_m
     assert layer is not None
     # What it asks for is answered by the layer, and the robot's sensors come through it.
     porter.until(
-        lambda: {"reply", "goal", "scan"} <= {what for what, _ in told(layer.stdout)},
-        "what the controller is told",
+        lambda: {"reply", "goal", "scan"} <= {what for what, _ in received(layer.stdout)},
+        "what the controller receives",
         lambda: porter.peer.publish("/scan", SENT["/scan"], ranges=[0.5]),
     )
-    assert ["reply", False] in told(layer.stdout)
-    assert ["goal", REJECTED] in told(layer.stdout)
-    assert ["scan", [0.5]] in told(layer.stdout)
+    assert ["reply", False] in received(layer.stdout)
+    assert ["goal", REJECTED] in received(layer.stdout)
+    assert ["scan", [0.5]] in received(layer.stdout)
 
     porter.allow(True)
     porter.until(lambda: porter.speed == 0.3, "the robot to move")
@@ -170,7 +170,7 @@ def test_a_controller_that_dies_leaves_a_robot_that_stands_still(porter: Porter)
         careless.wait()
         porter.until(lambda: porter.speed == 0.0, "the robot to stand still")
     assert porter.layer is not None and porter.layer.is_running
-    # Once, and not again and again: the log tells it of all the time until a later state.
+    # Once, and not again and again: the log reports it of all the time until a later state.
     porter.allow(False)
     events = porter.end()
     last_walk = max(index for index, entry in enumerate(events) if entry.get("event") == "walk.request")

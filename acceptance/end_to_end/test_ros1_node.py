@@ -321,7 +321,7 @@ def test_the_state_is_published_as_semantics_says(robot: Robot) -> None:
     assert taken
 
 
-def test_diagnostics_tell_how_it_is(robot: Robot) -> None:
+def test_diagnostics_report_the_state(robot: Robot) -> None:
     robot.start("_period:=0.02")
     robot.drive()
 

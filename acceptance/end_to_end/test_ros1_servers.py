@@ -1,6 +1,5 @@
 """Services and actions of a generated ROS 1 node: every way in which they end, with real servers."""
 
-import json
 import signal
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack
@@ -12,7 +11,7 @@ import pytest
 from robosc.certification import make_supervisor
 from robosc.language import load_bundle
 from robosc.targets import generate, write_files
-from support.process import Process
+from support.courier import CourierSide
 from support.ros1 import Master, Peer, missing, start_node, until
 from support.waiting import wait_until
 
@@ -39,16 +38,15 @@ def package(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-class Courier:
-    """The test's side of the model: one peer sees and orders, another one has the servers."""
+class Courier(CourierSide):
+    """One peer sees and orders, another one has the servers."""
 
     def __init__(self, master: Master, package: Path, folder: Path) -> None:
+        super().__init__(folder)
         self.master = master
         self.package = package
-        self.folder = folder
         self.ends = ExitStack()
         self.peer = self.ends.enter_context(Peer(master, folder))
-        self.node: Process
 
     def host(self) -> Peer:
         """A process for servers."""
@@ -79,38 +77,15 @@ class Courier:
     def until(self, condition: Callable[[], bool], what: str, repeat: Callable[[], object] = lambda: None) -> None:
         until(condition, what, self.node, repeat)
 
-    def order(self, what: str, condition: Callable[[], bool]) -> None:
-        """Order something until a condition shows that it is under way."""
-        self.until(condition, f"the order {what}", lambda: self.peer.publish(f"/order/{what}", "std_msgs/Empty"))
+    def publish_order(self, what: str) -> None:
+        self.peer.publish(f"/order/{what}", "std_msgs/Empty")
 
-    def allow(self, is_allowed: bool) -> None:
-        state = "granted" if is_allowed else "denied"
-        self.until(
-            lambda: self.state("Permission") == state,
-            f"the permission {state}",
-            lambda: self.peer.publish("/allowed", "std_msgs/Bool", data=is_allowed),
-        )
+    def publish_allowed(self, is_allowed: bool) -> None:
+        self.peer.publish("/allowed", "std_msgs/Bool", data=is_allowed)
 
-    def _current(self, component: str) -> Any:
+    def last_state(self) -> str | None:
         states = self.peer.values("/state")
-        return json.loads(states[-1]["data"])["current"][component] if states else None
-
-    def state(self, component: str) -> str | None:
-        current = self._current(component)
-        return None if current is None else str(current["state"])
-
-    def reaches(self, component: str, state: str) -> None:
-        self.until(lambda: self.state(component) == state, f"{component} to be {state}")
-
-    def value(self, component: str, variable: str) -> str:
-        return str(self._current(component)["variables"][variable])
-
-    def has(self, component: str, variable: str, value: str) -> None:
-        """Wait for a value."""
-        self.until(
-            lambda: self.state(component) is not None and self.value(component, variable) == value,
-            f"{variable} to be {value}",
-        )
+        return states[-1]["data"] if states else None
 
     def speeds(self, command: Any) -> None:
         """Wait for a last command."""
@@ -124,30 +99,10 @@ class Courier:
         (status,) = reports[-1]["status"]
         return status["level"], status["message"], {item["key"]: item["value"] for item in status["values"]}
 
-    def count_reaches(self, name: str, number: int) -> None:
-        """Wait for a counter of the diagnostics."""
-
-        def is_there() -> bool:
-            health = self.health()
-            return health is not None and int(health[2][name]) >= number
-
-        self.until(is_there, f"{number} {name}")
-
     def stands_still(self, status: int) -> None:
         """The node ends with a status, and its last command is the zero."""
         assert self.node.wait() == status, self.node.stderr
         wait_until(lambda: self.peer.values("/cmd_vel")[-1:] == [ZERO], "the zero")
-
-    def events(self) -> list[Any]:
-        """The event log of a node that has ended."""
-        (log,) = (self.folder / "events").iterdir()
-        return [json.loads(line) for line in log.read_text().splitlines()]
-
-    def reasons_of(self, event: str) -> list[Any]:
-        """End the node: the data of every such event."""
-        self.node.signal(signal.SIGTERM)
-        assert self.node.wait() == 0
-        return [item["data"] for item in self.events() if item.get("event") == event]
 
 
 @pytest.fixture
@@ -310,20 +265,20 @@ def test_a_goal_that_is_rejected(courier: Courier) -> None:
     assert courier.reasons_of("count.error")[-1] == "rejected"
 
 
-def test_a_goal_that_is_rejected_later(courier: Courier) -> None:
-    host = start_counting(courier, accepts="later")
-    host.do("end", name="/count", how="rejected")
+@pytest.mark.parametrize(
+    ("options", "how"),
+    [({"accepts": "later"}, "rejected"), ({}, "aborted"), ({}, "lost")],
+    ids=lambda value: str(value),
+)
+def test_a_goal_that_runs_and_does_not_succeed(courier: Courier, options: dict[str, Any], how: str) -> None:
+    host = start_counting(courier, **options)
+    if how == "lost":
+        host.die()
+    else:
+        host.do("end", name="/count", how=how)
     courier.reaches("Counter", "failed")
     courier.speeds(ZERO)
-    assert courier.reasons_of("count.error")[-1] == "rejected"
-
-
-def test_a_goal_that_is_aborted(courier: Courier) -> None:
-    host = start_counting(courier)
-    host.do("end", name="/count", how="aborted")
-    courier.reaches("Counter", "failed")
-    courier.speeds(ZERO)
-    assert courier.reasons_of("count.error")[-1] == "aborted"
+    assert courier.reasons_of("count.error")[-1] == how
 
 
 def test_the_supervisor_cancels_a_goal_that_is_no_longer_allowed(courier: Courier) -> None:
@@ -363,14 +318,6 @@ def test_a_missing_action_is_an_error_at_once(courier: Courier) -> None:
     courier.allow(True)
     courier.order("count", lambda: courier.state("Counter") == "failed")
     assert set(courier.reasons_of("count.error")) == {"lost"}
-
-
-def test_an_action_that_is_lost_is_an_error(courier: Courier) -> None:
-    host = start_counting(courier)
-    host.die()
-    courier.reaches("Counter", "failed")
-    courier.speeds(ZERO)
-    assert courier.reasons_of("count.error")[-1] == "lost"
 
 
 def test_an_action_whose_server_starts_anew_is_an_error(courier: Courier) -> None:

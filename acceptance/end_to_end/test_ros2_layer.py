@@ -345,7 +345,7 @@ def test_a_service_call_goes_through_or_is_answered_at_once(porter: Porter) -> N
     porter.until(lambda: porter.state("Power") is not None, "the layer to begin")
     reply = porter.wait_for(porter.call(), "the answer to a call that is held back")
     assert (reply.success, reply.message) == (False, "")
-    porter.until(lambda: porter.is_blocked("/power"), "a call to be told as held back", porter.call)
+    porter.until(lambda: porter.is_blocked("/power"), "a call to be reported as held back", porter.call)
     assert server.requests == []
 
     porter.allow(True)
@@ -393,7 +393,7 @@ def test_a_goal_is_rejected_or_served(porter: Porter) -> None:
     porter.start("server_wait:=2.0")
     porter.until(lambda: porter.state("Counter") is not None, "the layer to begin")
     assert not porter.send_goal().accepted
-    porter.until(lambda: porter.is_blocked("/count"), "a goal to be told as held back", porter.send_goal)
+    porter.until(lambda: porter.is_blocked("/count"), "a goal to be reported as held back", porter.send_goal)
     assert server.requests == []
 
     porter.allow(True)
@@ -482,7 +482,7 @@ def test_a_cancel_of_the_caller_is_always_forwarded(porter: Porter) -> None:
     assert (ended.status, list(ended.result.sequence)) == (CANCELED, [7])
 
 
-def test_a_goal_under_way_is_cancelled_at_the_end_and_its_caller_is_told(porter: Porter) -> None:
+def test_a_goal_under_way_is_cancelled_at_the_end_and_its_caller_learns_it(porter: Porter) -> None:
     from test_msgs.action import Fibonacci
 
     server = HeldAction(porter.host, Fibonacci, "/count")
@@ -530,19 +530,21 @@ def test_services_and_actions_of_a_program_that_knows_of_no_layer_are_remapped(p
     output = porter.folder / "careless" / "stdout.txt"
     with porter.careless() as careless:
 
-        def told() -> list[Any]:
+        def received() -> list[Any]:
             return [json.loads(line) for line in output.read_text().splitlines()]
 
         scan = LaserScan(ranges=array("f", [0.5]))
         porter.peer.spin_until(
-            lambda: {"reply", "goal", "scan"} <= {what for what, _ in told()},
+            lambda: {"reply", "goal", "scan"} <= {what for what, _ in received()},
             LIMIT_S,
-            "what the controller is told",
+            "what the controller receives",
             careless,
             lambda: porter.peer.publish(scan, "/scan", qos_profile_sensor_data),
         )
-        assert ["reply", False] in told()
-        assert ["goal", False] in told()
-        assert ["scan", [0.5]] in told()
+        assert ["reply", False] in received()
+        assert ["goal", False] in received()
+        assert ["scan", [0.5]] in received()
     assert action.requests == service.requests == []
-    porter.until(lambda: {"/power", "/count", "/cmd_vel"} <= {message.data for message in porter.blocked}, "all told")
+    porter.until(
+        lambda: {"/power", "/count", "/cmd_vel"} <= {message.data for message in porter.blocked}, "all reports"
+    )

@@ -21,7 +21,7 @@ LIMIT_S = 15.0
 PACKAGE = "walker_controller"
 ACTIVE, INACTIVE, UNCONFIGURED = "active", "inactive", "unconfigured"
 
-# It walks, once it has power, until it is told to halt. A level that is not known is a fault, if the parameters say so.
+# It walks, once it has power, until it is asked to halt. An unknown level is a fault, if the parameters say so.
 MODEL = """
 robot Walker {
     interface twist use Twist from geometry_msgs
@@ -107,7 +107,7 @@ class Stage:
         self.until(lambda: self.speed == 0.5, "the robot to walk")
 
     def stands(self) -> None:
-        """The last command is zero, perhaps told twice, and none follows."""
+        """The last command is zero, perhaps sent twice, and none follows."""
         self.until(lambda: self.speed == 0.0, "the robot to stand")
         count = len(self.commands)
         self.peer.spin_for(0.3)
@@ -281,7 +281,7 @@ def test_a_goal_that_is_accepted_after_the_cleanup_is_cancelled(start: Callable[
     assert not cancelled.done()
     accepted.set_result(None)
     stage.until(cancelled.done, "the cancel")
-    # What still waited for its turn would be told of by the next test.
+    # What still waited for its turn would reach the next test.
     stage.until(lambda: bool(ended), "the goal's end")
     stage.peer.spin_for(0.1)
     server.destroy()

@@ -34,7 +34,7 @@ StartNode = Callable[..., RosProcess]
 
 
 def complaints(node: RosProcess) -> list[str]:
-    """Lines that a node has written to standard error, without those that tell of its start."""
+    """Lines that a node has written to standard error, without those about its start."""
     return [line for line in node.stderr.splitlines() if not line.startswith("[INFO]")]
 
 
@@ -159,7 +159,7 @@ def test_it_moves_only_while_everything_allows_it(start: StartNode, peer: Peer) 
         robot.until(lambda: robot.speed == 0.15, f"the robot to move again after {what}", resume)
 
 
-def test_a_misspelt_parameter_is_told_once(start: StartNode, peer: Peer) -> None:
+def test_a_misspelt_parameter_is_reported_once(start: StartNode, peer: Peer) -> None:
     node = start("perod:=0.02")
     robot = Robot(peer, node)
     robot.until(lambda: robot.speed is not None, "the first command")

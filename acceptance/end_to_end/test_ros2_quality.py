@@ -214,6 +214,6 @@ def test_a_type_without_a_header_is_a_start_up_error(domain: int, tmp_path: Path
     with RosProcess(command, environment(domain, tmp_path), tmp_path / "run", [tmp_path / "package"]) as process:
         assert process.wait() == 2
         *before, line = process.stderr.splitlines()
-    assert all(told.startswith("[INFO]") for told in before)
+    assert all(earlier.startswith("[INFO]") for earlier in before)
     assert line.startswith("misfit_controller: message m: ")
     assert "header" in line

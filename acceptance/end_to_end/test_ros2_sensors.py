@@ -180,7 +180,7 @@ def test_diagnostics_follow_a_stale_sensor(start: Callable[..., RosProcess], pee
 
 
 class World:
-    """A simulation: its time, which passes when it is told to."""
+    """A simulation: its time, which passes when it is set."""
 
     def __init__(self, peer: Peer, now_s: float) -> None:
         self.now_s = now_s

@@ -1,16 +1,15 @@
 """Services and actions of a generated ROS 2 node: every way in which they end, with real servers over DDS."""
 
-import json
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from robosc.certification import make_supervisor
 from robosc.language import load_bundle
 from robosc.targets import generate, write_files
+from support.courier import CourierSide
 from support.ros2 import Peer, RosProcess, environment, own_domain
 from support.ros2_servers import End, HeldAction, HeldService, ServerHost, cancel_all
 
@@ -33,16 +32,17 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-class Courier:
-    """The test's side of the model."""
+class Courier(CourierSide):
+    """A peer that sees and orders, and a host of servers."""
+
+    node: RosProcess
 
     def __init__(self, workspace: Path, peer: Peer, host: ServerHost, variables: dict[str, str], folder: Path) -> None:
+        super().__init__(folder)
         self._workspace = workspace
         self.variables = variables
-        self._folder = folder
         self.peer = peer
         self.host = host
-        self.node: RosProcess
 
     def start(self, *parameters: str) -> None:
         """Start the node with its parameter file, deciding every 20 ms."""
@@ -59,47 +59,31 @@ class Courier:
                 "period:=0.02",
                 "publish_state:=true",
                 "policy:=priority",
-                f"log_folder:={self._folder / 'events'}",
+                f"log_folder:={self.folder / 'events'}",
                 *parameters,
             )
             for item in ("-p", parameter)
         ]
         command = ["-m", "courier_controller.start", "--ros-args", *arguments]
-        self.node = RosProcess(command, self.variables, self._folder / "run", [self._workspace])
+        self.node = RosProcess(command, self.variables, self.folder / "run", [self._workspace])
         orders = [f"/order/{name}" for name in ("power", "wind", "count", "reach")]
         self.peer.wait_for_peers(["/cmd_vel", "/allowed", "/state", *orders])
 
     def until(self, condition: Callable[[], bool], what: str, repeat: Callable[[], object] = lambda: None) -> None:
         self.peer.spin_until(condition, LIMIT_S, what, self.node, repeat)
 
-    def order(self, what: str, condition: Callable[[], bool]) -> None:
-        """Order something until a condition shows that it is under way."""
+    def publish_order(self, what: str) -> None:
         from std_msgs.msg import Empty
 
-        self.until(condition, f"the order {what}", lambda: self.peer.publish(Empty(), f"/order/{what}"))
+        self.peer.publish(Empty(), f"/order/{what}")
 
-    def allow(self, is_allowed: bool) -> None:
+    def publish_allowed(self, is_allowed: bool) -> None:
         from std_msgs.msg import Bool
 
-        state = "granted" if is_allowed else "denied"
-        self.until(
-            lambda: self.state("Permission") == state,
-            f"the permission {state}",
-            lambda: self.peer.publish(Bool(data=is_allowed), "/allowed"),
-        )
+        self.peer.publish(Bool(data=is_allowed), "/allowed")
 
-    def _current(self, component: str) -> Any:
-        return json.loads(self._states[-1].data)["current"][component] if self._states else None
-
-    def state(self, component: str) -> str | None:
-        current = self._current(component)
-        return None if current is None else str(current["state"])
-
-    def reaches(self, component: str, state: str) -> None:
-        self.until(lambda: self.state(component) == state, f"{component} to be {state}")
-
-    def value(self, component: str, variable: str) -> str:
-        return str(self._current(component)["variables"][variable])
+    def last_state(self) -> str | None:
+        return str(self._states[-1].data) if self._states else None
 
     def health(self) -> tuple[int, str, dict[str, str]] | None:
         """Level, message and values of the last report."""
@@ -108,35 +92,10 @@ class Courier:
         (status,) = self._reports[-1].status
         return status.level[0], status.message, {item.key: item.value for item in status.values}
 
-    def count_reaches(self, name: str, number: int) -> None:
-        """Wait for a counter of the diagnostics."""
-
-        def is_there() -> bool:
-            health = self.health()
-            return health is not None and int(health[2][name]) >= number
-
-        self.until(is_there, f"{number} {name}")
-
     def dying_server(self) -> RosProcess:
         """A process that ends when it is asked for something."""
         file = Path(__file__).parents[2] / "tests" / "support" / "ros2_dying_server.py"
-        return RosProcess([str(file)], self.variables, self._folder / "server")
-
-    def reasons_of(self, event: str) -> list[Any]:
-        """End the node: the data of every such event."""
-        self.node.signal(signal.SIGTERM)
-        assert self.node.wait() == 0
-        return self.reasons_so_far(event)
-
-    def reasons_so_far(self, event: str) -> list[Any]:
-        """The data of every such event."""
-        return [item["data"] for item in self.events() if item.get("event") == event]
-
-    def events(self) -> list[Any]:
-        """The event log; of a node that goes on, what it has written to the end."""
-        (log,) = (self._folder / "events").iterdir()
-        text = log.read_text()
-        return [json.loads(line) for line in text[: text.rfind("\n") + 1].splitlines()]
+        return RosProcess([str(file)], self.variables, self.folder / "server")
 
 
 @pytest.fixture
@@ -218,7 +177,7 @@ def test_a_late_reply_is_unexpected(courier: Courier) -> None:
     server = power_server(courier)
     courier.start("server_wait:=0.0", "service_timeout:=0.3")
     courier.order("power", lambda: bool(server.requests))
-    courier.until(lambda: courier.value("Power", "failures") == "1", "the timeout")
+    courier.has("Power", "failures", "1")
     courier.count_reaches("unexpected", 0)
     server.answer(success=True, message="late")
     courier.count_reaches("unexpected", 1)
@@ -247,7 +206,7 @@ def test_a_goal_that_succeeds(courier: Courier) -> None:
     start_counting(courier, server)
     assert server.requests[0].order == 5
     server.feedback(sequence=[7])
-    courier.until(lambda: courier.value("Counter", "seen") == "7", "the feedback")
+    courier.has("Counter", "seen", "7")
     server.end(End.SUCCEED, sequence=[0, 1, 1])
     courier.reaches("Counter", "counted")
     assert courier.value("Counter", "total") == "3"
@@ -270,11 +229,11 @@ def test_nested_data_there_and_back(courier: Courier) -> None:
     assert goal.nested_different_pkg == Time(sec=-7)
     assert goal.nested_field_no_pkg == NestedMessage.Goal().nested_field_no_pkg
     server.feedback(nested_field=BasicTypes(bool_value=True))
-    courier.until(lambda: courier.value("Arm", "is_near") == "true", "the feedback")
+    courier.has("Arm", "is_near", "true")
     server.end(
         End.SUCCEED, nested_field=BasicTypes(uint8_value=9, float32_value=-1.5), nested_different_pkg=Time(sec=3)
     )
-    courier.until(lambda: courier.value("Arm", "seconds") == "3", "the result")
+    courier.has("Arm", "seconds", "3")
     assert (courier.value("Arm", "number"), courier.value("Arm", "share")) == ("9", "-1.5")
 
 

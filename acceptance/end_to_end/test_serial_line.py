@@ -25,7 +25,7 @@ def test_it_keeps_to_the_line_and_stands_still_whenever_it_must(
     # More than the judge asks: its middle stays above the line, which is 5 cm wide.
     assert outcome.figures["aside_most_m"] < 0.025
     assert outcome.figures["collisions"] == 0
-    # The follower was never told to stop: the layer held back what it went on asking for.
+    # The follower was never asked to stop: the layer held back what it went on asking for.
     assert outcome.figures["blocked"] > 20
     events = [entry.event for entry in read_log(outcome.event_log).events]
     assert (events.count("stop.response"), events.count("resume.response")) == (2, 2)

@@ -46,7 +46,7 @@ def peer(master: Master, tmp_path: Path) -> Iterator[Peer]:
 
 @pytest.fixture
 def serve(master: Master, tmp_path: Path) -> Iterator[Callable[..., tuple[Process, int]]]:
-    """Starts a twin: the process, and where to write what it is told."""
+    """Starts a twin: the process, and where to write its commands."""
     with ExitStack() as stack:
 
         def start(*arguments: str, **variables: str) -> tuple[Process, int]:

@@ -32,7 +32,7 @@ class Served:
         self.peer = peer
         self._commands = commands
 
-    def tell(self, command: str) -> None:
+    def send(self, command: str) -> None:
         os.write(self._commands, command.encode() + b"\n")
 
     def until(self, condition: Callable[[], bool], what: str, repeat: Callable[[], object] = lambda: None) -> None:
@@ -90,7 +90,7 @@ def test_other_nodes_see_a_turtlebot(serve: Callable[..., Served], tmp_path: Pat
     assert batteries[0].voltage == pytest.approx(12.0)
     assert (odometry[0].header.frame_id, odometry[0].child_frame_id) == ("odom", "base_footprint")
 
-    # It drives as it is told, for as long as it is told.
+    # It drives as commanded, for as long as commanded.
     velocity = Twist()
     velocity.linear.x = 0.2
     twin.until(
@@ -109,10 +109,10 @@ def test_other_nodes_see_a_turtlebot(serve: Callable[..., Served], tmp_path: Pat
 
     # What is said on its standard input happens to it.
     behind_m = scans[-1].ranges[0]
-    twin.tell("obstacle box 1.2 0.0")
+    twin.send("obstacle box 1.2 0.0")
     twin.until(lambda: scans[-1].ranges[0] < behind_m - 0.3, "the box to be seen")
-    twin.tell("what is this")
-    twin.tell("collisions")
+    twin.send("what is this")
+    twin.send("collisions")
     twin.until(lambda: "collisions 0" in twin.process.stdout, "an answer")
     assert twin.process.stdout.splitlines()[:2] == ["ready", "error: unknown command 'what is this'; `help` lists them"]
 

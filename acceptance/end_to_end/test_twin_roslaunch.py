@@ -3,12 +3,13 @@
 import os
 import signal
 import sys
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 
 from robosc.model.structure import Deployment
+from robosc.supervisor import Supervisor
 from robosc.targets import generate, write_files
 from robosc_simulated import MotionError, load_scene, read_motion
 from robosc_simulated.motion import Motion
@@ -60,39 +61,54 @@ def end(launch: Process) -> None:
     assert "escalating" not in launch.stdout + launch.stderr
 
 
-def test_the_maze_solver_is_launched_and_gets_out(master: Master, tmp_path: Path) -> None:
-    package = tmp_path / "packages" / "maze_solver_controller"
-    write_files(generate(example_supervisor("maze_solver/maze_solver"), "ros1"), package)
-    path = tmp_path / "motion.jsonl"
-    arguments = ("maze_solver.launch", "scene:=maze-rooms", "speed:=10", f"options:=--motion {path}")
-    with launched(master, tmp_path, *arguments) as launch:
+def driven(
+    master: Master,
+    folder: Path,
+    package: str,
+    supervisor: Supervisor,
+    has_arrived: Callable[[Motion], bool],
+    *arguments: str,
+) -> Motion:
+    """Launch a supervisor's package on the twin until the robot has arrived, and return its motion."""
+    write_files(generate(supervisor, "ros1"), folder / "packages" / package)
+    path = folder / "motion.jsonl"
+    with launched(master, folder, *arguments, f"options:=--motion {path}") as launch:
         until(
-            lambda: (
-                (found := motion_of(path)) is not None and any(each.happening == "goal" for each in found.happenings)
-            ),
-            "the robot to be out of the maze",
+            lambda: (found := motion_of(path)) is not None and has_arrived(found),
+            "the robot to arrive",
             launch,
             limit_s=LIMIT_S,
         )
         end(launch)
     found = motion_of(path)
     assert found is not None
+    return found
+
+
+def test_the_maze_solver_is_launched_and_gets_out(master: Master, tmp_path: Path) -> None:
+    solver = example_supervisor("maze_solver/maze_solver")
+    found = driven(
+        master,
+        tmp_path,
+        "maze_solver_controller",
+        solver,
+        lambda motion: any(each.happening == "goal" for each in motion.happenings),
+        "maze_solver.launch",
+        "scene:=maze-rooms",
+        "speed:=10",
+    )
     assert check_maze(load_scene("maze-rooms"), found) == ()
 
 
 def test_the_supervised_line_follower_is_launched_and_keeps_to_its_line(master: Master, tmp_path: Path) -> None:
-    package = tmp_path / "packages" / "line_follower_layer_layer"
-    write_files(generate(example_supervisor("line_follower/line_follower_layer", Deployment.LAYER), "ros1"), package)
-    path = tmp_path / "motion.jsonl"
-    arguments = ("line_follower.launch", "speed:=4", f"options:=--motion {path}")
-    with launched(master, tmp_path, *arguments) as launch:
-        until(
-            lambda: (found := motion_of(path)) is not None and any(each.x_m > 0.9 for each in found.samples),
-            "the robot to be around the first bend",
-            launch,
-            limit_s=LIMIT_S,
-        )
-        end(launch)
-    found = motion_of(path)
-    assert found is not None
+    layer = example_supervisor("line_follower/line_follower_layer", Deployment.LAYER)
+    found = driven(
+        master,
+        tmp_path,
+        "line_follower_layer_layer",
+        layer,
+        lambda motion: any(each.x_m > 0.9 for each in motion.samples),
+        "line_follower.launch",
+        "speed:=4",
+    )
     assert check_line(load_scene("line-oval"), found, least_m=0.9) == ()

@@ -34,8 +34,8 @@ def kilted() -> list[str]:
 
 
 def test_it_is_the_rclpy_of_kilted(kilted: list[str]) -> None:
-    tell = "import importlib.metadata, rclpy; print(importlib.metadata.version('ros-rclpy'), rclpy.__file__)"
-    done = subprocess.run([*kilted, "-c", tell], capture_output=True, text=True, check=True)
+    program = "import importlib.metadata, rclpy; print(importlib.metadata.version('ros-rclpy'), rclpy.__file__)"
+    done = subprocess.run([*kilted, "-c", program], capture_output=True, text=True, check=True)
     version, file = done.stdout.split()
     assert version.startswith("9.")
     assert Path(kilted[-1]).parents[1] in Path(file).parents

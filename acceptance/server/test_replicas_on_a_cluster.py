@@ -49,10 +49,7 @@ class Site:
 
 @pytest.fixture(scope="module")
 def site(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Site]:
-    with (
-        postgresql() as database,
-        dask_cluster(tmp_path_factory.mktemp("cluster"), _WORKERS) as cluster,
-    ):
+    with postgresql() as database, dask_cluster(tmp_path_factory.mktemp("cluster"), _WORKERS) as cluster:
         yield Site(cluster, database.new_database().replace("postgresql://", "postgresql+psycopg://"))
 
 

@@ -54,7 +54,7 @@ class Calls:
         self._health: Any = health_pb2_grpc.HealthStub(channel)
 
     def gated(self, name: str, more: str = "") -> str:
-        """A task that writes down that it has begun, and ends when it is told to."""
+        """A task that writes down that it has begun, and ends when it is released."""
         return f"log {self.folder / 'begun'}\nuntil {self.folder / name}\n{more}"
 
     def open_gate(self, name: str) -> None:
@@ -95,8 +95,8 @@ class Calls:
     async def watch(self, job_id: str) -> Any:
         """A job when it has ended."""
         async with asyncio.timeout(PATIENCE_S):
-            async for told in self._jobs.WatchJob(pb.WatchJobRequest(id=job_id)):
-                job = told.job
+            async for news in self._jobs.WatchJob(pb.WatchJobRequest(id=job_id)):
+                job = news.job
         assert job.HasField("end_time"), job
         return job
 
@@ -129,11 +129,11 @@ async def calls_of(address: str, folder: Path) -> AsyncIterator[Calls]:
 async def refused(call: Any) -> None:
     """A call that ends soon, and says that the database is away and when to come again."""
     begun_s = asyncio.get_running_loop().time()
-    with pytest.raises(grpc.aio.AioRpcError) as told:
+    with pytest.raises(grpc.aio.AioRpcError) as error:
         await call
-    assert told.value.code() is grpc.StatusCode.UNAVAILABLE
-    assert reason_of(told.value) == "STORE_UNAVAILABLE"
-    assert float(dict(told.value.trailing_metadata())["retry-after"]) > 0
+    assert error.value.code() is grpc.StatusCode.UNAVAILABLE
+    assert reason_of(error.value) == "STORE_UNAVAILABLE"
+    assert float(dict(error.value.trailing_metadata())["retry-after"]) > 0
     assert asyncio.get_running_loop().time() - begun_s < _REFUSED_WITHIN_S
 
 
@@ -163,7 +163,7 @@ _LARGE = 3_000_000
 _MANY = 40
 
 
-def test_what_a_server_accepts_while_its_disk_is_full_is_kept_and_the_rest_refused(tmp_path: Path) -> None:
+async def test_what_a_server_accepts_while_its_disk_is_full_is_kept_and_the_rest_refused(tmp_path: Path) -> None:
     def text_of(number: int) -> str:
         return f"job {number}\n" + "x" * 200_000
 
@@ -194,7 +194,7 @@ def test_what_a_server_accepts_while_its_disk_is_full_is_kept_and_the_rest_refus
             assert "call" in await synthesis
             assert await calls.check("a call") == "a call"
             assert await calls.check("a call") == "a call"
-            # Its end cannot be kept: it is not told as if it were.
+            # Its end cannot be kept: it is not reported as if it were.
             assert (await calls.job(running)).state == pb.JOB_STATE_RUNNING
             assert not watching.done()
 
@@ -210,22 +210,19 @@ def test_what_a_server_accepts_while_its_disk_is_full_is_kept_and_the_rest_refus
             assert process.poll() is None
             return {"running": running, "before": before, **again}
 
-    async def after(address: str, ids: dict[str, str]) -> None:
-        async with calls_of(address, tmp_path) as calls:
-            assert {job.id for job in await calls.jobs()} == set(ids.values())
-            large = calls.gated("gate", f"big {_LARGE}")
-            assert await calls.result(ids["running"]) == result_of(large, _LARGE)
-            for number in range(_MANY):
-                assert await calls.result(ids[str(number)]) == result_of(text_of(number))
-
     with small_disk(tmp_path / "disk", "32m") as disk:
         with job_server(disk) as (process, address):
-            ids = asyncio.run(before(address, disk, process))
+            ids = await before(address, disk, process)
         with job_server(disk) as (_, address):
-            asyncio.run(after(address, ids))
+            async with calls_of(address, tmp_path) as calls:
+                assert {job.id for job in await calls.jobs()} == set(ids.values())
+                large = calls.gated("gate", f"big {_LARGE}")
+                assert await calls.result(ids["running"]) == result_of(large, _LARGE)
+                for number in range(_MANY):
+                    assert await calls.result(ids[str(number)]) == result_of(text_of(number))
 
 
-def test_a_server_that_is_killed_while_its_disk_is_full_has_lost_nothing_that_it_accepted(tmp_path: Path) -> None:
+async def test_a_server_that_is_killed_while_its_disk_is_full_has_lost_nothing_that_it_accepted(tmp_path: Path) -> None:
     async def before(address: str, disk: Path, process: subprocess.Popen[str]) -> list[str]:
         async with calls_of(address, tmp_path) as calls:
             ids = [await calls.submit(calls.gated("gate", str(number))) for number in range(5)]
@@ -239,27 +236,24 @@ def test_a_server_that_is_killed_while_its_disk_is_full_has_lost_nothing_that_it
             process.kill()
             return ids
 
-    async def after(address: str, ids: list[str]) -> None:
-        async with calls_of(address, tmp_path) as calls:
-            calls.open_gate("gate")
-            found = {job.id for job in await calls.jobs()}
-            # One more may be kept whose caller was told that this is open.
-            assert set(ids) <= found
-            assert len(found) <= len(ids) + 1
-            for job in await asyncio.gather(*map(calls.watch, ids)):
-                assert job.state == pb.JOB_STATE_SUCCEEDED
-
     with small_disk(tmp_path / "disk", "16m") as disk:
         with job_server(disk) as (process, address):
-            ids = asyncio.run(before(address, disk, process))
+            ids = await before(address, disk, process)
         (disk / "filler").unlink()
         with job_server(disk) as (_, address):
-            asyncio.run(after(address, ids))
+            async with calls_of(address, tmp_path) as calls:
+                calls.open_gate("gate")
+                found = {job.id for job in await calls.jobs()}
+                # One more may be kept whose caller learned that this is open.
+                assert set(ids) <= found
+                assert len(found) <= len(ids) + 1
+                for job in await asyncio.gather(*map(calls.watch, ids)):
+                    assert job.state == pb.JOB_STATE_SUCCEEDED
 
 
 @pytest.mark.parametrize("way", ["stop", "freeze"])
-def test_a_database_that_is_gone_for_a_while(database_server: Postgresql, tmp_path: Path, way: str) -> None:
-    async def test(address: str, process: subprocess.Popen[str]) -> None:
+async def test_a_database_that_is_gone_for_a_while(database_server: Postgresql, tmp_path: Path, way: str) -> None:
+    with job_server(tmp_path / "state", database_server.new_database()) as (process, address):
         async with calls_of(address, tmp_path) as calls:
             succeeded, failed = await calls.submit("done"), await calls.submit("fail CPU_LIMIT")
             await asyncio.gather(*map(calls.watch, (succeeded, failed)))
@@ -310,6 +304,3 @@ def test_a_database_that_is_gone_for_a_while(database_server: Postgresql, tmp_pa
             expected = {succeeded, failed, cancelled, running, second, *waiting, again[0]}
             assert {job.id for job in await calls.jobs()} == expected
             assert process.poll() is None
-
-    with job_server(tmp_path / "state", database_server.new_database()) as (process, address):
-        asyncio.run(test(address, process))

@@ -35,7 +35,7 @@ def answers(client: Path) -> Any:
 
 
 @pytest.fixture
-def told(capsys: pytest.CaptureFixture[str]) -> Iterator[Any]:
+def command_line(capsys: pytest.CaptureFixture[str]) -> Iterator[Any]:
     def run(*arguments: object) -> str:
         capsys.readouterr()
         robosc([str(argument) for argument in arguments])
@@ -55,13 +55,13 @@ def test_findings_and_layout(answers: Any) -> None:
     assert answers["formatted"] == "robot R { }\n"
 
 
-def test_the_supervisor_is_that_of_the_command_line(answers: Any, tmp_path: Path, told: Any) -> None:
+def test_the_supervisor_is_that_of_the_command_line(answers: Any, tmp_path: Path, command_line: Any) -> None:
     file = tmp_path / "out.rsup"
-    told("synth", MODEL, "-o", file)
+    command_line("synth", MODEL, "-o", file)
     found = answers["synthesis"]
     assert base64.b64decode(found["supervisor"]) == file.read_bytes()
     assert (found["status"], found["states"]) == ("SYNTHESIS_STATUS_SUPERVISOR", "16")
-    # How much is told depends on how long it took.
+    # How much is reported depends on how long it took.
     assert set(found["stages"]) <= {"check", "synthesis", "verification", "controller"}
     job = answers["job"]
     assert base64.b64decode(job["supervisor"]) == file.read_bytes()
@@ -69,19 +69,21 @@ def test_the_supervisor_is_that_of_the_command_line(answers: Any, tmp_path: Path
     assert job["states"][-1] == "JOB_STATE_SUCCEEDED"
 
 
-def test_files_graph_and_verdicts_are_those_of_the_command_line(answers: Any, tmp_path: Path, told: Any) -> None:
-    told("generate", MODEL, "--target", "python", "-o", tmp_path)
+def test_files_graph_and_verdicts_are_those_of_the_command_line(
+    answers: Any, tmp_path: Path, command_line: Any
+) -> None:
+    command_line("generate", MODEL, "--target", "python", "-o", tmp_path)
     names = [path for path in tmp_path.rglob("*") if path.is_file() and path.name != ".robosc-manifest.json"]
     assert answers["files"] == {path.relative_to(tmp_path).as_posix(): path.read_text() for path in names}
-    assert answers["graph"] == json.loads(told("explore", MODEL, "--json"))
+    assert answers["graph"] == json.loads(command_line("explore", MODEL, "--json"))
     properties = ["--property", "reachable true", "--property", "AG false"]
     assert answers["verification"] == {
         "status": "VERIFICATION_STATUS_FAILED",
-        "report": json.loads(told("verify", MODEL, "--json", *properties)),
+        "report": json.loads(command_line("verify", MODEL, "--json", *properties)),
     }
 
 
-def test_a_refusal_tells_its_reason(answers: Any) -> None:
+def test_a_refusal_reports_its_reason(answers: Any) -> None:
     assert answers["refusal"] == {
         "code": "INVALID_ARGUMENT",
         "message": "a file's name must be relative, not '/etc/passwd'",

@@ -31,7 +31,7 @@ def test_every_job_ends_once_with_its_right_result(tmp_path: Path) -> None:
     assert set(ledger["kills"]) == set(Kind) and sum(ledger["kills"].values()) > 0
 
 
-def test_wrong_use_is_told() -> None:
+def test_wrong_use_is_reported() -> None:
     done = subprocess.run([sys.executable, PROGRAM, "--jobs", "0"], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")
     assert "--jobs, --workers and --throughput take numbers above 0" in done.stderr

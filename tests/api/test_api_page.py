@@ -44,8 +44,8 @@ def test_every_reason_is_there_with_its_status() -> None:
 
 def test_limits() -> None:
     request, task = RequestLimits(), TaskLimits()
-    told = {row[0]: row[1] for row in rows("limit")}
-    assert list(told.values()) == [
+    limits = {row[0]: row[1] for row in rows("limit")}
+    assert list(limits.values()) == [
         f"{request.bundle_bytes // 2**20} MiB",
         f"{request.bundle_files:,} each",
         "100",

@@ -57,7 +57,7 @@ def test_a_new_token_is_taken_without_a_new_channel(address: str, file: Path, ca
         assert sent() == b"Bearer first"
         put(file, "second\n")
         assert [sent(), sent()] == [b"Bearer second"] * 2
-        # Half a file, and none, leave the token as it is, and the log tells it once.
+        # Half a file, and none, leave the token as it is, and the log says it once.
         put(file, "")
         assert [sent(), sent()] == [b"Bearer second"] * 2
         file.unlink()

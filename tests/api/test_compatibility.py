@@ -14,7 +14,7 @@ from support.node import buf
 
 SYNTHESIS, JOBS = "synthesis.proto", "jobs.proto"
 
-# File, what is replaced (the first occurrence), by what, and what is told.
+# File, what is replaced (the first occurrence), by what, and the finding.
 BREAKING = {
     "a field removed": (SYNTHESIS, "  string mend = 5;", "", r"Diagnostic, field 5: gone"),
     "a field reserved": (SYNTHESIS, "string mend = 5;", "reserved 5;", r"Diagnostic, field 5: gone"),
@@ -110,7 +110,7 @@ def test_what_was_reserved_stays_so(today: FileDescriptorSet, tmp_path: Path) ->
     ]
 
 
-def told_by_buf(folder: Path, against: FileDescriptorSet) -> tuple[bool, str]:
+def verdict_of_buf(folder: Path, against: FileDescriptorSet) -> tuple[bool, str]:
     """Return True if buf, another checker of interfaces, finds something that breaks callers, and its output."""
     before = folder / "before.binpb"
     before.write_bytes(against.SerializeToString())
@@ -124,9 +124,9 @@ def told_by_buf(folder: Path, against: FileDescriptorSet) -> tuple[bool, str]:
 
 @pytest.mark.parametrize("case", BREAKING)
 def test_what_breaks_callers_is_found(today: FileDescriptorSet, tmp_path: Path, case: str) -> None:
-    name, old, new, told = BREAKING[case]
+    name, old, new, finding = BREAKING[case]
     found = breaks(today, compiled(changed(tmp_path, name, old, new), tmp_path / "set.binpb"))
-    assert any(re.search(told, line) for line in found), found
+    assert any(re.search(finding, line) for line in found), found
 
 
 @pytest.mark.parametrize("case", HARMLESS)
@@ -138,7 +138,7 @@ def test_what_is_new_breaks_nobody(today: FileDescriptorSet, tmp_path: Path, cas
 def test_another_checker_is_of_the_same_mind(today: FileDescriptorSet, tmp_path: Path, case: str) -> None:
     name, old, new, *_ = BREAKING[case] if case in BREAKING else HARMLESS[case]
     changed(tmp_path, name, old, new)
-    is_broken, words = told_by_buf(tmp_path, today)
+    is_broken, words = verdict_of_buf(tmp_path, today)
     assert is_broken == (case in BREAKING), words
 
 
@@ -148,4 +148,4 @@ def test_buf_finds_nothing_to_complain_of(released: FileDescriptorSet, tmp_path:
     ran = subprocess.run([buf(), "format", "--diff", "--exit-code", PROTO], capture_output=True, text=True, timeout=120)
     assert (ran.returncode, ran.stdout) == (0, "")
     shutil.copytree(PROTO / "robosc_api", tmp_path / "proto" / "robosc_api")
-    assert told_by_buf(tmp_path, released) == (False, "")
+    assert verdict_of_buf(tmp_path, released) == (False, "")

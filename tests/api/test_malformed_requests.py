@@ -1,6 +1,5 @@
 """Bytes that are no message, for methods of each kind, and what a guard and others stand behind."""
 
-import asyncio
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -40,23 +39,20 @@ def with_messages(server: grpc.aio.Server) -> None:
     server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Messages", handlers),))
 
 
-def test_they_are_refused_with_a_reason_and_messages_are_not() -> None:
-    async def run() -> None:
-        checked = MalformedRequests("test.Messages", SERVICE)
-        async with small_server(interceptors=[checked], unary=raw, setup=with_messages) as (channel, _):
-            # Methods that take bytes look at them themselves.
-            assert (await call(channel, WRONG)).answer == WRONG
-            right = Message(service="name").SerializeToString()
-            made: Any = channel.unary_unary("/test.Messages/Unary")
-            assert await made(right, timeout=PATIENCE_S) == b"name"
-            refusals = [made(WRONG, timeout=PATIENCE_S)]
-            for name in ("Generator", "Writer"):
-                stream: Any = channel.unary_stream(f"/test.Messages/{name}")
-                assert [answer async for answer in stream(right, timeout=PATIENCE_S)] == [b"name"]
-                refusals.append(stream(WRONG, timeout=PATIENCE_S))
-            for refused in refusals:
-                assert await refused.code() is grpc.StatusCode.INVALID_ARGUMENT
-                assert await refused.details() == "the request is not a valid message of this service"
-                assert b"MALFORMED_REQUEST" in dict(await refused.trailing_metadata())["grpc-status-details-bin"]
-
-    asyncio.run(run())
+async def test_they_are_refused_with_a_reason_and_messages_are_not() -> None:
+    checked = MalformedRequests("test.Messages", SERVICE)
+    async with small_server(interceptors=[checked], unary=raw, setup=with_messages) as (channel, _):
+        # Methods that take bytes look at them themselves.
+        assert (await call(channel, WRONG)).answer == WRONG
+        right = Message(service="name").SerializeToString()
+        made: Any = channel.unary_unary("/test.Messages/Unary")
+        assert await made(right, timeout=PATIENCE_S) == b"name"
+        refusals = [made(WRONG, timeout=PATIENCE_S)]
+        for name in ("Generator", "Writer"):
+            stream: Any = channel.unary_stream(f"/test.Messages/{name}")
+            assert [answer async for answer in stream(right, timeout=PATIENCE_S)] == [b"name"]
+            refusals.append(stream(WRONG, timeout=PATIENCE_S))
+        for refused in refusals:
+            assert await refused.code() is grpc.StatusCode.INVALID_ARGUMENT
+            assert await refused.details() == "the request is not a valid message of this service"
+            assert b"MALFORMED_REQUEST" in dict(await refused.trailing_metadata())["grpc-status-details-bin"]

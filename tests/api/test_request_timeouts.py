@@ -9,7 +9,7 @@ import grpc
 import pytest
 
 from robosc_api.request_timeouts import RequestTimeouts
-from support.held_time import HeldLoop, on_held_time
+from support.held_time import HeldLoop
 from support.small_server import SERVICE, call, small_server
 from support.waiting import PATIENCE_S, until
 
@@ -73,83 +73,71 @@ async def refusal(made: Any) -> tuple[Any, str]:
 
 
 @pytest.mark.parametrize("name", ["Unary", "Generator", "Writer"])
-def test_a_request_comes_in_time_or_the_call_ends(name: str) -> None:
-    async def test(loop: HeldLoop) -> None:
-        timeouts = RequestTimeouts(LIMIT_S)
-        async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
-            made = [silent(channel, name) for _ in range(3)]
-            await until(lambda: waits(timeouts) == 3)
-            await loop.passed(LIMIT_S / 2)
-            assert waits(timeouts) == 3
-            await loop.passed(LIMIT_S / 2)
-            for each in made:
-                assert await refusal(each) == (
-                    grpc.StatusCode.INVALID_ARGUMENT,
-                    "the request did not arrive within 0.25 seconds",
-                )
-            # One that ends its requests without any need not be waited for, and the next ones are answered.
-            spoken: Any = channel.stream_stream(f"/test.Kinds/{name}")(timeout=PATIENCE_S)
-            await spoken.write(b"said")
-            assert await spoken.read() == b"said"
-
-    on_held_time(test)
+async def test_a_request_comes_in_time_or_the_call_ends(name: str, loop: HeldLoop) -> None:
+    timeouts = RequestTimeouts(LIMIT_S)
+    async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
+        made = [silent(channel, name) for _ in range(3)]
+        await until(lambda: waits(timeouts) == 3)
+        await loop.passed(LIMIT_S / 2)
+        assert waits(timeouts) == 3
+        await loop.passed(LIMIT_S / 2)
+        for each in made:
+            assert await refusal(each) == (
+                grpc.StatusCode.INVALID_ARGUMENT,
+                "the request did not arrive within 0.25 seconds",
+            )
+        # One that ends its requests without any need not be waited for, and the next ones are answered.
+        spoken: Any = channel.stream_stream(f"/test.Kinds/{name}")(timeout=PATIENCE_S)
+        await spoken.write(b"said")
+        assert await spoken.read() == b"said"
 
 
 @pytest.mark.parametrize("name", ["Unary", "Writer"])
-def test_an_end_without_a_request_is_told_at_once(name: str) -> None:
-    async def run() -> None:
-        async with small_server(interceptors=[RequestTimeouts(LONG_S)], setup=with_all_kinds) as (channel, _):
-            made = silent(channel, name)
-            await made.done_writing()
-            assert (await refusal(made))[0] is grpc.StatusCode.INVALID_ARGUMENT
-
-    asyncio.run(run())
+async def test_an_end_without_a_request_is_reported_at_once(name: str) -> None:
+    async with small_server(interceptors=[RequestTimeouts(LONG_S)], setup=with_all_kinds) as (channel, _):
+        made = silent(channel, name)
+        await made.done_writing()
+        assert (await refusal(made))[0] is grpc.StatusCode.INVALID_ARGUMENT
 
 
 @pytest.mark.parametrize("name", ["Both", "Collect"])
-def test_a_stream_of_requests_goes_on_as_long_as_they_come(name: str) -> None:
-    async def test(loop: HeldLoop) -> None:
-        path = f"/test.Kinds/{name}"
-        for limits, words in (
-            ((LIMIT_S, LONG_S), "within 0.25 s"),
-            ((LONG_S, LIMIT_S), "each further one within 0.25"),
-        ):
-            timeouts = RequestTimeouts(limits[0], {path: limits[1]})
-            async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
-                made = silent(channel, name)
-                if limits[0] == LONG_S:
-                    for text in (b"a", b"b"):
-                        await made.write(text)
-                        assert name == "Collect" or await made.read() == text
-                    await until(partial(is_waiting, timeouts, path))
-                else:
-                    await until(partial(is_waiting, timeouts))
-                await loop.passed(LIMIT_S)
-                code, told = await refusal(made)
-                assert code is grpc.StatusCode.INVALID_ARGUMENT
-                assert words in told
-                open_stream: Any = channel.stream_stream(path)
-                whole = open_stream(iter([b"a", b"b"]), timeout=PATIENCE_S)
-                assert b"".join([each async for each in whole]) == b"ab"
-
-    on_held_time(test)
-
-
-def test_streams_that_nothing_is_said_of_are_left_alone() -> None:
-    async def test(loop: HeldLoop) -> None:
-        timeouts = RequestTimeouts(LIMIT_S)
+async def test_a_stream_of_requests_goes_on_as_long_as_they_come(name: str, loop: HeldLoop) -> None:
+    path = f"/test.Kinds/{name}"
+    for limits, words in (
+        ((LIMIT_S, LONG_S), "within 0.25 s"),
+        ((LONG_S, LIMIT_S), "each further one within 0.25"),
+    ):
+        timeouts = RequestTimeouts(limits[0], {path: limits[1]})
         async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
-            quiet, other = silent(channel, "Both"), silent(channel, "Unary")
-            await until(lambda: waits(timeouts) == 1)
+            made = silent(channel, name)
+            if limits[0] == LONG_S:
+                for text in (b"a", b"b"):
+                    await made.write(text)
+                    assert name == "Collect" or await made.read() == text
+                await until(partial(is_waiting, timeouts, path))
+            else:
+                await until(partial(is_waiting, timeouts))
             await loop.passed(LIMIT_S)
-            await refusal(other)
-            await quiet.write(b"at last")
-            assert await quiet.read() == b"at last"
+            code, message = await refusal(made)
+            assert code is grpc.StatusCode.INVALID_ARGUMENT
+            assert words in message
+            open_stream: Any = channel.stream_stream(path)
+            whole = open_stream(iter([b"a", b"b"]), timeout=PATIENCE_S)
+            assert b"".join([each async for each in whole]) == b"ab"
 
-    on_held_time(test)
+
+async def test_streams_that_nothing_is_said_of_are_left_alone(loop: HeldLoop) -> None:
+    timeouts = RequestTimeouts(LIMIT_S)
+    async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
+        quiet, other = silent(channel, "Both"), silent(channel, "Unary")
+        await until(lambda: waits(timeouts) == 1)
+        await loop.passed(LIMIT_S)
+        await refusal(other)
+        await quiet.write(b"at last")
+        assert await quiet.read() == b"at last"
 
 
-def test_the_wait_is_for_the_request_alone() -> None:
+async def test_the_wait_is_for_the_request_alone(loop: HeldLoop) -> None:
     """Check that handling a request may take any time, and that a caller may go at any time."""
     goes_on = asyncio.Event()
     begun: list[str] = []
@@ -164,57 +152,48 @@ def test_the_wait_is_for_the_request_alone() -> None:
             raise
         return request
 
-    async def test(loop: HeldLoop) -> None:
-        timeouts = RequestTimeouts(LIMIT_S)
-        async with small_server(interceptors=[timeouts], unary=slow) as (channel, _):
-            made: Any = channel.unary_unary(f"/{SERVICE}/Unary")
-            stays, goes = made(b"stays", timeout=PATIENCE_S), made(b"goes", timeout=PATIENCE_S)
-            late: Any = channel.stream_unary(f"/{SERVICE}/Unary")(timeout=PATIENCE_S)
-            await until(lambda: len(begun) == 2 and waits(timeouts) == 1)
-            await loop.passed(LIMIT_S)
-            assert await late.code() is grpc.StatusCode.INVALID_ARGUMENT
-            goes.cancel()
-            await until(lambda: bool(cancelled))
-            assert cancelled == ["goes"]
-            goes_on.set()
-            assert await stays == b"stays"
-            assert (await call(channel, b"x")).answer == b"x"
-
-    on_held_time(test)
+    timeouts = RequestTimeouts(LIMIT_S)
+    async with small_server(interceptors=[timeouts], unary=slow) as (channel, _):
+        made: Any = channel.unary_unary(f"/{SERVICE}/Unary")
+        stays, goes = made(b"stays", timeout=PATIENCE_S), made(b"goes", timeout=PATIENCE_S)
+        late: Any = channel.stream_unary(f"/{SERVICE}/Unary")(timeout=PATIENCE_S)
+        await until(lambda: len(begun) == 2 and waits(timeouts) == 1)
+        await loop.passed(LIMIT_S)
+        assert await late.code() is grpc.StatusCode.INVALID_ARGUMENT
+        goes.cancel()
+        await until(lambda: bool(cancelled))
+        assert cancelled == ["goes"]
+        goes_on.set()
+        assert await stays == b"stays"
+        assert (await call(channel, b"x")).answer == b"x"
 
 
-def test_who_cancels_at_the_same_moment_is_obeyed() -> None:
-    async def run() -> None:
-        timeout = RequestTimeouts(LIMIT_S)._first
-        never: asyncio.Future[None] = asyncio.get_running_loop().create_future()
-        task: asyncio.Task[Any] = asyncio.create_task(timeout.wait(asyncio.shield(never)))
-        while not timeout._since_s:
-            await asyncio.sleep(0)
-        timeout._since_s[task] -= LIMIT_S
-        timeout._cancel_overdue()
-        task.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await task
-        assert not timeout._since_s and not timeout._overdue
-        never.cancel()
-
-    asyncio.run(run())
+async def test_who_cancels_at_the_same_moment_is_obeyed() -> None:
+    timeout = RequestTimeouts(LIMIT_S)._first
+    never: asyncio.Future[None] = asyncio.get_running_loop().create_future()
+    task: asyncio.Task[Any] = asyncio.create_task(timeout.wait(asyncio.shield(never)))
+    while not timeout._since_s:
+        await asyncio.sleep(0)
+    timeout._since_s[task] -= LIMIT_S
+    timeout._cancel_overdue()
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await task
+    assert not timeout._since_s and not timeout._overdue
+    never.cancel()
 
 
-def test_those_that_begin_while_others_wait_are_looked_for_later() -> None:
-    async def test(loop: HeldLoop) -> None:
-        timeouts = RequestTimeouts(LIMIT_S)
-        async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
-            made = []
-            for number in range(1, 4):
-                made.append(silent(channel, "Unary"))
-                await until(partial(is_waiting, timeouts, count=number))
-                await loop.passed(LIMIT_S / 4)
-            assert waits(timeouts) == 3
-            for left in (2, 1, 0):
-                await loop.passed(LIMIT_S / 4)
-                assert waits(timeouts) == left
-            for each in made:
-                assert (await refusal(each))[0] is grpc.StatusCode.INVALID_ARGUMENT
-
-    on_held_time(test)
+async def test_those_that_begin_while_others_wait_are_looked_for_later(loop: HeldLoop) -> None:
+    timeouts = RequestTimeouts(LIMIT_S)
+    async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
+        made = []
+        for number in range(1, 4):
+            made.append(silent(channel, "Unary"))
+            await until(partial(is_waiting, timeouts, count=number))
+            await loop.passed(LIMIT_S / 4)
+        assert waits(timeouts) == 3
+        for left in (2, 1, 0):
+            await loop.passed(LIMIT_S / 4)
+            assert waits(timeouts) == left
+        for each in made:
+            assert (await refusal(each))[0] is grpc.StatusCode.INVALID_ARGUMENT

@@ -92,27 +92,27 @@ def test_a_token_is_valid_until_it_expires(file: Path, clock: Clock, caplog: pyt
     assert caplog.text.count("no valid token has the scope 'synthesize'") == 1
 
 
-def test_the_log_tells_once_that_a_token_expires_soon(
+def test_the_log_says_once_that_a_token_expires_soon(
     file: Path, clock: Clock, caplog: pytest.LogCaptureFixture
 ) -> None:
     lines = [make_token("laptop", (Scope.SYNTHESIZE,), expires_s=NOW_S + 20 * DAY_S)[1]]
     write(file, *lines)
     tokens = tokens_of(file, clock)
 
-    def told() -> int:
+    def count() -> int:
         assert tokens.entries
         return caplog.text.count("of 'laptop' expires at 2026-12-16T12:00:00Z: rotate it")
 
-    assert told() == 0
+    assert count() == 0
     clock.now_s = NOW_S + 20 * DAY_S - SOON_S - 1
-    assert told() == 0
+    assert count() == 0
     clock.now_s += 1
-    assert told() == 1
+    assert count() == 1
     clock.now_s += DAY_S
-    assert told() == 1
+    assert count() == 1
 
 
-def test_a_token_that_another_one_replaces_is_told_of_by_nobody(
+def test_a_token_that_another_one_replaces_is_reported_by_nobody(
     file: Path, clock: Clock, caplog: pytest.LogCaptureFixture
 ) -> None:
     both, one = (Scope.SYNTHESIZE, Scope.ADMIN), (Scope.SYNTHESIZE,)

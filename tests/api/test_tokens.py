@@ -93,7 +93,7 @@ def test_a_token_has_a_scope() -> None:
         (f"a watch sha256:{'0' * 64}{2 * ' expires=2027-01-31T00:00:00Z'}", "tokens:1: expires occurs twice"),
     ],
 )
-def test_a_wrong_line_is_told_without_what_stands_there(text: str, problem: str) -> None:
+def test_a_wrong_line_is_reported_without_what_stands_there(text: str, problem: str) -> None:
     with pytest.raises(SecurityError) as caught:
         parse_tokens(text, "tokens")
     assert problem in str(caught.value)
@@ -125,7 +125,7 @@ def test_a_file_that_becomes_wrong_changes_nothing(tmp_path: Path, caplog: pytes
     assert caplog.text.count("the changed token file is not used") == 2
 
 
-def test_that_nobody_is_let_in_is_told_once_each_time_it_becomes_so(
+def test_that_nobody_is_let_in_is_reported_once_each_time_it_becomes_so(
     tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     clock = Clock()
@@ -139,8 +139,8 @@ def test_that_nobody_is_let_in_is_told_once_each_time_it_becomes_so(
         written(tmp_path, *lines)
         clock.now_s = number
         assert len(tokens.entries) == len(lines)
-        told = caplog.text.count(f"{file}: no valid token has the scope 'synthesize', so every call is refused")
-        assert told == times, lines
+        count = caplog.text.count(f"{file}: no valid token has the scope 'synthesize', so every call is refused")
+        assert count == times, lines
     caplog.clear()
     TokenFile(written(tmp_path, *useless))
     assert caplog.text == ""
@@ -150,8 +150,8 @@ def test_a_scope_that_there_is_not(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as raised:
         arguments("laptop", "--scope", "nonsense")
     assert raised.value.code == 2
-    told = capsys.readouterr().err
-    assert "unknown scope 'nonsense': use watch, operate, synthesize, admin" in told
+    errors = capsys.readouterr().err
+    assert "unknown scope 'nonsense': use watch, operate, synthesize, admin" in errors
 
 
 @pytest.mark.parametrize("mode", [0o620, 0o602])
@@ -185,28 +185,28 @@ def test_a_token_is_written_for_its_owner_alone_and_never_over_a_file(tmp_path: 
     file = tmp_path / "token"
     before = os.umask(0)
     try:
-        shown, told = issue_token(arguments("laptop", "-o", str(file)))
+        shown, printed = issue_token(arguments("laptop", "-o", str(file)))
     finally:
         os.umask(before)
     assert shown == ""
     assert file.stat().st_mode & 0o777 == 0o600
     token = file.read_text().strip()
-    assert token not in told
-    assert TokenFile(written(tmp_path, told.splitlines()[-1])).find(token) is not None
+    assert token not in printed
+    assert TokenFile(written(tmp_path, printed.splitlines()[-1])).find(token) is not None
     with pytest.raises(SecurityError, match="File exists"):
         issue_token(arguments("laptop", "-o", str(file)))
     assert file.read_text().strip() == token
 
 
-@pytest.mark.parametrize(("mode", "is_told"), [(0o600, False), (0o640, True), (0o604, True)])
-def test_a_token_that_others_may_read_is_told(
-    mode: int, is_told: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
+@pytest.mark.parametrize(("mode", "is_reported"), [(0o600, False), (0o640, True), (0o604, True)])
+def test_a_token_that_others_may_read_is_reported(
+    mode: int, is_reported: bool, tmp_path: Path, caplog: pytest.LogCaptureFixture
 ) -> None:
     file = tmp_path / "token"
     file.write_text(make_token("a", (Scope.WATCH,))[0])
     file.chmod(mode)
     with open_channel("127.0.0.1:1", Credentials(token_file=file)):
-        assert (f"{file}: other users may read this file" in caplog.text) is is_told
+        assert (f"{file}: other users may read this file" in caplog.text) is is_reported
 
 
 def test_quotas_stand_behind_the_digest(tmp_path: Path) -> None:
@@ -227,8 +227,8 @@ def test_quotas_stand_behind_the_digest(tmp_path: Path) -> None:
 def test_quotas_by_flags_where_a_service_has_them() -> None:
     parser = argparse.ArgumentParser()
     add_token_arguments(parser, (Scope.SYNTHESIZE,), has_quotas=True)
-    _, told = issue_token(parser.parse_args(["a", "--per-minute", "60"]))
-    assert told.splitlines()[-1].endswith(" per_minute=60")
+    _, printed = issue_token(parser.parse_args(["a", "--per-minute", "60"]))
+    assert printed.splitlines()[-1].endswith(" per_minute=60")
     for wrong in ("0", "-1", "x", "9999999999"):
         with pytest.raises(SystemExit):
             parser.parse_args(["a", "--waiting", wrong])

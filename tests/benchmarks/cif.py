@@ -32,12 +32,12 @@ PHASES = {
     "fixed point": "fixed point",
     "reachability": "reachability",
 }
-"""Column of the time that passes until synthesis tells of one of its phases; the rest makes conditions."""
+"""Column of the time that passes until synthesis reports one of its phases; the rest makes conditions."""
 
 TIMES = ("reading", "building", "fixed point", "reachability", "conditions")
 
 HEADER = ("model", "states", *(f"{name}, s" for name in TIMES), "process, s", "peak nodes", "memory, MB")
-RATIOS = ("as told", "fixed point", "process")
+RATIOS = ("as reported", "fixed point", "process")
 
 _IMPORT = re.compile(r'^\s*import\s+"([^"]+)"', re.MULTILINE)
 
@@ -56,14 +56,14 @@ def measured(path: Path) -> dict[str, object]:
         seconds[column] += now - last
         last = now
 
-    def told(progress: SynthesisProgress) -> None:
+    def note(progress: SynthesisProgress) -> None:
         passed(PHASES[progress.phase])
 
     system = check_cif(load_cif(path)).system
     passed("reading")
     if system is None:
-        raise SystemExit(f"{path} has errors: robosc check tells them")
-    found = synthesize(system, on_progress=told)
+        raise SystemExit(f"{path} has errors: robosc check lists them")
+    found = synthesize(system, on_progress=note)
     passed("conditions")
     return {
         **seconds,
@@ -74,7 +74,7 @@ def measured(path: Path) -> dict[str, object]:
 
 
 def _peak_kib() -> int:
-    """Most memory that this process had; `getrusage` would tell of the one that started it, too."""
+    """Most memory that this process had; `getrusage` would count the one that started it, too."""
     (line,) = (line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("VmHWM"))
     return int(line.split()[1])
 
@@ -153,9 +153,9 @@ def table(arguments: Sequence[str]) -> str:
             seconds = [float(str(found[column])) for column in TIMES]
             process = _process_seconds(path, environment)
             states = int(str(found["states"]))
-            told = f"{states:,}" if states < 10**12 else f"{float(states):.4e}"
+            text = f"{states:,}" if states < 10**12 else f"{float(states):.4e}"
             size = [f"{found['peak nodes']:,}", f"{float(str(found['memory'])) / 1024:.0f}"]
-            row = [name, told, *(f"{figure:.3f}" for figure in (*seconds, process)), *size]
+            row = [name, text, *(f"{figure:.3f}" for figure in (*seconds, process)), *size]
             if others:
                 row += _compared(others.get(path.stem, {}), states, seconds[2] + seconds[3], process, ratios)
             rows.append(row)
@@ -169,9 +169,9 @@ def table(arguments: Sequence[str]) -> str:
 def _compared(
     other: dict[str, str], states: int, fixed_point: float, process: float, ratios: tuple[list[float], list[float]]
 ) -> list[str]:
-    """Cells: whether the states are those that are told, and the ratios of times, which are also kept."""
-    told = _number(other.get("controlled states, exact", ""))
-    cells = ["" if told is None else "yes" if abs(states - told) <= 1e-4 * told else "NO"]
+    """Cells: whether the states are those of the other tool, and the ratios of times, which are also kept."""
+    known = _number(other.get("controlled states, exact", ""))
+    cells = ["" if known is None else "yes" if abs(states - known) <= 1e-4 * known else "NO"]
     for seconds, column, kept in zip((fixed_point, process), ("synthesis s", "whole process s"), ratios, strict=True):
         figure = _number(other.get(column, ""))
         if figure:

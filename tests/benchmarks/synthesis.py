@@ -1,6 +1,6 @@
 """Time, size and memory of synthesis on families of systems of growing size: both engines, and in modules.
 
-Each size runs in a process of its own with a limit of time; what does not end in it is told as such, and larger sizes
+Each size runs in a process of its own with a limit of time; what does not end in it is marked so, and larger sizes
 of that family are left out for that engine.
 """
 
@@ -79,7 +79,7 @@ def _row(family: str, size: int, engine: str, before: tuple[int, float] | None) 
         family: Name of the family.
         size: Its size.
         engine: Engine of the synthesis.
-        before: The size and time of the line before: the exponent of the growth since then is told.
+        before: The size and time of the line before: the exponent of the growth since then is printed.
     """
     done = subprocess.run(
         [sys.executable, __file__, family, str(size), engine],

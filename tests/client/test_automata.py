@@ -132,8 +132,8 @@ class TestCommands:
         # The folder of a model says something of this machine, and does not reach the server.
         for place in (Path("models", name), folder / "models" / name):
             status, out, err = both(*COMMANDS[command], place)
-            told = both(*COMMANDS[command], place, "--json")
-            assert (status, json.loads(told[1]) != {}) == (told[0], True)
+            result = both(*COMMANDS[command], place, "--json")
+            assert (status, json.loads(result[1]) != {}) == (result[0], True)
             assert out or err or command == "verify --quiet"
 
     def test_a_model_of_a_machine(self, both: Run) -> None:
@@ -191,7 +191,7 @@ class TestCommands:
             ["synth", "--max-nodes", "1"],
         ],
     )
-    def test_what_cannot_be_is_told(self, arguments: list[str], folder: Path, remote: Run) -> None:
+    def test_what_cannot_be_is_reported(self, arguments: list[str], folder: Path, remote: Run) -> None:
         """Messages are those of this machine; what a server finds out ends with the status of a refusal."""
         status, out, err = remote(*arguments, "models/tank.cif")
         assert (out, err.count("\n")) == ("", 1)

@@ -3,9 +3,9 @@
 import asyncio
 import inspect
 import threading
-from collections.abc import AsyncGenerator
+from collections.abc import AsyncGenerator, Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import ExitStack
+from contextlib import AbstractContextManager, ExitStack, contextmanager
 from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
@@ -77,6 +77,21 @@ BUSY = Refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, "too much to do", "SERVER_BUS
 def connect(request: Any) -> Any:
     """Opens a client of either kind that tries again quickly."""
     return lambda address, **options: client_of(request.param, address, **{"retries": QUICK, **options})
+
+
+Talk = Callable[..., AbstractContextManager[tuple[Any, Any]]]
+
+
+@pytest.fixture
+def talk(connect: Any) -> Talk:
+    """Opens a client, of either kind, of a server that gives these answers to its methods, with a record of them."""
+
+    @contextmanager
+    def opened(**answers: Any) -> Iterator[tuple[Any, Any]]:
+        with scripted(**answers) as (address, script), connect(address) as client:
+            yield client, script
+
+    return opened
 
 
 def test_public_names() -> None:
@@ -175,16 +190,16 @@ def test_every_method_is_tested() -> None:
 
 @pytest.mark.parametrize("method", TASKS)
 class TestEveryMethod:
-    def test_answer(self, connect: Any, method: str) -> None:
+    def test_answer(self, talk: Talk, method: str) -> None:
         call, answer = TASKS[method]
-        with scripted(**{method: [answer]}) as (address, script), connect(address) as client:
+        with talk(**{method: [answer]}) as (client, script):
             call(client)
             assert len(script.of(method)) == 1
 
-    def test_bytes_that_are_no_message(self, connect: Any, method: str) -> None:
+    def test_bytes_that_are_no_message(self, talk: Talk, method: str) -> None:
         call, _ = TASKS[method]
         answers = {method: [[b"\xff\xff\xff"]]}
-        with scripted(**answers) as (address, _), connect(address) as client, pytest.raises(ServiceError):
+        with talk(**answers) as (client, _), pytest.raises(ServiceError):
             call(client)
 
     def test_nobody_there(self, connect: Any, method: str) -> None:
@@ -233,25 +248,21 @@ class TestEveryMethod:
             ("UNIMPLEMENTED", "", ServiceError),
         ],
     )
-    def test_refused(self, connect: Any, method: str, code: str, reason: str, error: Any) -> None:
+    def test_refused(self, talk: Talk, method: str, code: str, reason: str, error: Any) -> None:
         refusal = Refusal(grpc.StatusCode[code], "that is why\x1b[31m", reason)
-        with (
-            scripted(**{method: [[refusal]]}) as (address, script),
-            connect(address) as client,
-            pytest.raises(error) as caught,
-        ):
+        with talk(**{method: [[refusal]]}) as (client, script), pytest.raises(error) as caught:
             TASKS[method][0](client)
         assert type(caught.value) is error
         assert str(caught.value).isprintable()
         assert caught.value.reason == (reason if code != "UNIMPLEMENTED" else "")
         assert len(script.of(method)) == 1
 
-    def test_an_empty_answer(self, connect: Any, method: str) -> None:
+    def test_an_empty_answer(self, talk: Talk, method: str) -> None:
         """None at all, or a message without anything in it; a watch asks again, but not for ever."""
         if method in ("Check", "Format", "ListTargets", "GetVersion", "ListJobs"):
             return  # An empty message is an answer.
         empty = type(TASKS[method][1][0])()
-        with scripted(**{method: [[empty]]}) as (address, _), connect(address) as client, pytest.raises(ServiceError):
+        with talk(**{method: [[empty]]}) as (client, _), pytest.raises(ServiceError):
             TASKS[method][0](client)
 
 
@@ -263,7 +274,7 @@ class TestErrors:
         for error in (ServerUnavailableError, DeadlineError, RequestRefusedError, ServiceError, JobError):
             assert issubclass(error, ClientError)
 
-    def test_deadline(self, connect: Any) -> None:
+    def test_deadline(self, talk: Talk) -> None:
         begun, ended = threading.Event(), threading.Event()
 
         def stuck(context: Any) -> Any:
@@ -272,15 +283,15 @@ class TestErrors:
                 yield progress()
                 ended.wait(PATIENCE_S)
 
-        with scripted(Synthesize=[[stuck]]) as (address, _), connect(address) as client:
-            told: list[Any] = []
+        with talk(Synthesize=[[stuck]]) as (client, _):
+            reports: list[Any] = []
             with pytest.raises(DeadlineError, match=r"within 0\.5 seconds"):
-                client.synthesize(BUNDLE, deadline_s=0.5, on_progress=told.append)
+                client.synthesize(BUNDLE, deadline_s=0.5, on_progress=reports.append)
             # On a slow machine the call may not even have begun by then.
-            assert len(told) <= 1
+            assert len(reports) <= 1
             assert not begun.is_set() or ended.wait(PATIENCE_S)
 
-    def test_what_a_caller_raises_ends_the_work(self, connect: Any) -> None:
+    def test_what_a_caller_raises_ends_the_work(self, talk: Talk) -> None:
         ended = threading.Event()
 
         def stuck(context: Any) -> Any:
@@ -291,10 +302,10 @@ class TestErrors:
         class StopNowError(Exception):
             pass
 
-        def stop(told: Any) -> None:
+        def stop(report: Any) -> None:
             raise StopNowError
 
-        with scripted(Synthesize=[[stuck]]) as (address, _), connect(address) as client:
+        with talk(Synthesize=[[stuck]]) as (client, _):
             with pytest.raises(StopNowError) as caught:
                 client.synthesize(BUNDLE, on_progress=stop)
             # The call itself is still referred to by the exception, so it is not its destruction that ends it.
@@ -321,20 +332,20 @@ class TestErrors:
         with scripted(Synthesize=[[stuck]]) as (address, _):
             asyncio.run(run(address))
 
-    def test_not_tried_again_once_there_was_an_answer(self, connect: Any) -> None:
-        with scripted(Synthesize=[[progress(), AWAY]]) as (address, script), connect(address) as client:
+    def test_not_tried_again_once_there_was_an_answer(self, talk: Talk) -> None:
+        with talk(Synthesize=[[progress(), AWAY]]) as (client, script):
             with pytest.raises(ServerUnavailableError):
                 client.synthesize(BUNDLE)
             assert len(script.of("Synthesize")) == 1
 
-    def test_details_of_another_domain_or_that_are_none(self, connect: Any) -> None:
+    def test_details_of_another_domain_or_that_are_none(self, talk: Talk) -> None:
         strange = Refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, "no", "SERVER_BUSY", 0.0, domain="elsewhere.example")
 
         def broken(context: grpc.ServicerContext) -> Any:
             context.set_trailing_metadata((("grpc-status-details-bin", b"\xff\xff\xff"),))
             context.abort(grpc.StatusCode.INTERNAL, "oh")
 
-        with scripted(Check=[[strange], [broken]]) as (address, script), connect(address) as client:
+        with talk(Check=[[strange], [broken]]) as (client, script):
             with pytest.raises(RequestRefusedError) as caught:
                 client.check(BUNDLE)
             assert (type(caught.value), caught.value.reason) == (RequestRefusedError, "")
@@ -370,22 +381,18 @@ class TestErrors:
                 client.check(BUNDLE)
             server.stop(None).wait()
 
-    def test_a_message_that_is_too_large(self, connect: Any) -> None:
+    def test_a_message_that_is_too_large(self, talk: Talk) -> None:
         large = supervisor(b"x" * 2**26)
         large.result.reason = "y" * 2**22
-        with scripted(Synthesize=[[large]]) as (address, _), connect(address) as client, pytest.raises(ClientError):
+        with talk(Synthesize=[[large]]) as (client, _), pytest.raises(ClientError):
             client.synthesize(BUNDLE)
 
-    def test_endless_progress_ends_with_the_deadline(self, connect: Any) -> None:
+    def test_endless_progress_ends_with_the_deadline(self, talk: Talk) -> None:
         def endless(context: grpc.ServicerContext) -> Any:
             while context.is_active():
                 yield progress()
 
-        with (
-            scripted(Synthesize=[[endless]]) as (address, _),
-            connect(address) as client,
-            pytest.raises(DeadlineError),
-        ):
+        with talk(Synthesize=[[endless]]) as (client, _), pytest.raises(DeadlineError):
             client.synthesize(BUNDLE, deadline_s=0.3)
 
     def test_two_threads_share_a_client(self) -> None:
@@ -514,35 +521,27 @@ class TestWatch:
     @pytest.mark.parametrize(
         "jobs", [(job(3), job(3)), (job(3), job(2)), (job(id="job-2"),), (job(0),), (job(state=0),), (job(kind=0),)]
     )
-    def test_what_no_server_tells(self, connect: Any, jobs: Any) -> None:
-        with (
-            scripted(WatchJob=[watched(*jobs)]) as (address, _),
-            connect(address) as client,
-            pytest.raises(ServiceError, match="malformed"),
-        ):
+    def test_what_no_server_reports(self, talk: Talk, jobs: Any) -> None:
+        with talk(WatchJob=[watched(*jobs)]) as (client, _), pytest.raises(ServiceError, match="malformed"):
             list(client.watch("job-1"))
 
-    def test_deadline(self, connect: Any) -> None:
-        with (
-            scripted(WatchJob=[[*watched(job(1)), held]]) as (address, _),
-            connect(address) as client,
-            pytest.raises(DeadlineError),
-        ):
+    def test_deadline(self, talk: Talk) -> None:
+        with talk(WatchJob=[[*watched(job(1)), held]]) as (client, _), pytest.raises(DeadlineError):
             client.wait("job-1", deadline_s=0.4)
 
-    def test_wait(self, connect: Any) -> None:
-        with scripted(WatchJob=[self.states(1, 2, 3)]) as (address, _), connect(address) as client:
+    def test_wait(self, talk: Talk) -> None:
+        with talk(WatchJob=[self.states(1, 2, 3)]) as (client, _):
             found = client.wait("job-1")
             assert (found.state, found.revision) == (JobState.SUCCEEDED, 3)
 
-    def test_an_unread_watch_is_ended(self, connect: Any) -> None:
+    def test_an_unread_watch_is_ended(self, talk: Talk) -> None:
         ended = threading.Event()
 
         def noted(context: Any) -> Any:
             context.add_callback(ended.set)
             return ()
 
-        with scripted(WatchJob=[[noted, *watched(job(1)), held]]) as (address, _), connect(address) as client:
+        with talk(WatchJob=[[noted, *watched(job(1)), held]]) as (client, _):
             items = client.watch("job-1")
             next(items)
             items.close()
@@ -550,7 +549,7 @@ class TestWatch:
 
 
 class TestJobs:
-    def test_values(self, connect: Any) -> None:
+    def test_values(self, talk: Talk) -> None:
         message = job(
             5,
             jobs_pb2.JOB_STATE_FAILED,
@@ -563,7 +562,7 @@ class TestJobs:
         message.start_time.seconds = 1_700_000_001
         message.end_time.seconds = 1_700_000_002
         message.expire_time.seconds = 1_700_000_003
-        with scripted(GetJob=[[jobs_pb2.GetJobResponse(job=message)]]) as (address, _), connect(address) as client:
+        with talk(GetJob=[[jobs_pb2.GetJobResponse(job=message)]]) as (client, _):
             found = client.get_job("job-1")
         assert (found.id, found.owner, found.kind, found.state) == (
             "job-1", "tester", TaskKind.SYNTHESIZE, JobState.FAILED
@@ -585,17 +584,16 @@ class TestJobs:
             job(create_time={"seconds": 2**60}),
         ],
     )
-    def test_what_no_server_tells(self, connect: Any, message: Any) -> None:
+    def test_what_no_server_reports(self, talk: Talk, message: Any) -> None:
         with (
-            scripted(GetJob=[[jobs_pb2.GetJobResponse(job=message)]]) as (address, _),
-            connect(address) as client,
+            talk(GetJob=[[jobs_pb2.GetJobResponse(job=message)]]) as (client, _),
             pytest.raises(ServiceError, match="malformed"),
         ):
             client.get_job("job-1")
 
-    def test_submission(self, connect: Any) -> None:
+    def test_submission(self, talk: Talk) -> None:
         answer = jobs_pb2.SubmitJobResponse(job=job(), existed=True)
-        with scripted(SubmitJob=[[answer]]) as (address, script), connect(address) as client:
+        with talk(SubmitJob=[[answer]]) as (client, script):
             assert client.submit(Check(BUNDLE)).existed
             client.submit(Check(BUNDLE))
             client.submit(Synthesize(BUNDLE), idempotency_key="mine", label="a label", retention_s=1.5)
@@ -606,26 +604,25 @@ class TestJobs:
         assert not first.HasField("retention")
         assert (third.idempotency_key, third.label, third.retention.ToMilliseconds()) == ("mine", "a label", 1500)
 
-    def test_pages(self, connect: Any) -> None:
+    def test_pages(self, talk: Talk) -> None:
         def page(token: str, *numbers: int) -> list[Any]:
             return [jobs_pb2.ListJobsResponse(jobs=[job(id=f"job-{n}") for n in numbers], next_page_token=token)]
 
         pages = [page("a", 1, 2), page("b"), page("", 3)]
-        with scripted(ListJobs=pages) as (address, script), connect(address) as client:
+        with talk(ListJobs=pages) as (client, script):
             chosen = {"states": (JobState.QUEUED,), "kind": TaskKind.CHECK, "all_owners": True, "page_size": 2}
             assert [item.id for item in client.list_jobs(**chosen)] == ["job-1", "job-2", "job-3"]
             assert [item.page_token for item in script.of("ListJobs")] == ["", "a", "b"]
             asked = script.of("ListJobs")[2]
         assert (list(asked.states), asked.kind, asked.all_owners, asked.page_size) == ([1], 1, True, 2)
 
-    def test_pages_without_an_end(self, connect: Any) -> None:
+    def test_pages_without_an_end(self, talk: Talk) -> None:
         same = [jobs_pb2.ListJobsResponse(next_page_token="a")]
         many = [jobs_pb2.ListJobsResponse(jobs=[job() for _ in range(3)])]
         changing = [[jobs_pb2.ListJobsResponse(next_page_token=str(number))] for number in range(200)]
         for pages in ([same], [many], changing):
             with (
-                scripted(ListJobs=pages) as (address, _),
-                connect(address) as client,
+                talk(ListJobs=pages) as (client, _),
                 pytest.raises(ServiceError, match=r"does not end|more than 2 jobs"),
             ):
                 list(client.list_jobs(page_size=2))
@@ -646,7 +643,7 @@ def location(place: Location | None) -> Any:
 
 
 class TestConversion:
-    def test_diagnostics(self, connect: Any) -> None:
+    def test_diagnostics(self, talk: Talk) -> None:
         numbers: Any = {Severity.ERROR: 1, Severity.WARNING: 2, Severity.NOTE: 3}
         messages = [
             pb.Diagnostic(
@@ -659,10 +656,10 @@ class TestConversion:
             )
             for item in FINDINGS
         ]
-        with scripted(Check=[[pb.CheckResponse(diagnostics=messages)]]) as (address, _), connect(address) as client:
+        with talk(Check=[[pb.CheckResponse(diagnostics=messages)]]) as (client, _):
             assert client.check(BUNDLE) == FINDINGS
 
-    def test_synthesis(self, connect: Any) -> None:
+    def test_synthesis(self, talk: Talk) -> None:
         summary = pb.Summary(
             controllable_events=2,
             uncontrollable_events=3,
@@ -672,20 +669,17 @@ class TestConversion:
         )
         statistics = pb.Statistics(engine="autoref", state_bits=7, iterations=3, peak_nodes=10**12)
         answer = supervisor(b"x", summary=summary, statistics=statistics, signature=b"s")
-        with scripted(Synthesize=[[answer]]) as (address, _), connect(address) as client:
+        with talk(Synthesize=[[answer]]) as (client, _):
             found = client.synthesize(BUNDLE)
         assert found.summary == robosc_client.Summary(2, 3, 10**40, None, (("move.request", "true"),), "text\n")
         assert found.statistics == robosc_client.Statistics("autoref", 7, 3, 10**12)
         assert (found.supervisor, found.signature, found.reason) == (b"x", b"s", "")
 
-    def test_about_the_server(self, connect: Any) -> None:
+    def test_about_the_server(self, talk: Talk) -> None:
         limits = pb.ServerLimits(bundle_bytes=1, bundle_files=2, task_seconds=3.5, retention_seconds=10)
         version = pb.GetVersionResponse(version="9", engines=["cudd", "autoref"], limits=limits)
         targets = pb.ListTargetsResponse(targets=[pb.Target(name="ros2", description="a package")])
-        with (
-            scripted(GetVersion=[[version]], ListTargets=[[targets]]) as (address, _),
-            connect(address) as client,
-        ):
+        with talk(GetVersion=[[version]], ListTargets=[[targets]]) as (client, _):
             found = client.get_version()
             assert (found.version, found.engines) == ("9", ("cudd", "autoref"))
             assert (found.limits.bundle_bytes, found.limits.task_seconds) == (1, 3.5)

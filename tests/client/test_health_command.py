@@ -1,8 +1,8 @@
 """`robosc-client health` against a server that is as it is said to be."""
 
 import json
+from functools import partial
 from pathlib import Path
-from typing import Any
 
 import pytest
 from grpc_health.v1 import health_pb2
@@ -10,6 +10,7 @@ from grpc_health.v1 import health_pb2
 from robosc_api.security import ServerSecurity
 from robosc_client.main import main
 from support.certificates import Authority
+from support.client_commands import Run
 from support.health_servers import answering
 
 Status = health_pb2.HealthCheckResponse
@@ -17,18 +18,12 @@ IN_THE_CLEAR = ServerSecurity()
 
 
 @pytest.fixture
-def asked(capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Any:
+def asked(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> Run:
     monkeypatch.setenv("XDG_CONFIG_HOME", str(tmp_path / "settings"))
-
-    def ask(*arguments: Any) -> Any:
-        status = main(["health", *map(str, arguments)])
-        printed = capfd.readouterr()
-        return status, printed.out, printed.err
-
-    return ask
+    return partial(run, "health")
 
 
-def test_well_and_not_well(asked: Any) -> None:
+def test_well_and_not_well(asked: Run) -> None:
     with answering(Status.SERVING, Jobs=Status.NOT_SERVING, Odd=Status.UNKNOWN) as address:
         assert asked("--server", address) == (0, "SERVING\n", "")
         assert asked("--server", address, "--service", "Jobs") == (1, "NOT_SERVING\n", "")
@@ -40,7 +35,7 @@ def test_well_and_not_well(asked: Any) -> None:
         assert (status, json.loads(out)) == (1, {"server": address, "service": "Jobs", "status": "NOT_SERVING"})
 
 
-def test_nobody_there(asked: Any) -> None:
+def test_nobody_there(asked: Run) -> None:
     status, out, err = asked("--server", "127.0.0.1:1")
     assert (status, out) == (3, "")
     assert err.startswith("robosc-client: no server answers at 127.0.0.1:1: UNAVAILABLE: ")
@@ -48,7 +43,7 @@ def test_nobody_there(asked: Any) -> None:
     assert json.loads(asked("--server", "127.0.0.1:1", "--json")[1])["error"]["status"] == 3
 
 
-def test_with_tls_as_a_profile_says(asked: Any, tmp_path: Path) -> None:
+def test_with_tls_as_a_profile_says(asked: Run, tmp_path: Path) -> None:
     authority = Authority(tmp_path)
     certificate, key = authority.sign("server")
     with answering(Status.SERVING, ServerSecurity(certificate=certificate, key=key)) as address:

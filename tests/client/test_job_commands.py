@@ -22,7 +22,6 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.commands.bench import varied
 from robosc_client.jobs import MAXIMUM_IDEMPOTENCY_KEY, MAXIMUM_LABEL
 from robosc_client.load_measurement import Measured
-from robosc_client.main import main
 from robosc_server.jobs import convert
 from support.answers import (
     enveloped,
@@ -36,7 +35,7 @@ from support.answers import (
     verification,
     watched,
 )
-from support.client_commands import FINDING, MADE, MODEL, NOTHING, SUCCEEDED, interrupted, job_answers, run
+from support.client_commands import FINDING, MADE, MODEL, NOTHING, SUCCEEDED, Run, interrupted, job_answers
 from support.models import bundle_of
 from support.scripted_service import Refusal, scripted
 from support.waiting import PATIENCE_S
@@ -55,12 +54,12 @@ class TestSubmit:
             (["format", MODEL], "format"),
         ],
     )
-    def test_tasks(self, capfd: pytest.CaptureFixture[str], arguments: Any, kind: str) -> None:
+    def test_tasks(self, run: Run, arguments: Any, kind: str) -> None:
         answer = jobs_pb2.SubmitJobResponse(job=job())
         with scripted(SubmitJob=[[answer]]) as (address, script):
             more = ["--label", "mine", "--idempotency-key", "k", "--keep", "60", "--server", address]
-            assert run(capfd, "submit", *arguments, *more) == (0, "job-1\n", "")
-            status, out, _ = run(capfd, "submit", *arguments, *more, "--json")
+            assert run("submit", *arguments, *more) == (0, "job-1\n", "")
+            status, out, _ = run("submit", *arguments, *more, "--json")
             (request, _) = script.of("SubmitJob")
         assert (status, json.loads(out)["existed"], json.loads(out)["job"]["id"]) == (0, False, "job-1")
         assert (request.task.WhichOneof("request"), request.label, request.idempotency_key) == (kind, "mine", "k")
@@ -94,9 +93,9 @@ class TestSubmit:
         ],
     )
     @pytest.mark.parametrize("more", [[], ["--json"]])
-    def test_wrong_use(self, capfd: pytest.CaptureFixture[str], arguments: Any, words: str, more: Any) -> None:
+    def test_wrong_use(self, run: Run, arguments: Any, words: str, more: Any) -> None:
         """Refusals are those of the commands that wait for their result, before a server is asked."""
-        status, out, err = run(capfd, "submit", *arguments, "--server", "127.0.0.1:1", *more)
+        status, out, err = run("submit", *arguments, "--server", "127.0.0.1:1", *more)
         assert status == 2
         assert words in (out if more else err)
         assert not more or json.loads(out)
@@ -116,42 +115,41 @@ class TestSubmit:
             (["format", MODEL, "-L", "."], "unrecognized arguments"),
         ],
     )
-    def test_wrong_options(self, capfd: pytest.CaptureFixture[str], arguments: Any, words: str) -> None:
-        with pytest.raises(SystemExit) as left:
-            main(["submit", *arguments, "--server", "127.0.0.1:1"])
-        assert left.value.code == 2
-        assert words in capfd.readouterr().err
+    def test_wrong_options(self, run: Run, arguments: Any, words: str) -> None:
+        status, _, err = run("submit", *arguments, "--server", "127.0.0.1:1")
+        assert status == 2
+        assert words in err
 
     def test_bounds_are_the_server_s(self) -> None:
         assert (MAXIMUM_LABEL, MAXIMUM_IDEMPOTENCY_KEY) == (convert.MAXIMUM_LABEL, convert.MAXIMUM_IDEMPOTENCY_KEY)
 
-    def test_a_supervisor_to_verify(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    def test_a_supervisor_to_verify(self, run: Run, tmp_path: Path) -> None:
         place = tmp_path / "made.rsup"
         place.write_bytes(b"supervisor")
         with scripted(SubmitJob=[[jobs_pb2.SubmitJobResponse(job=job())]]) as (address, script):
-            assert run(capfd, "submit", "verify", place, MODEL, "--strict", "--server", address)[0] == 0
+            assert run("submit", "verify", place, MODEL, "--strict", "--server", address)[0] == 0
             (request,) = script.of("SubmitJob")
         sent = request.task.verify
         assert (sent.supervisor, sent.strict, sent.maximum_states) == (b"supervisor", True, 1_000_000)
 
-    def test_a_text_that_is_no_model(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    def test_a_text_that_is_no_model(self, run: Run, tmp_path: Path) -> None:
         """Has a layout all the same, which is the server's to judge."""
         file = tmp_path / "odd.rscd"
         file.write_bytes(b"\xef\xbb\xbfrobot {")
         with scripted(SubmitJob=[[jobs_pb2.SubmitJobResponse(job=job())]]) as (address, script):
-            assert run(capfd, "submit", "format", file, "--server", address)[0] == 0
+            assert run("submit", "format", file, "--server", address)[0] == 0
             (request,) = script.of("SubmitJob")
             assert (request.task.format.file.name, request.task.format.file.text) == ("odd.rscd", "robot {")
             file.write_bytes(b"\xff")
-            assert run(capfd, "submit", "format", file, "--server", address)[0] == 1
+            assert run("submit", "format", file, "--server", address)[0] == 1
 
-    def test_submitted_and_watched(self, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_submitted_and_watched(self, run: Run) -> None:
         answers = {
             "SubmitJob": [[jobs_pb2.SubmitJobResponse(job=job(1, jobs_pb2.JOB_STATE_QUEUED))]],
             "WatchJob": [watched(job(1, jobs_pb2.JOB_STATE_QUEUED, waiting_before=2), job(2), job(3, SUCCEEDED))],
         }
         with scripted(**answers) as (address, _):
-            status, out, _ = run(capfd, "submit", "check", MODEL, "--watch", "--server", address)
+            status, out, _ = run("submit", "check", MODEL, "--watch", "--server", address)
         assert status == 0
         first, *lines = out.splitlines()
         assert first == "job-1"
@@ -159,7 +157,7 @@ class TestSubmit:
         assert "2 before it" in out
 
     @pytest.mark.parametrize("more", [[], ["--json"]])
-    def test_the_id_is_told_before_anything_is_waited_for(self, more: Any) -> None:
+    def test_the_id_is_printed_before_anything_is_waited_for(self, more: Any) -> None:
         """Check that Ctrl-C, or whatever else ends the waiting, does not lose the job."""
         left = threading.Event()
 
@@ -184,33 +182,33 @@ class TestSubmit:
         assert process.returncode == 130
         assert not more or json.loads(out)["error"]["status"] == 130
 
-    def test_a_watch_that_fails(self, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_a_watch_that_fails(self, run: Run) -> None:
         submitted = jobs_pb2.SubmitJobResponse(job=job(1, jobs_pb2.JOB_STATE_QUEUED))
         gone = Refusal(grpc.StatusCode.NOT_FOUND, "there is no such job", "NO_SUCH_JOB")
         with scripted(SubmitJob=[[submitted]], WatchJob=[[gone]]) as (address, _):
-            status, out, _ = run(capfd, "submit", "check", MODEL, "--watch", "--json", "--server", address)
+            status, out, _ = run("submit", "check", MODEL, "--watch", "--json", "--server", address)
         assert status == 3
         assert "job-1" in json.loads(out)["error"]["message"]
 
 
 class TestWatch:
-    def test_failed(self, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_failed(self, run: Run) -> None:
         with scripted(WatchJob=[watched(job(1), job(2, jobs_pb2.JOB_STATE_FAILED))]) as (address, _):
-            status, out, _ = run(capfd, "watch", "job-1", "--server", address)
+            status, out, _ = run("watch", "job-1", "--server", address)
             assert status == 1
             assert "too long [CPU_LIMIT]" in out
-            status, out, _ = run(capfd, "watch", "job-1", "--json", "--server", address)
+            status, out, _ = run("watch", "job-1", "--json", "--server", address)
             assert status == 1
             assert json.loads(out)["job"]["failure"] == {"reason": "CPU_LIMIT", "message": "too long"}
 
     def test_a_line_moves_on_a_terminal(self, tmp_path: Path) -> None:
         """And it is markup to nobody, and gone at the end."""
-        told = [job(number, progress=pb.Progress(stage="check", message=f"[bold]step {number}")) for number in (1, 2)]
+        states = [job(number, progress=pb.Progress(stage="check", message=f"[bold]step {number}")) for number in (1, 2)]
 
         is_shown = threading.Event()
 
         def until_shown(context: grpc.ServicerContext) -> Any:
-            yield from watched(*told)
+            yield from watched(*states)
             assert is_shown.wait(PATIENCE_S)
             yield from watched(job(3, SUCCEEDED))
 
@@ -225,7 +223,7 @@ class TestWatch:
                     shown += part
                     if b"[bold]step 2" in shown:
                         is_shown.set()
-            except OSError:  # Linux's way to tell that nobody has the other end any more.
+            except OSError:  # Linux's way to say that nobody has the other end any more.
                 pass
             os.close(main_end)
             out, _ = process.communicate(timeout=PATIENCE_S)
@@ -236,13 +234,13 @@ class TestWatch:
 
 
 class TestGet:
-    def test_where_it_is(self, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_where_it_is(self, run: Run) -> None:
         message = job(4, progress=pb.Progress(stage="check", message="half"), label="mine")
         with scripted(GetJob=[[jobs_pb2.GetJobResponse(job=message)]]) as (address, _):
-            assert run(capfd, "get", "job-1", "--server", address) == (
+            assert run("get", "job-1", "--server", address) == (
                 0, "job-1  running    synthesize  robot.rscd  mine  check: half\n", ""
             )  # fmt: skip
-            document = json.loads(run(capfd, "get", "job-1", "--json", "--server", address)[1])["job"]
+            document = json.loads(run("get", "job-1", "--json", "--server", address)[1])["job"]
         assert (document["state"], document["created"], document["ended"]) == (
             "running",
             "2023-11-14T22:13:20+00:00",
@@ -262,17 +260,15 @@ class TestGet:
             ("format", [pb.FormatResponse(text="robot R { }\n")], 0, "robot R { }"),
         ],
     )
-    def test_results(
-        self, capfd: pytest.CaptureFixture[str], tmp_path: Path, kind: str, messages: Any, status: int, word: str
-    ) -> None:
+    def test_results(self, run: Run, tmp_path: Path, kind: str, messages: Any, status: int, word: str) -> None:
         with scripted(**job_answers(kind, messages)) as (address, _):
-            found, out, _ = run(capfd, "get", "job-1", "--result", "--json", "--server", address)
+            found, out, _ = run("get", "job-1", "--result", "--json", "--server", address)
             assert found == status, out
             assert word in out
             json.loads(out)
-            assert run(capfd, "get", "job-1", "--result", "--server", address)[0] == status
+            assert run("get", "job-1", "--result", "--server", address)[0] == status
             place = tmp_path / "out"
-            found, _, err = run(capfd, "get", "job-1", "-o", place, "--server", address)
+            found, _, err = run("get", "job-1", "-o", place, "--server", address)
         if kind == "check":
             assert found == 2
             assert "--result" in err
@@ -323,16 +319,16 @@ class TestGet:
         ],
     )
     def test_nothing_that_could_be_written(
-        self, capfd: pytest.CaptureFixture[str], tmp_path: Path, kind: str, messages: Any, words: Any
+        self, run: Run, tmp_path: Path, kind: str, messages: Any, words: Any
     ) -> None:
-        """Then it is told why, as the command does that waits for it."""
+        """Then it says why, as the command does that waits for it."""
         place = tmp_path / "out"
         with scripted(**job_answers(kind, messages)) as (address, _):
-            status, out, err = run(capfd, "get", "job-1", "-o", place, "--server", address)
+            status, out, err = run("get", "job-1", "-o", place, "--server", address)
             assert (status, out) == (1, "")
             for word in words:
                 assert word in err
-            status, out, _ = run(capfd, "get", "job-1", "-o", place, "--json", "--server", address)
+            status, out, _ = run("get", "job-1", "-o", place, "--json", "--server", address)
         assert status == 1
         found = json.loads(out)["result"]
         assert found["diagnostics"] if "1 error" in words else found["reason"]
@@ -345,28 +341,28 @@ class TestGet:
             (jobs_pb2.JOB_STATE_CANCELLED, "job job-1 was cancelled"),
         ],
     )
-    def test_without_a_result(self, capfd: pytest.CaptureFixture[str], tmp_path: Path, state: Any, words: str) -> None:
-        """Exit statuses are those of `watch`; where the job is can be told of any."""
+    def test_without_a_result(self, run: Run, tmp_path: Path, state: Any, words: str) -> None:
+        """Exit statuses are those of `watch`; where the job is can be said of any."""
         with scripted(GetJob=[[jobs_pb2.GetJobResponse(job=job(4, state))]]) as (address, script):
             for more in (["--result"], ["-o", tmp_path / "out"]):
-                told = run(capfd, "get", "job-1", *more, "--server", address)
-                assert told == (1, "", f"robosc-client: {words}\n")
-                status, out, _ = run(capfd, "get", "job-1", *more, "--json", "--server", address)
+                result = run("get", "job-1", *more, "--server", address)
+                assert result == (1, "", f"robosc-client: {words}\n")
+                status, out, _ = run("get", "job-1", *more, "--json", "--server", address)
                 document = json.loads(out)
                 assert (status, document["result"]) == (1, None)
                 has_failed = state == jobs_pb2.JOB_STATE_FAILED
                 reason = {"reason": "CPU_LIMIT", "message": "too long"} if has_failed else None
                 assert document["job"]["failure"] == reason
-            assert run(capfd, "get", "job-1", "--server", address)[0] == 0
+            assert run("get", "job-1", "--server", address)[0] == 0
             assert {name for name, _ in script.requests} == {"GetJob"}
 
-    def test_a_result_of_another_kind(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    def test_a_result_of_another_kind(self, run: Run, tmp_path: Path) -> None:
         """Is none of this job: a text must not come where a supervisor is wanted."""
         answers = job_answers("synthesize", [])
         answers["GetJobResult"] = [enveloped("format", [pb.FormatResponse(text="robot R { }\n")])]
         with scripted(**answers) as (address, _):
             for more in (["-o", tmp_path / "out"], ["--result"], ["--result", "--json"]):
-                status, _, err = run(capfd, "get", "job-1", *more, "--server", address)
+                status, _, err = run("get", "job-1", *more, "--server", address)
                 assert status == 3
                 assert "malformed" in err
         assert not (tmp_path / "out").exists()
@@ -390,7 +386,7 @@ class TestGet:
         assert piped == text.encode()
         assert shown == b"robot R {\n\t// \\x1b]0;owned\\x07 \\x9b2J\\r\n}\n"
 
-    def test_nothing_is_written_outside_of_the_folder(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    def test_nothing_is_written_outside_of_the_folder(self, run: Run, tmp_path: Path) -> None:
         """Not through links in the folder either; a link in a file's place is replaced, not followed."""
         outside, folder = tmp_path / "outside", tmp_path / "out"
         outside.mkdir()
@@ -399,30 +395,30 @@ class TestGet:
         (folder / "link").symlink_to(outside)
         for path in ("link/x", "../outside/x", str(outside / "x"), "a/../../outside/x"):
             with scripted(**job_answers("generate", generation({path: (b"x", True)}))) as (address, _):
-                assert run(capfd, "get", "job-1", "-o", folder, "--server", address)[0] in (1, 3)
+                assert run("get", "job-1", "-o", folder, "--server", address)[0] in (1, 3)
         (folder / "file").symlink_to(outside / "file")
         with scripted(**job_answers("generate", generation({"file": (b"x", False)}))) as (address, _):
-            assert run(capfd, "get", "job-1", "-o", folder, "--force", "--server", address)[0] == 0
+            assert run("get", "job-1", "-o", folder, "--force", "--server", address)[0] == 0
         assert [item.name for item in outside.iterdir()] == ["file"]
         assert (outside / "file").read_text() == "mine"
         assert not (folder / "file").is_symlink()
 
 
 class TestListAndCancel:
-    def test_list(self, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_list(self, run: Run) -> None:
         page = [jobs_pb2.ListJobsResponse(jobs=[job(id=f"job-{n}") for n in range(5)], next_page_token="more")]
         with scripted(ListJobs=[page, page]) as (address, script):
             chosen = ["--state", "running", "--state", "queued", "--kind", "check", "--all", "--most", "5"]
-            status, out, _ = run(capfd, "list", *chosen, "--server", address)
+            status, out, _ = run("list", *chosen, "--server", address)
             assert (status, len(out.splitlines())) == (0, 5)
             (request,) = script.of("ListJobs")
-            assert len(json.loads(run(capfd, "list", *chosen, "--json", "--server", address)[1])["jobs"]) == 5
+            assert len(json.loads(run("list", *chosen, "--json", "--server", address)[1])["jobs"]) == 5
         assert (list(request.states), request.kind, request.all_owners, request.page_size) == ([2, 1], 1, True, 5)
 
-    def test_kinds_as_the_commands_call_them(self, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_kinds_as_the_commands_call_them(self, run: Run) -> None:
         with scripted(ListJobs=[[jobs_pb2.ListJobsResponse()]]) as (address, script):
             for name in ("synth", "synthesize"):
-                assert run(capfd, "list", "--kind", name, "--server", address)[0] == 0
+                assert run("list", "--kind", name, "--server", address)[0] == 0
             assert [request.kind for request in script.of("ListJobs")] == [jobs_pb2.TASK_KIND_SYNTHESIZE] * 2
 
     @pytest.mark.parametrize(
@@ -439,31 +435,30 @@ class TestListAndCancel:
             (["--deadline", "soon"], "above 0 and below 1,000,000,000"),
         ],
     )
-    def test_wrong_use(self, capfd: pytest.CaptureFixture[str], options: Any, words: str) -> None:
-        with pytest.raises(SystemExit) as left:
-            main(["list", *options, "--server", "127.0.0.1:1"])
-        assert left.value.code == 2
-        assert words in capfd.readouterr().err
+    def test_wrong_use(self, run: Run, options: Any, words: str) -> None:
+        status, _, err = run("list", *options, "--server", "127.0.0.1:1")
+        assert status == 2
+        assert words in err
 
-    def test_cancel(self, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_cancel(self, run: Run) -> None:
         ended = jobs_pb2.CancelJobResponse(job=job(2, jobs_pb2.JOB_STATE_CANCELLED))
         with scripted(CancelJob=[[ended]]) as (address, _):
-            status, out, _ = run(capfd, "cancel", "job-1", "--server", address)
+            status, out, _ = run("cancel", "job-1", "--server", address)
         assert status == 0
         assert "cancelled" in out
 
-    def test_no_such_job(self, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_no_such_job(self, run: Run) -> None:
         with scripted(GetJob=[[Refusal(grpc.StatusCode.NOT_FOUND, "there is no job x", "NO_SUCH_JOB")]]) as (
             address,
             _,
         ):
-            status, _, err = run(capfd, "get", "x", "--server", address)
+            status, _, err = run("get", "x", "--server", address)
         assert status == 3
         assert "there is no job x" in err
 
 
 class TestBench:
-    def test_counted(self, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_counted(self, run: Run) -> None:
         peers: set[str] = set()
 
         def note(context: grpc.ServicerContext) -> None:
@@ -476,7 +471,7 @@ class TestBench:
                     script.requests.clear()
                     peers.clear()
                     options = ["--task", task, "-c", "4", "--connections", "2", "-n", "20", *more, "--server", address]
-                    status, out, _ = run(capfd, "bench", MODEL, "--json", *options)
+                    status, out, _ = run("bench", MODEL, "--json", *options)
                     document = json.loads(out)
                     assert (status, document["calls"], document["errors"]) == (0, 20, {})
                     assert document["milliseconds"]["p50"] <= document["milliseconds"]["p99"]
@@ -484,24 +479,24 @@ class TestBench:
                     texts = {request.bundle.main.text for request in script.of(method)}
                     assert len(script.of(method)) == 20
                     assert len(texts) == (20 if more else 1)
-            assert "a second" in run(capfd, "bench", MODEL, "-d", "0.2", "--server", address)[1]
+            assert "a second" in run("bench", MODEL, "-d", "0.2", "--server", address)[1]
 
     @pytest.mark.parametrize("more", [[], ["--uncached"]])
-    def test_what_cannot_be_sent(self, capfd: pytest.CaptureFixture[str], more: Any) -> None:
+    def test_what_cannot_be_sent(self, run: Run, more: Any) -> None:
         options = ["--task", "synth", "--max-nodes", str(2**70), "-n", "1", *more]
-        status, _, err = run(capfd, "bench", MODEL, *options, "--server", "127.0.0.1:1")
+        status, _, err = run("bench", MODEL, *options, "--server", "127.0.0.1:1")
         assert status == 2
         assert "--max-nodes must be at most" in err
 
-    def test_errors_by_reason(self, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_errors_by_reason(self, run: Run) -> None:
         refusal = Refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, "busy", "SERVER_BUSY", 1.0)
         with scripted(Check=[[pb.CheckResponse()], [refusal]]) as (address, _):
-            status, out, _ = run(capfd, "bench", MODEL, "-n", "10", "--json", "--server", address)
+            status, out, _ = run("bench", MODEL, "-n", "10", "--json", "--server", address)
         assert status == 3
         assert (json.loads(out)["calls"], json.loads(out)["errors"]) == (1, {"SERVER_BUSY": 9})
 
     @pytest.mark.parametrize("json_flag", [[], ["--json"]])
-    def test_interrupted_it_tells_what_it_has_measured(self, json_flag: Any) -> None:
+    def test_interrupted_it_reports_what_it_has_measured(self, json_flag: Any) -> None:
         begun, ended = threading.Event(), threading.Event()
 
         def stuck(context: Any) -> None:
@@ -516,8 +511,8 @@ class TestBench:
             status, output, error = interrupted(words, begun)
         assert (status, error) == (130, "robosc-client: interrupted\n")
         if json_flag:
-            told = json.loads(output)
-            assert (told["calls"], told["errors"], told["interrupted"]) == (2, {"SERVER_BUSY": 1}, True)
+            report = json.loads(output)
+            assert (report["calls"], report["errors"], report["interrupted"]) == (2, {"SERVER_BUSY": 1}, True)
         else:
             assert output.startswith("2 calls in ") and "errors: 1 SERVER_BUSY" in output
 
@@ -547,8 +542,6 @@ class TestBench:
         )
         assert Measured(1.0, tuple(sorted(times)), 0, {}).percentile_s(percent) == wanted
 
-    def test_wrong_use(self, capfd: pytest.CaptureFixture[str]) -> None:
+    def test_wrong_use(self, run: Run) -> None:
         for options in (["-c", "0"], ["-n", "0"], ["-n", "1", "-d", "1"], ["-d", "0"], ["--task", "fly"]):
-            with pytest.raises(SystemExit) as left:
-                main(["bench", MODEL, "--server", "127.0.0.1:1", *options])
-            assert left.value.code == 2
+            assert run("bench", MODEL, "--server", "127.0.0.1:1", *options)[0] == 2

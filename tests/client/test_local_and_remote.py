@@ -44,8 +44,8 @@ def require_alike(local: Any, remote: Any, *, is_made: bool) -> None:
     """The parts that every result has."""
     assert local.status is remote.status
     assert (local.reason, tuple(local.diagnostics)) == (remote.reason, tuple(remote.diagnostics))
-    told = None if isinstance(local.explanation, robosc.NoSupervisor) else local.explanation
-    assert told == remote.explanation
+    explanation = None if isinstance(local.explanation, robosc.NoSupervisor) else local.explanation
+    assert explanation == remote.explanation
     assert is_made == (local.status is robosc.SynthesisStatus.SUPERVISOR)
     for result in (local, remote):
         assert "\n" not in repr(result)

@@ -16,7 +16,7 @@ from robosc_client.commands.connection import target_of
 from robosc_client.main import make_parser
 from robosc_client.profiles import Profile, add_profile, profiles_file, read_profiles
 from support.certificates import Authority
-from support.client_commands import run
+from support.client_commands import Run
 from support.scripted_service import scripted
 from support.waiting import PATIENCE_S
 
@@ -35,50 +35,46 @@ def target(*arguments: str) -> Any:
     return target_of(make_parser().parse_args(["version", *arguments]))
 
 
-def test_added_listed_shown_removed(capfd: pytest.CaptureFixture[str], tmp_path: Path, folder: Path) -> None:
+def test_added_listed_shown_removed(run: Run, tmp_path: Path, folder: Path) -> None:
     ca = Authority(tmp_path, "ca").file
-    assert run(capfd, "profile", "add", "lab", "--server", "lab.example:50051", "--ca", ca)[0] == 0
-    assert run(capfd, "profile", "add", "home", "--server", "[::1]:1", "--tls", "--json")[0] == 0
-    assert run(capfd, "profile", "list") == (0, f"* {'lab':20} lab.example:50051\n  {'home':20} [::1]:1\n", "")
-    status, out, _ = run(capfd, "profile", "list", "--json")
+    assert run("profile", "add", "lab", "--server", "lab.example:50051", "--ca", ca)[0] == 0
+    assert run("profile", "add", "home", "--server", "[::1]:1", "--tls", "--json")[0] == 0
+    assert run("profile", "list") == (0, f"* {'lab':20} lab.example:50051\n  {'home':20} [::1]:1\n", "")
+    status, out, _ = run("profile", "list", "--json")
     assert (status, json.loads(out)["default"], list(json.loads(out)["profiles"])) == (0, "lab", ["lab", "home"])
-    assert json.loads(run(capfd, "profile", "show", "lab", "--json")[1]) == {
+    assert json.loads(run("profile", "show", "lab", "--json")[1]) == {
         "name": "lab", "default": True, "server": "lab.example:50051", "ca": str(ca)
     }  # fmt: skip
-    assert "server       [::1]:1\n" in run(capfd, "profile", "show", "home")[1]
-    assert run(capfd, "profile", "add", "lab", "--server", "lab:1")[0] == 2
-    assert run(capfd, "profile", "add", "home", "--server", "lab:2", "--force", "--default")[0] == 0
+    assert "server       [::1]:1\n" in run("profile", "show", "home")[1]
+    assert run("profile", "add", "lab", "--server", "lab:1")[0] == 2
+    assert run("profile", "add", "home", "--server", "lab:2", "--force", "--default")[0] == 0
     assert read_profiles().default == "home"
-    assert run(capfd, "profile", "remove", "home")[0] == 0
+    assert run("profile", "remove", "home")[0] == 0
     assert (read_profiles().default, list(read_profiles().by_name)) == (None, ["lab"])
-    assert run(capfd, "profile", "remove", "home")[0] == 2
-    assert run(capfd, "profile", "show", "home")[0] == 2
+    assert run("profile", "remove", "home")[0] == 2
+    assert run("profile", "show", "home")[0] == 2
     assert profiles_file() == folder / "client.toml"
     assert profiles_file().stat().st_mode & 0o777 == 0o600
 
 
-def test_a_token_is_kept_for_its_owner_alone(
-    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, folder: Path
-) -> None:
+def test_a_token_is_kept_for_its_owner_alone(run: Run, monkeypatch: pytest.MonkeyPatch, folder: Path) -> None:
     monkeypatch.setattr(sys, "stdin", io.StringIO("secret-token\n"))
-    status, out, err = run(capfd, "profile", "add", "lab", "--server", "127.0.0.1:1", "--token")
+    status, out, err = run("profile", "add", "lab", "--server", "127.0.0.1:1", "--token")
     assert status == 0
     assert "secret" not in out + err
     file = folder / "tokens" / "lab"
     assert (file.read_text(), file.stat().st_mode & 0o777) == ("secret-token\n", 0o600)
     assert file.parent.stat().st_mode & 0o777 == 0o700
     assert target()[1].token_file == file
-    assert run(capfd, "profile", "remove", "lab")[0] == 0
+    assert run("profile", "remove", "lab")[0] == 0
     assert not file.exists()
     for text in ("", "two words", "x" * 5000, "é"):
         monkeypatch.setattr(sys, "stdin", io.StringIO(text))
-        assert run(capfd, "profile", "add", "lab", "--server", "127.0.0.1:1", "--token")[0] == 2
+        assert run("profile", "add", "lab", "--server", "127.0.0.1:1", "--token")[0] == 2
     assert not read_profiles().by_name
 
 
-def test_what_could_never_be_used(
-    capfd: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, folder: Path
-) -> None:
+def test_what_could_never_be_used(run: Run, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, folder: Path) -> None:
     """Is refused when it is kept, not when it is needed; no token is asked for before that."""
     none, token = tmp_path / "none", tmp_path / "token"
     token.write_text("secret")
@@ -93,19 +89,19 @@ def test_what_could_never_be_used(
         (["--token-file", token], "only with TLS"),
         (["--token"], "only with TLS"),
     ):
-        status, out, err = run(capfd, "profile", "add", "lab", "--server", "lab.example:1", *options)
+        status, out, err = run("profile", "add", "lab", "--server", "lab.example:1", *options)
         assert (status, out) == (2, ""), options
         assert words in err
         assert err.count("\n") == 1
     assert list(folder.rglob("*")) == []
-    assert run(capfd, "profile", "add", "lab", "--server", "lab.example:1", "--tls", "--token")[0] == 0
-    assert run(capfd, "profile", "add", "here", "--server", "[::1]:1", "--token-file", token)[0] == 0
+    assert run("profile", "add", "lab", "--server", "lab.example:1", "--tls", "--token")[0] == 0
+    assert run("profile", "add", "here", "--server", "[::1]:1", "--token-file", token)[0] == 0
 
 
-def test_comments_stay(capfd: pytest.CaptureFixture[str]) -> None:
+def test_comments_stay(run: Run) -> None:
     profiles_file().parent.mkdir(parents=True)
     profiles_file().write_text('# mine\n[profiles.lab]  # in the cellar\nserver = "lab:1"\n', encoding="utf-8")
-    assert run(capfd, "profile", "add", "home", "--server", "home:1")[0] == 0
+    assert run("profile", "add", "home", "--server", "home:1")[0] == 0
     text = profiles_file().read_text(encoding="utf-8")
     assert "# mine" in text
     assert "# in the cellar" in text
@@ -122,55 +118,53 @@ def test_comments_stay(capfd: pytest.CaptureFixture[str]) -> None:
         "default = " + "9" * 5000, "[profiles.lab]\nserver = 'x:1'\nca = '~nobody-of-that-name/x'",
     ],
 )  # fmt: skip
-def test_odd_files(capfd: pytest.CaptureFixture[str], text: str) -> None:
+def test_odd_files(run: Run, text: str) -> None:
     profiles_file().parent.mkdir(parents=True)
     profiles_file().write_bytes(text.encode("utf-8", "surrogateescape"))
     for command in (["profile", "list"], ["version"], ["profile", "add", "x", "--server", "x:1"]):
-        status, out, err = run(capfd, *command)
+        status, out, err = run(*command)
         assert (status, out) == (2, "")
         assert str(profiles_file()) in err
         assert err.count("\n") == 1
 
 
-def test_which_server_is_asked(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
-    status, _, err = run(capfd, "version")
+def test_which_server_is_asked(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
+    status, _, err = run("version")
     assert status == 2
     assert "no server is given" in err
     for name in ("a", "b", "c"):
-        assert run(capfd, "profile", "add", name, "--server", f"{name}:1")[0] == 0
+        assert run("profile", "add", name, "--server", f"{name}:1")[0] == 0
     assert target()[0] == "a:1"
     monkeypatch.setenv("ROBOSC_PROFILE", "b")
     assert target()[0] == "b:1"
     assert target("--profile", "c")[0] == "c:1"
     assert target("--server", "d:1")[0] == "d:1"
-    assert run(capfd, "version", "--profile", "none")[0] == 2
+    assert run("version", "--profile", "none")[0] == 2
 
 
-def test_whom_a_token_is_sent_to(
-    monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str], tmp_path: Path
-) -> None:
+def test_whom_a_token_is_sent_to(monkeypatch: pytest.MonkeyPatch, run: Run, tmp_path: Path) -> None:
     """The environment's is for a server that is named; a profile has its own, or none."""
     environment, own, given = (tmp_path / name for name in ("environment", "own", "given"))
     own.write_text("secret")
     own.chmod(0o600)
     monkeypatch.setenv("ROBOSC_TOKEN_FILE", str(environment))
     monkeypatch.setenv("ROBOSC_CA", str(environment))
-    assert run(capfd, "profile", "add", "own", "--server", "127.0.0.2:1", "--token-file", own)[0] == 0
-    assert run(capfd, "profile", "add", "none", "--server", "b:1", "--tls")[0] == 0
+    assert run("profile", "add", "own", "--server", "127.0.0.2:1", "--token-file", own)[0] == 0
+    assert run("profile", "add", "none", "--server", "b:1", "--tls")[0] == 0
     assert target("--server", "c:1") == ("c:1", Credentials(ca=environment, token_file=environment))
     assert target("--profile", "own") == ("127.0.0.2:1", Credentials(token_file=own))
     assert target("--profile", "none") == ("b:1", Credentials(is_secure=True))
     assert target("--profile", "own", "--token-file", str(given)) == ("127.0.0.2:1", Credentials(token_file=given))
 
 
-def test_an_address_without_a_port_has_the_default_one(capfd: pytest.CaptureFixture[str]) -> None:
+def test_an_address_without_a_port_has_the_default_one(run: Run) -> None:
     assert target("--server", "localhost") == ("localhost:50051", Credentials())
-    assert run(capfd, "profile", "add", "added", "--server", "[::1]")[0] == 0
+    assert run("profile", "add", "added", "--server", "[::1]")[0] == 0
     assert target("--profile", "added")[0] == "[::1]:50051"
     profiles_file().write_text("[profiles.written]\nserver = 'lab.example'\n", encoding="utf-8")
     assert target("--profile", "written")[0] == "lab.example:50051"
     profiles_file().write_text("[profiles.wrong]\nserver = 'lab:'\n", encoding="utf-8")
-    status, _, err = run(capfd, "version", "--profile", "wrong")
+    status, _, err = run("version", "--profile", "wrong")
     assert status == 2
     assert "profile 'wrong': 'server' must be HOST or HOST:PORT" in err
 
@@ -181,27 +175,27 @@ def test_what_a_profile_says_is_relative_to_its_file() -> None:
     assert target("--profile", "lab")[1].ca == profiles_file().parent / "ca.pem"
 
 
-def test_without_a_home(monkeypatch: pytest.MonkeyPatch, capfd: pytest.CaptureFixture[str]) -> None:
+def test_without_a_home(monkeypatch: pytest.MonkeyPatch, run: Run) -> None:
     monkeypatch.setenv("XDG_CONFIG_HOME", "relative")
     monkeypatch.setattr(Path, "home", lambda: (_ for _ in ()).throw(RuntimeError))
-    assert run(capfd, "version")[0] == 2
+    assert run("version")[0] == 2
     with scripted(GetVersion=[[pb.GetVersionResponse(version="1")]]) as (address, _):
-        assert run(capfd, "version", "--server", address)[0] == 0
+        assert run("version", "--server", address)[0] == 0
 
 
-def test_a_folder_that_cannot_be_written(capfd: pytest.CaptureFixture[str], folder: Path) -> None:
+def test_a_folder_that_cannot_be_written(run: Run, folder: Path) -> None:
     folder.parent.mkdir(parents=True)
     folder.write_text("a file")
-    status, _, err = run(capfd, "profile", "add", "lab", "--server", "x:1")
+    status, _, err = run("profile", "add", "lab", "--server", "x:1")
     assert status == 2
     assert "Not a directory" in err
 
 
-def test_a_path_that_is_no_unicode(capfd: pytest.CaptureFixture[str], folder: Path, tmp_path: Path) -> None:
+def test_a_path_that_is_no_unicode(run: Run, folder: Path, tmp_path: Path) -> None:
     """Cannot stand in the file; nothing is written, and nothing is left."""
     ca = tmp_path / "\udcff.pem"
     Authority(tmp_path).file.rename(ca)
-    status, _, err = run(capfd, "profile", "add", "lab", "--server", "lab:1", "--ca", ca)
+    status, _, err = run("profile", "add", "lab", "--server", "lab:1", "--ca", ca)
     assert status == 2
     assert "not UTF-8" in err
     assert list(folder.rglob("*")) == []

@@ -31,16 +31,16 @@ def bars(monkeypatch: pytest.MonkeyPatch) -> list[Any]:
 
 def test_the_bar_goes_on_with_the_stages(bars: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("sys.stderr", Terminal())
-    told: list[tuple[float, float | None]] = []
+    seen: list[tuple[float, float | None]] = []
     with ProgressLine() as line:
         (task,) = bars[0].tasks
         # Nothing is known yet.
         assert task.total is None
         for stage in ("check", "synthesis", "synthesis", "verification", "controller", "generation"):
             line.report(Progress(stage, "[bold]words"))
-            told.append((task.completed, task.total))
+            seen.append((task.completed, task.total))
             assert task.description == f"{stage}: [bold]words"
-    assert told == [(0, 4), (1, 4), (1, 4), (2, 4), (3, 4), (4, 4)]
+    assert seen == [(0, 4), (1, 4), (1, 4), (2, 4), (3, 4), (4, 4)]
 
 
 def test_what_has_no_known_stages_moves_to_and_fro(bars: list[Any], monkeypatch: pytest.MonkeyPatch) -> None:

@@ -61,10 +61,10 @@ class TestSynthesis:
         assert (found.status, found.supervisor, found.signature) == (SynthesisStatus.SUPERVISOR, b"x", b"signed")
 
     def test_progress_is_harmless_on_a_terminal(self) -> None:
-        told = SynthesisReader().take(progress(stage="\x1b]0;title\x07" + "x" * 2000))
-        assert told is not None
-        assert told.stage.isprintable()
-        assert len(told.stage) < 1100
+        report = SynthesisReader().take(progress(stage="\x1b]0;title\x07" + "x" * 2000))
+        assert report is not None
+        assert report.stage.isprintable()
+        assert len(report.stage) < 1100
 
     @pytest.mark.parametrize(
         ("messages", "words"),

@@ -121,10 +121,10 @@ def test_a_watch_has_all_attempts_again_after_each_message() -> None:
 
 def test_why_nobody_answers() -> None:
     """gRPC's own reason, on one line that no terminal obeys."""
-    for told, words in (("", ""), ("connection refused", ": connection refused")):
+    for detail, words in (("", ""), ("connection refused", ": connection refused")):
         with pytest.raises(ServerUnavailableError) as caught:
             Attempts(NO_RETRIES, "there:1", None).delay_after(
-                Failure(grpc.StatusCode.UNAVAILABLE, told), has_answered=False
+                Failure(grpc.StatusCode.UNAVAILABLE, detail), has_answered=False
             )
         assert str(caught.value) == f"no server answers at there:1{words}"
     assert first_line("\n first \x1b[2J\x07\nsecond") == "first \\x1b[2J\\x07"

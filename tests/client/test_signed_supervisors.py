@@ -15,9 +15,8 @@ from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.commands import supervisor_file
 from robosc_client.commands.supervisor_file import write_supervisor
-from robosc_client.main import main
 from support.answers import enveloped, exploration, generation, job, supervisor, synthesis, verification
-from support.client_commands import MADE, MODEL, SUCCEEDED, encoded_supervisor, job_answers, run
+from support.client_commands import MADE, MODEL, SUCCEEDED, Run, encoded_supervisor, job_answers
 from support.scripted_service import scripted
 
 
@@ -32,7 +31,7 @@ class TestSignatures:
         return content, sign(content, read_private_key(tmp_path / "right.key"))
 
     @pytest.mark.parametrize("command", ["synth", "get"])
-    def test_checked_and_kept(self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any, command: str) -> None:
+    def test_checked_and_kept(self, run: Run, tmp_path: Path, made: Any, command: str) -> None:
         content, signature = made
         place = tmp_path / "there.rsup"
         beside = tmp_path / "there.rsup.sig"
@@ -45,7 +44,7 @@ class TestSignatures:
                 "GetJobResult": [enveloped("synthesize", [answer])],
             }
             with scripted(**answers) as (address, _):
-                return run(capfd, *what, "-o", place, "--server", address, *more)
+                return run(*what, "-o", place, "--server", address, *more)
 
         trusted = ["--signed-by", tmp_path / "right.pub"]
         assert asked(supervisor(content, signature=signature), *trusted)[0] == 0
@@ -74,12 +73,7 @@ class TestSignatures:
     @pytest.mark.parametrize("signature", [b"", b"by the server"])
     @pytest.mark.parametrize("command", [["synth", MODEL], ["get", "job-1"]])
     def test_what_cannot_be_written(
-        self,
-        capfd: pytest.CaptureFixture[str],
-        tmp_path: Path,
-        monkeypatch: pytest.MonkeyPatch,
-        command: Any,
-        signature: bytes,
+        self, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, command: Any, signature: bytes
     ) -> None:
         """Leaves the supervisor that was there, and its signature."""
         place, beside = tmp_path / "there.rsup", tmp_path / "there.rsup.sig"
@@ -93,7 +87,7 @@ class TestSignatures:
         answer = supervisor(encoded_supervisor("line_follower"), signature=signature)
         answers = {**job_answers("synthesize", [answer]), "Synthesize": [[answer]]}
         with scripted(**answers) as (address, _):
-            status, out, err = run(capfd, *command, "-o", place, "--server", address)
+            status, out, err = run(*command, "-o", place, "--server", address)
         assert (status, out) == (2, "")
         assert err == f"robosc-client: cannot write {place}: No space left on device\n"
         assert (place.read_bytes(), beside.read_bytes()) == (b"old", b"its signature")
@@ -129,44 +123,43 @@ class TestSignatures:
         os.close(reader)
         assert [item.name for item in tmp_path.iterdir()] == ["pipe"]
 
-    def test_no_name_of_a_file(self, capfd: pytest.CaptureFixture[str]) -> None:
-        assert run(capfd, "synth", MODEL, "-o", ".", "--server", "127.0.0.1:1") == (
+    def test_no_name_of_a_file(self, run: Run) -> None:
+        assert run("synth", MODEL, "-o", ".", "--server", "127.0.0.1:1") == (
             2, "", "robosc-client: -o needs a file path\n"
         )  # fmt: skip
 
-    def test_no_name_for_what_a_job_has_found(
-        self, capfd: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_no_name_for_what_a_job_has_found(self, run: Run, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         for command in (["get", "job-1"], ["synth", MODEL]):
-            with pytest.raises(SystemExit) as left:
-                main([*command, "-o", "", "--server", "127.0.0.1:1"])
-            assert left.value.code == 2
-            assert "the name of a file or folder is empty" in capfd.readouterr().err
+            status, _, err = run(*command, "-o", "", "--server", "127.0.0.1:1")
+            assert status == 2
+            assert "the name of a file or folder is empty" in err
         monkeypatch.chdir(tmp_path)
         with scripted(**job_answers("synthesize", [MADE])) as (address, _):
-            status, _, err = run(capfd, "get", "job-1", "-o", ".", "--server", address)
+            status, _, err = run("get", "job-1", "-o", ".", "--server", address)
         assert (status, err) == (2, "robosc-client: cannot write .: Is a directory\n")
         assert list(tmp_path.iterdir()) == []
 
     @pytest.mark.parametrize("command", [["synth", MODEL], ["get", "job-1", "--result"]])
-    def test_what_is_no_key(self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any, command: Any) -> None:
-        """Is wrong use, and told before a server is asked."""
+    def test_what_is_no_key(
+        self, capfd: pytest.CaptureFixture[str], run: Run, tmp_path: Path, made: Any, command: Any
+    ) -> None:
+        """Is wrong use, and reported before a server is asked."""
         (tmp_path / "none.pub").write_text("no key\n")
         (tmp_path / "empty.pub").write_text("")
         capfd.readouterr()
         for name in ("none.pub", "empty.pub", "absent.pub", "right.key", "."):
             keys = ["--signed-by", tmp_path / "right.pub", "--signed-by", tmp_path / name]
-            status, out, err = run(capfd, *command, *keys, "--server", "127.0.0.1:1")
+            status, out, err = run(*command, *keys, "--server", "127.0.0.1:1")
             assert (status, out) == (2, "")
             assert str(tmp_path / name) in err
             assert err.count("\n") == 1
 
-    def test_no_supervisor_to_be_signed(self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any) -> None:
+    def test_no_supervisor_to_be_signed(self, run: Run, tmp_path: Path, made: Any) -> None:
         """Is about the model: nothing that anybody could have signed is taken."""
         answer = synthesis(reason="no supervisor exists")
         with scripted(Synthesize=[[answer]]) as (address, _):
             options = ["-o", tmp_path / "there.rsup", "--signed-by", tmp_path / "right.pub", "--server", address]
-            assert run(capfd, "synth", MODEL, *options)[0] == 1
+            assert run("synth", MODEL, *options)[0] == 1
         assert not (tmp_path / "there.rsup").exists()
 
     @pytest.mark.parametrize(
@@ -177,7 +170,7 @@ class TestSignatures:
         ],
     )
     def test_a_supervisor_that_was_not_asked_for(
-        self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any, made_of: str, options: Any
+        self, run: Run, tmp_path: Path, made: Any, made_of: str, options: Any
     ) -> None:
         """Is refused although its signature is right, and without one, too."""
         content = encoded_supervisor(made_of)
@@ -185,12 +178,12 @@ class TestSignatures:
         place = tmp_path / "there.rsup"
         with scripted(Synthesize=[[answer]]) as (address, _):
             for trusted in ([], ["--signed-by", tmp_path / "right.pub"]):
-                status, _, err = run(capfd, "synth", MODEL, *options, "-o", place, "--server", address, *trusted)
+                status, _, err = run("synth", MODEL, *options, "-o", place, "--server", address, *trusted)
                 assert status == 3
                 assert "is refused: it was made" in err
                 assert list(tmp_path.glob("there*")) == []
 
-    def test_a_job_s_supervisor(self, capfd: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    def test_a_job_s_supervisor(self, run: Run, tmp_path: Path) -> None:
         """Must be one, and of the deployment that is named."""
         place = tmp_path / "there.rsup"
         for answer, options, status in (
@@ -200,9 +193,9 @@ class TestSignatures:
         ):
             place.unlink(missing_ok=True)
             with scripted(**job_answers("synthesize", [answer])) as (address, _):
-                assert run(capfd, "get", "job-1", "-o", place, *options, "--server", address)[0] == status
+                assert run("get", "job-1", "-o", place, *options, "--server", address)[0] == status
             assert place.exists() == (status == 0)
-        assert run(capfd, "get", "job-1", "--deployment", "layer", "--server", "127.0.0.1:1")[0] == 2
+        assert run("get", "job-1", "--deployment", "layer", "--server", "127.0.0.1:1")[0] == 2
 
     @pytest.mark.parametrize(
         ("kind", "messages"),
@@ -215,19 +208,17 @@ class TestSignatures:
             ("format", [pb.FormatResponse(text="robot R { }\n")]),
         ],
     )
-    def test_what_nobody_can_have_signed(
-        self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any, kind: str, messages: Any
-    ) -> None:
+    def test_what_nobody_can_have_signed(self, run: Run, tmp_path: Path, made: Any, kind: str, messages: Any) -> None:
         trusted = ["--signed-by", tmp_path / "right.pub"]
         with scripted(**job_answers(kind, messages)) as (address, _):
             for more in (["-o", tmp_path / "out"], ["--result"], ["--result", "--json"]):
-                status, _, err = run(capfd, "get", "job-1", *more, *trusted, "--server", address)
+                status, _, err = run("get", "job-1", *more, *trusted, "--server", address)
                 assert status == 3
                 assert "no supervisor" in err
-            assert run(capfd, "get", "job-1", *trusted, "--server", address)[0] == 2
+            assert run("get", "job-1", *trusted, "--server", address)[0] == 2
         assert not (tmp_path / "out").exists()
 
-    def test_results_that_are_printed(self, capfd: pytest.CaptureFixture[str], tmp_path: Path, made: Any) -> None:
+    def test_results_that_are_printed(self, run: Run, tmp_path: Path, made: Any) -> None:
         content, signature = made
         unknown = b"{}"
         signed = sign(unknown, read_private_key(tmp_path / "right.key"))
@@ -238,4 +229,4 @@ class TestSignatures:
         ):
             with scripted(**job_answers("synthesize", [answer])) as (address, _):
                 options = ["--result", "--signed-by", tmp_path / "right.pub", "--server", address]
-                assert run(capfd, "get", "job-1", *options)[0] == status
+                assert run("get", "job-1", *options)[0] == status

@@ -9,11 +9,10 @@ import threading
 from typing import Any
 
 import grpc
-import pytest
 
 from robosc_api.v1 import jobs_pb2
 from support.answers import job, load
-from support.client_commands import interrupted, run
+from support.client_commands import Run, interrupted
 from support.scripted_service import Refusal, scripted
 from support.waiting import PATIENCE_S, wait_until
 
@@ -56,9 +55,9 @@ LISTED = [
 ]
 
 
-def test_one_look_as_text(capfd: pytest.CaptureFixture[str]) -> None:
+def test_one_look_as_text(run: Run) -> None:
     with scripted(GetLoad=[[LOAD]], ListJobs=LISTED) as (address, script):
-        status, out, err = run(capfd, "top", "--once", "--server", address)
+        status, out, err = run("top", "--once", "--server", address)
     assert (status, err) == (0, "")
     head, blank, columns, ann, bob, _, names, *jobs = out.splitlines()
     assert head == "22:15:00 UTC  servers 3  workers 4, busy 1  waiting 2  ended in the last minute 12"
@@ -78,9 +77,9 @@ def test_one_look_as_text(capfd: pytest.CaptureFixture[str]) -> None:
     assert not script.of("GetLoad")[0].all_callers
 
 
-def test_one_look_as_json_of_all_callers(capfd: pytest.CaptureFixture[str]) -> None:
+def test_one_look_as_json_of_all_callers(run: Run) -> None:
     with scripted(GetLoad=[[LOAD]], ListJobs=LISTED) as (address, script):
-        status, out, _ = run(capfd, "top", "--once", "--json", "--all", "--most", "1", "--server", address)
+        status, out, _ = run("top", "--once", "--json", "--all", "--most", "1", "--server", address)
     assert (status, out.count("\n")) == (0, 1)
     found = json.loads(out)
     assert (found["workers"], found["running_tasks"], found["waiting_tasks"], found["servers"]) == (4, 1, 2, 3)
@@ -103,18 +102,18 @@ def test_one_look_as_json_of_all_callers(capfd: pytest.CaptureFixture[str]) -> N
     assert script.of("GetLoad")[0].all_callers
 
 
-def test_a_caller_who_is_no_admin_is_refused_all(capfd: pytest.CaptureFixture[str]) -> None:
+def test_a_caller_who_is_no_admin_is_refused_all(run: Run) -> None:
     refusal = Refusal(grpc.StatusCode.PERMISSION_DENIED, "needs a token with the scope 'admin'", "PERMISSION_DENIED")
     with scripted(GetLoad=[[refusal]], ListJobs=LISTED) as (address, script):
-        status, out, err = run(capfd, "top", "--once", "--all", "--server", address)
+        status, out, err = run("top", "--once", "--all", "--server", address)
     assert (status, out) == (3, "")
     assert "the scope 'admin'" in err
     assert not script.of("ListJobs")
 
 
-def test_an_earlier_server_has_no_load(capfd: pytest.CaptureFixture[str]) -> None:
+def test_an_earlier_server_has_no_load(run: Run) -> None:
     with scripted(GetLoad=[[Refusal(grpc.StatusCode.UNIMPLEMENTED)]]) as (address, _):
-        status, out, err = run(capfd, "top", "--once", "--server", address)
+        status, out, err = run("top", "--once", "--server", address)
     assert (status, out) == (3, "")
     assert "is not a RoboSC server of this version" in err
 

@@ -61,9 +61,9 @@ def test_what_names_its_thing_first_passes(tmp_path: Path) -> None:
 def test_an_opening_without_subject_is_found_in_its_line(
     plain: str, riddle: str, line: int, word: str, tmp_path: Path
 ) -> None:
-    status, told = checked(tmp_path, GOOD.replace(plain, riddle))
+    status, findings = checked(tmp_path, GOOD.replace(plain, riddle))
     assert status == 1
-    assert [entry.startswith(f"part/jobs.py:{line}: begins with '{word}':") for entry in told] == [True]
+    assert [entry.startswith(f"part/jobs.py:{line}: begins with '{word}':") for entry in findings] == [True]
 
 
 def test_a_folder_that_is_not_there_is_wrong_use(tmp_path: Path) -> None:

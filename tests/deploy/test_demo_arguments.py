@@ -1,4 +1,4 @@
-"""Wrong use of the demonstration is told at once, before anything is started."""
+"""Wrong use of the demonstration is reported at once, before anything is started."""
 
 import subprocess
 import sys
@@ -40,5 +40,5 @@ def test_what_cannot_be_is_one_clear_error(option: str, value: str, status: int,
     )
     assert result.returncode == status
     assert result.stderr.splitlines()[-1].startswith(message)
-    # A speed is looked at only when the scene has been read, which is told.
+    # A speed is looked at only when the scene has been read, which is printed.
     assert option == "--speed" or result.stdout == ""

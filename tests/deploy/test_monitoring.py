@@ -32,7 +32,7 @@ def dashboard() -> dict[str, Any]:
 
 
 def _samples() -> set[str]:
-    """Names of all samples that a server tells, also of what has not happened yet."""
+    """Names of all samples that a server exports, also of what has not happened yet."""
     found = set()
     for line in Metrics("").text().decode().splitlines():
         if line.startswith("# TYPE "):
@@ -56,19 +56,19 @@ def test_the_names_in_a_query_are_found() -> None:
     assert _names(query) == {"a_bucket", "b_total"}
 
 
-def test_what_is_drawn_is_told(dashboard: dict[str, Any]) -> None:
+def test_what_is_drawn_is_measured(dashboard: dict[str, Any]) -> None:
     expressions = _expressions(dashboard)
     (instance,) = [item for item in dashboard["templating"]["list"] if item["name"] == "instance"]
     for expression in [*expressions, instance["query"]["query"].replace(", instance", "")]:
         assert _names(expression) and _names(expression) <= _samples(), expression
-    # And all of ours that is told is drawn.
+    # And all of ours that is exported is drawn.
     ours = {name.removesuffix("_bucket") for name in _samples() if name.startswith("robosc_server_")}
     ours -= {name for name in ours if name.endswith(("_sum", "_count", "_created"))}
     drawn = {name.removesuffix("_bucket") for expression in expressions for name in _names(expression)}
     assert ours - drawn == {"robosc_server_info"}
 
 
-def test_what_is_watched_is_told() -> None:
+def test_what_is_watched_is_measured() -> None:
     for group in yaml.safe_load(ALERTS.read_text())["groups"]:
         for rule in group["rules"]:
             assert _names(rule["expr"]) and _names(rule["expr"]) <= _samples(), rule["alert"]

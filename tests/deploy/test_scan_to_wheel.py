@@ -55,9 +55,9 @@ def test_the_page_shows_it() -> None:
 
 
 def test_times_are_those_of_the_code() -> None:
-    told = " ".join(hop.note + hop.time for hop in HOPS)
-    assert f"up to {Execution().period_s * 1000:g} ms" in told
-    assert f"each {EXCHANGE_S * 1000:g} ms" in told
+    text = " ".join(hop.note + hop.time for hop in HOPS)
+    assert f"up to {Execution().period_s * 1000:g} ms" in text
+    assert f"each {EXCHANGE_S * 1000:g} ms" in text
 
 
 def test_it_ends_where_the_measured_time_ends() -> None:

@@ -1,4 +1,4 @@
-"""The site of the documentation: it is built without a warning, loads nothing, and tells links that lead nowhere."""
+"""The site of the documentation: it is built without a warning, loads nothing, and reports links that lead nowhere."""
 
 import re
 from pathlib import Path

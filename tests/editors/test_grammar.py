@@ -83,14 +83,14 @@ def check_tokens(text: str, found: RobotScopes) -> None:
             assert never_closed is None or all(has(scopes, never_closed) for scopes in inside), word
             continue
         for scopes in inside:
-            told = (text[max(start - 80, 0) : behind], scopes)
-            assert not has(scopes, COMMENT), told
-            assert has(scopes, STRING) == (kind == Kind.STRING), told
-            assert has(scopes, NUMBER) == (kind == Kind.NUMBER), told
+            context = (text[max(start - 80, 0) : behind], scopes)
+            assert not has(scopes, COMMENT), context
+            assert has(scopes, STRING) == (kind == Kind.STRING), context
+            assert has(scopes, NUMBER) == (kind == Kind.NUMBER), context
             if kind == Kind.WORD:
-                assert has(scopes, WORD_OF_THE_LANGUAGE) and not has(scopes, NAME), told
+                assert has(scopes, WORD_OF_THE_LANGUAGE) and not has(scopes, NAME), context
             elif word.startswith("^") and kind == Kind.NAME:
-                assert has(scopes, NAME) and not has(scopes, WORD_OF_THE_LANGUAGE), told
+                assert has(scopes, NAME) and not has(scopes, WORD_OF_THE_LANGUAGE), context
 
 
 def check_names(text: str, found: RobotScopes) -> None:
@@ -116,13 +116,13 @@ def check_names(text: str, found: RobotScopes) -> None:
             continue
         place = places.location(start, start + 1)
         at, scopes = (place.line, place.column), found[start]
-        told = (text[max(start - 80, 0) : start], token, scopes)
+        context = (text[max(start - 80, 0) : start], token, scopes)
         if at in functions:
-            assert has(scopes, FUNCTION), told
+            assert has(scopes, FUNCTION), context
         elif at in names - words:
-            assert has(scopes, NAME) and not has(scopes, WORD_OF_THE_LANGUAGE), told
+            assert has(scopes, NAME) and not has(scopes, WORD_OF_THE_LANGUAGE), context
         else:
-            assert has(scopes, WORD_OF_THE_LANGUAGE) and not has(scopes, NAME), told
+            assert has(scopes, WORD_OF_THE_LANGUAGE) and not has(scopes, NAME), context
 
 
 def nodes(tree: object) -> Iterator[object]:

@@ -1,4 +1,4 @@
-"""The language server over real JSON-RPC: what it finds, tells, offers and changes."""
+"""The language server over real JSON-RPC: what it finds, shows, offers and changes."""
 
 import shutil
 from collections.abc import Iterator
@@ -150,7 +150,7 @@ def test_a_library_that_changes_on_disk_is_read_again(tmp_path: Path) -> None:
         assert editor.codes("walker.rscd", lambda codes: "unknown-name" not in codes) == []
 
 
-def test_related_places_are_told(editor: Editor) -> None:
+def test_related_places_are_sent(editor: Editor) -> None:
     editor.replace("walker.rscd", ROBOT.replace("marked state on_ {", "marked state off { } state on_ {"))
     found = next(item for item in editor.findings("walker.rscd", bool) if str(item.code).startswith("duplicate"))
     assert found.related_information is not None
@@ -167,14 +167,14 @@ def test_warnings_of_synthesis_follow_and_are_those_of_the_text(tmp_path: Path) 
         unused = next(item for item in found if item.code == "unused-requirement")
         assert unused.severity is lsp.DiagnosticSeverity.Warning
         assert unused.range.start.line == ROBOT[: ROBOT.index("requirement {")].count("\n")
-        # What is in the library is told there, too: here it has no line.
+        # What is in the library is reported there, too: here it has no line.
         assert any("parts.rscd:" in item.message for item in found if item.code == "never-enabled")
         editor.replace("walker.rscd", "robot Empty { }")
         codes = editor.codes("walker.rscd")
         assert "unused-requirement" not in codes and "never-enabled" not in codes
 
 
-def test_that_there_is_no_supervisor_is_told_at_the_robot(tmp_path: Path) -> None:
+def test_that_there_is_no_supervisor_is_reported_at_the_robot(tmp_path: Path) -> None:
     with Editor(tmp_path) as editor:
         editor.open("fall.rscd", FALL)
         found = editor.findings("fall.rscd", lambda found: any(item.code == "no-supervisor" for item in found))
@@ -194,7 +194,7 @@ def test_without_synthesis_there_are_the_findings_of_the_checks(tmp_path: Path) 
         assert lens.command.title == "synthesis is disabled"
 
 
-# What is told
+# Hover texts
 
 
 def hover(editor: Editor, name: str, words: str) -> str:
@@ -205,24 +205,24 @@ def hover(editor: Editor, name: str, words: str) -> str:
     return str(found.contents.value)
 
 
-def test_of_a_message_its_type_users_and_plant_are_told(editor: Editor) -> None:
-    told = hover(editor, "walker.rscd", "requirement wa|lk")
-    assert 'incoming message walk with identifier: "/cmd_vel"' in told
-    assert "used by requirement (line 17), provide (line 19)" in told
-    assert "plant `" in told and "`walk.request`" in told
+def test_hover_over_a_message_shows_its_type_users_and_plant(editor: Editor) -> None:
+    text = hover(editor, "walker.rscd", "requirement wa|lk")
+    assert 'incoming message walk with identifier: "/cmd_vel"' in text
+    assert "used by requirement (line 17), provide (line 19)" in text
+    assert "plant `" in text and "`walk.request`" in text
 
 
-def test_of_a_part_of_a_library_the_robots_are_told_that_use_it(editor: Editor) -> None:
+def test_hover_over_a_part_of_a_library_shows_the_robots_that_use_it(editor: Editor) -> None:
     assert "used by walker.rscd" in hover(editor, "parts.rscd", "state cal|m {")
     assert "used by walker.rscd" in hover(editor, "parts.rscd", "component Ba|se {")
 
 
-def test_of_a_component_its_plant_is_told(editor: Editor) -> None:
-    told = hover(editor, "walker.rscd", "Butto|n.off")
-    assert "2 states, 1 variable, 3 transitions" in told
+def test_hover_over_a_component_shows_its_plant(editor: Editor) -> None:
+    text = hover(editor, "walker.rscd", "Butto|n.off")
+    assert "2 states, 1 variable, 3 transitions" in text
 
 
-def test_what_the_supervisor_adds_is_told(tmp_path: Path) -> None:
+def test_what_the_supervisor_adds_is_reported(tmp_path: Path) -> None:
     with Editor(tmp_path) as editor:
         editor.open("trap.rscd", TRAP)
         editor.until(lambda: editor.lenses_refreshed > 0)
@@ -234,7 +234,7 @@ def test_what_the_supervisor_adds_is_told(tmp_path: Path) -> None:
         assert part_of(TRAP, lens.range) == "Trap"
 
 
-def test_of_words_and_comments_nothing_is_told(editor: Editor) -> None:
+def test_hover_over_words_and_comments_shows_nothing(editor: Editor) -> None:
     for words in ("it 🏃 wa|lks", "re|quirement walk", "|robot Walker"):
         place = editor.at("walker.rscd", words)
         parameters = lsp.HoverParams(place.text_document, place.position)
@@ -452,18 +452,18 @@ def test_semantic_tokens_cover_every_name(editor: Editor) -> None:
         editor.client.text_document_semantic_tokens_full_async(lsp.SemanticTokensParams(editor.document("walker.rscd")))
     )
     line = character = 0
-    told = []
+    tokens = []
     for index in range(0, len(found.data), 5):
         lines, characters, length, kind, modifiers = found.data[index : index + 5]
         line, character = line + lines, characters + (0 if lines else character)
         where = lsp.Range(lsp.Position(line, character), lsp.Position(line, character + length))
         names = [name for bit, name in enumerate(legend.token_modifiers) if modifiers >> bit & 1]
-        told.append((part_of(ROBOT, where), legend.token_types[kind], *names))
-    assert told[0] == ("Walker", "namespace", "declaration")
-    assert told[1:4] == [("Base", "class", "declaration"), ("parts", "namespace"), ("Base", "class")]
-    assert ("on_", "enumMember", "declaration") in told and ("on_", "enumMember") in told
-    assert ("most", "variable", "declaration", "readonly") in told and ("most", "variable", "readonly") in told
-    assert ("pressed", "event") in told and ("power", "function") in told and ("linear", "property") in told
+        tokens.append((part_of(ROBOT, where), legend.token_types[kind], *names))
+    assert tokens[0] == ("Walker", "namespace", "declaration")
+    assert tokens[1:4] == [("Base", "class", "declaration"), ("parts", "namespace"), ("Base", "class")]
+    assert ("on_", "enumMember", "declaration") in tokens and ("on_", "enumMember") in tokens
+    assert ("most", "variable", "declaration", "readonly") in tokens and ("most", "variable", "readonly") in tokens
+    assert ("pressed", "event") in tokens and ("power", "function") in tokens and ("linear", "property") in tokens
 
 
 def test_braces_and_comments_are_folded(editor: Editor) -> None:
@@ -472,8 +472,8 @@ def test_braces_and_comments_are_folded(editor: Editor) -> None:
     found = editor.run(
         editor.client.text_document_folding_range_async(lsp.FoldingRangeParams(editor.document("walker.rscd")))
     )
-    told = {(item.start_line, item.end_line, item.kind) for item in found}
-    assert told == {(0, 1, lsp.FoldingRangeKind.Comment), (2, 4, lsp.FoldingRangeKind.Region)}
+    ranges = {(item.start_line, item.end_line, item.kind) for item in found}
+    assert ranges == {(0, 1, lsp.FoldingRangeKind.Comment), (2, 4, lsp.FoldingRangeKind.Region)}
 
 
 def formatted(editor: Editor) -> list[lsp.TextEdit]:
@@ -492,18 +492,23 @@ def test_a_text_is_formatted_as_by_the_command(editor: Editor) -> None:
 
 
 def actions(editor: Editor, name: str, words: str, *kinds: str) -> list[lsp.CodeAction]:
-    """The fixes at the `|` of some words; of some kinds alone if these are told."""
+    """The fixes at the `|` of some words; of some kinds alone if these are given."""
     place = editor.at(name, words)
     where = lsp.Range(place.position, place.position)
     parameters = lsp.CodeActionParams(place.text_document, where, lsp.CodeActionContext([], only=list(kinds) or None))
     return list(editor.run(editor.client.text_document_code_action_async(parameters)))
 
 
-def test_a_name_that_is_nearly_right_is_fixed(editor: Editor) -> None:
-    editor.replace("walker.rscd", ROBOT.replace("Base.calm", "Base.clam"))
+@pytest.mark.parametrize(
+    ("right", "wrong", "title"),
+    [("Base.calm", "Base.cl|am", "Write 'calm'"), ("response from pressed", "response t|o pressed", "Write 'from'")],
+    ids=["name", "preposition"],
+)
+def test_a_word_that_is_nearly_right_is_fixed(editor: Editor, right: str, wrong: str, title: str) -> None:
+    editor.replace("walker.rscd", ROBOT.replace(right, wrong.replace("|", "")))
     editor.findings("walker.rscd", bool)
-    action, *_ = actions(editor, "walker.rscd", "Base.cl|am")
-    assert action.title == "Write 'calm'" and action.is_preferred and action.kind == lsp.CodeActionKind.QuickFix
+    action, *_ = actions(editor, "walker.rscd", wrong)
+    assert action.title == title and action.is_preferred and action.kind == lsp.CodeActionKind.QuickFix
     assert action.edit is not None and action.edit.changes is not None
     assert with_edits(editor.texts["walker.rscd"], action.edit.changes[editor.uri("walker.rscd")]) == ROBOT
     assert actions(editor, "walker.rscd", "provide wa|lk") == []
@@ -556,7 +561,7 @@ def test_what_takes_too_long_is_tried_when_it_is_chosen(tmp_path: Path, monkeypa
         assert editor.logged == [f"{second.title}: this does not fix the finding in the current text"]
 
 
-def test_an_editor_that_cannot_ask_later_is_told_what_was_not_tried(
+def test_an_editor_that_cannot_ask_later_receives_what_was_not_tried(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(server, "_FIX_TIME_S", -1.0)
@@ -564,8 +569,8 @@ def test_an_editor_that_cannot_ask_later_is_told_what_was_not_tried(
         editor.open("parts.rscd", LIBRARY)
         editor.open("walker.rscd", TWO_MISTAKES)
         assert len(everywhere(editor, "walker.rscd")) == 1
-        (told,) = editor.logged
-        assert told.startswith("1 finding of this range not tried for fixes")
+        (entry,) = editor.logged
+        assert entry.startswith("1 finding of this range not tried for fixes")
 
 
 def test_a_control_node_of_several_lines_is_written_as_states(editor: Editor) -> None:
@@ -610,14 +615,6 @@ def test_a_fix_that_brings_more_errors_is_not_offered(editor: Editor) -> None:
     editor.replace("double.rscd", editor.texts["double.rscd"].replace("Othr", "Lmp"))
     assert editor.codes("double.rscd", bool) == ["unknown-name"]
     assert actions(editor, "double.rscd", "import Lm|p") == []
-
-
-def test_a_wrong_preposition_is_fixed(editor: Editor) -> None:
-    editor.replace("walker.rscd", ROBOT.replace("response from pressed", "response to pressed"))
-    editor.findings("walker.rscd", bool)
-    (action,) = actions(editor, "walker.rscd", "response t|o pressed")
-    assert action.edit is not None and action.edit.changes is not None
-    assert with_edits(editor.texts["walker.rscd"], action.edit.changes[editor.uri("walker.rscd")]) == ROBOT
 
 
 # What is offered
@@ -864,8 +861,8 @@ def test_folders_that_are_worked_in_can_change(editor: Editor, tmp_path: Path) -
     folder = lsp.WorkspaceFolder(other.as_uri(), "other")
 
     def found() -> set[str]:
-        told = editor.run(editor.client.workspace_symbol_async(lsp.WorkspaceSymbolParams("Faraway")))
-        return {item.name for item in told}
+        symbols = editor.run(editor.client.workspace_symbol_async(lsp.WorkspaceSymbolParams("Faraway")))
+        return {item.name for item in symbols}
 
     for added, removed, names in (([folder], [], {"Faraway"}), ([], [folder], set())):
         event = lsp.WorkspaceFoldersChangeEvent(added, removed)

@@ -39,9 +39,9 @@ def message(**content: object) -> bytes:
     return b"Content-Length: %d\r\n\r\n" % len(body) + body
 
 
-def test_help_and_version_are_told() -> None:
-    told = run("--help")
-    assert told.returncode == 0 and b"--synthesis-seconds" in told.stdout
+def test_help_and_version_are_printed() -> None:
+    done = run("--help")
+    assert done.returncode == 0 and b"--synthesis-seconds" in done.stdout
     assert run("--version").stdout.decode().strip() == f"robosc-lsp {__version__}"
 
 
@@ -55,14 +55,14 @@ def test_help_and_version_are_told() -> None:
     ],
 )
 def test_wrong_arguments_are_one_error(arguments: tuple[str, ...], why: str) -> None:
-    told = run(*arguments)
-    assert told.returncode == 2 and not told.stdout
-    assert why in told.stderr.decode() and "Traceback" not in told.stderr.decode()
+    done = run(*arguments)
+    assert done.returncode == 2 and not done.stdout
+    assert why in done.stderr.decode() and "Traceback" not in done.stderr.decode()
 
 
-def test_whether_it_can_be_started_is_told() -> None:
-    told = run("--library-path", "/nowhere/at/all", "--check")
-    assert told.returncode == 0 and told.stdout.decode() == f"robosc-lsp {__version__} can be started\n"
+def test_whether_it_can_be_started_is_reported() -> None:
+    done = run("--library-path", "/nowhere/at/all", "--check")
+    assert done.returncode == 0 and done.stdout.decode() == f"robosc-lsp {__version__} can be started\n"
 
 
 def test_a_folder_that_is_not_there_holds_no_libraries(tmp_path: Path) -> None:
@@ -74,12 +74,12 @@ def test_a_folder_that_is_not_there_holds_no_libraries(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("arguments", "missing"), [((), "pygls"), (("--check",), "lsprotocol")])
-def test_without_its_libraries_it_tells_how_to_get_them(
+def test_without_its_libraries_it_says_how_to_get_them(
     tmp_path: Path, arguments: tuple[str, ...], missing: str
 ) -> None:
     (tmp_path / missing).mkdir()
     (tmp_path / missing / "__init__.py").write_text(f"raise ModuleNotFoundError(name={missing!r})")
-    told = subprocess.run(
+    done = subprocess.run(
         [*COMMAND, *arguments],
         env={**os.environ, "PYTHONPATH": str(tmp_path)},
         input=b"",
@@ -87,8 +87,8 @@ def test_without_its_libraries_it_tells_how_to_get_them(
         timeout=LIMIT_S,
         check=False,
     )
-    assert told.returncode == 1
-    assert told.stderr.decode() == "robosc-lsp: the language server needs pygls: pip install 'robosc[lsp]'\n"
+    assert done.returncode == 1
+    assert done.stderr.decode() == "robosc-lsp: the language server needs pygls: pip install 'robosc[lsp]'\n"
 
 
 def test_it_ends_when_its_input_does() -> None:
@@ -200,8 +200,8 @@ def test_a_synthesis_takes_no_more_memory_than_it_may(monkeypatch: pytest.Monkey
     request = SynthesisRequest(("small.rscd", bounded_products(4)), (), ())
     assert synthesizer.outcome(request).states
     monkeypatch.setattr(synthesizer, "_MOST_NODES", 10)
-    told = synthesizer.outcome(request)
-    assert "memory" in told.unknown and not told.reason and told.states is None
+    outcome = synthesizer.outcome(request)
+    assert "memory" in outcome.unknown and not outcome.reason and outcome.states is None
 
 
 def test_nothing_is_kept_of_edits(tmp_path: Path) -> None:

@@ -97,7 +97,7 @@ def test_a_scan_that_is_no_circle_does_not_join_its_ends() -> None:
         (Scan([1.0] * 4, 0.0, 1.0, 3.5, 0.1), True),
     ],
 )
-def test_a_scan_that_tells_nothing_is_blindness(scan: Scan, blind: bool) -> None:
+def test_a_scan_without_a_range_is_blindness(scan: Scan, blind: bool) -> None:
     assert is_blind(scan) is blind
 
 

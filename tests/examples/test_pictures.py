@@ -53,7 +53,7 @@ def test_each_pixel_is_read_where_it_stands(encoding: str, height: int, width: i
         ({"data": bytes(25)}, "25 bytes for 2 rows of 12 bytes"),
     ],
 )
-def test_what_is_no_picture_is_told(wrong: dict[str, Any], complaint: str) -> None:
+def test_what_is_no_picture_is_reported(wrong: dict[str, Any], complaint: str) -> None:
     sound = {"encoding": "rgb8", "height": 2, "width": 4, "step": 12, "data": bytes(24)}
     assert colour_picture(SimpleNamespace(**sound)).shape == (2, 4, 3)
     for read in (colour_picture, grey_picture):

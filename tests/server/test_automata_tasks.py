@@ -55,6 +55,13 @@ def answers(kind: TaskKind, message: Any) -> list[Any]:
     return [RESPONSES[kind].FromString(item) for item in found.messages]
 
 
+OPTIONS_OF_ROBOTS: dict[str, Any] = {
+    "deployment": pb.DEPLOYMENT_LAYER,
+    "allow_livelock": True,
+    "verified_states": 0,
+}
+
+
 class TestAcceptance:
     def test_the_same_text_in_two_languages_is_two_tasks(self) -> None:
         languages = (pb.LANGUAGE_UNSPECIFIED, pb.LANGUAGE_ROBOSC, pb.LANGUAGE_CIF)
@@ -93,22 +100,14 @@ class TestAcceptance:
     def test_no_file_has_a_place_on_a_machine(self, name: str) -> None:
         assert "must be relative" in refusal(TaskKind.CHECK, request(TaskKind.CHECK, cif(**{name: ""})))
 
-    @pytest.mark.parametrize("kind", MAKING)
-    @pytest.mark.parametrize(
-        ("name", "options"),
-        [
-            ("deployment", pb.SynthesisOptions(deployment=pb.DEPLOYMENT_LAYER)),
-            ("allow_livelock", pb.SynthesisOptions(allow_livelock=True)),
-            ("verified_states", pb.SynthesisOptions(verified_states=0)),
-        ],
-    )
-    def test_options_of_robots_are_refused(self, kind: TaskKind, name: str, options: pb.SynthesisOptions) -> None:
-        message = request(kind, cif(), options=options)
-        assert refusal(kind, message) == f"{name} applies to RoboSC models, and the request has automata"
-
     @pytest.mark.parametrize(
         ("kind", "name", "value"),
         [
+            *[
+                (kind, name, {"options": pb.SynthesisOptions(**{name: value})})
+                for kind in MAKING
+                for name, value in OPTIONS_OF_ROBOTS.items()
+            ],
             (TaskKind.GENERATE, "publish_state", {"generation": pb.GenerateOptions(publish_state=True)}),
             (TaskKind.GENERATE, "log_events", {"generation": pb.GenerateOptions(log_events=True)}),
             (TaskKind.GENERATE, "supervised", {"generation": pb.GenerateOptions(supervised=pb.SupervisedController())}),
@@ -212,7 +211,7 @@ class TestWork:
         assert (answer.result.status, answer.result.supervisor) == (pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL, b"")
         assert "more than the 1000 that a supervisor file may have" in answer.result.reason
 
-    def test_what_is_to_blame_is_told(self) -> None:
+    def test_what_is_to_blame_is_reported(self) -> None:
         for kind in (TaskKind.SYNTHESIZE, TaskKind.GENERATE, TaskKind.EXPLORE):
             (answer,) = answers(kind, request(kind, cif(EMPTY)))
             assert answer.result.status == pb.SYNTHESIS_STATUS_EMPTY
@@ -232,7 +231,7 @@ class TestWork:
         assert (made["cif"], made["python"], made["ros2"]) == (["supervisor.cif"], ["tank_supervisor.py"], [])
         assert "tank_supervisor.c" in made["c99"]
 
-    def test_code_begins_where_it_is_told(self) -> None:
+    def test_code_begins_where_it_is_asked_to(self) -> None:
         bundle = cif(TANK.replace("= 1;", "in any;"))
         for initial, status in (
             ("", pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL),

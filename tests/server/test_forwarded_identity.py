@@ -64,7 +64,7 @@ def test_a_forwarded_identity_is_taken_over_a_socket_and_from_a_proxy_with_a_cer
     check_listening("10.0.0.1:1", ServerSecurity(certificate=FILE, key=FILE, client_ca=FILE, forwarded_identity=True))
 
 
-def test_calls_over_a_socket_have_the_scopes_that_the_proxy_tells(tmp_path: Path) -> None:
+def test_calls_over_a_socket_have_the_scopes_that_the_proxy_sends(tmp_path: Path) -> None:
     file = tmp_path / "server.socket"
     anna = ("x-robosc-caller", "anna")
     with served(given_workers=StartedWorkers(), socket=file, forwarded_identity=True) as address:

@@ -78,8 +78,8 @@ def test_calls_of_one_connection_and_their_metadata_are_bounded() -> None:
         strangers(address, 1) as (stranger,),
     ):
         assert eventually(lambda: any(kind == SETTINGS and not flags for kind, flags, _ in stranger.frames))
-        told = next(content for kind, flags, content in stranger.frames if kind == SETTINGS and not flags)
-        settings = {struct.unpack_from(">HI", told, at) for at in range(0, len(told), 6)}
+        payload = next(content for kind, flags, content in stranger.frames if kind == SETTINGS and not flags)
+        settings = {struct.unpack_from(">HI", payload, at) for at in range(0, len(payload), 6)}
         assert (MAXIMUM_CONCURRENT_STREAMS, 1007) in settings
         with grpc.insecure_channel(address) as channel:
             stub = STUB(channel)
@@ -108,13 +108,13 @@ def test_a_request_that_is_too_large_is_refused_with_a_reason() -> None:
             error: Any = caught.value
             return error.code(), reason_of(error.trailing_metadata())
 
-        told = grpc.StatusCode.RESOURCE_EXHAUSTED, "REQUEST_TOO_LARGE"
+        expected = grpc.StatusCode.RESOURCE_EXHAUSTED, "REQUEST_TOO_LARGE"
         for submits in (False, True):
             for size in (991, limits.request_bytes, 2 * limits.request_bytes):
-                assert refusal(size, submits) == told
+                assert refusal(size, submits) == expected
             # gRPC's own answer, and the server goes on.
             assert refusal(3 * limits.request_bytes, submits) == (grpc.StatusCode.RESOURCE_EXHAUSTED, "")
-            assert refusal(991, submits) == told
+            assert refusal(991, submits) == expected
 
 
 SHORT = [method for method in METHODS if "SynthesisService" not in method and not method.endswith("SubmitJob")]

@@ -48,45 +48,39 @@ async def chunks(count: int) -> AsyncIterator[bytes]:
         yield bytes(SIZE)
 
 
-def test_who_reads_gets_any_number_of_messages() -> None:
-    async def test() -> None:
-        # Two may be unread; a hundred are sent to each of two calls.
-        sender = ResultSender(5 * SIZE, 100 * SIZE)
-        calls = [Call(), Call()]
-        sending = [asyncio.create_task(sender.send_stream(call, chunks(100))) for call in calls]
-        for _ in range(100):
-            for call in calls:
-                call.read()
-            await asyncio.sleep(0)
-            await asyncio.sleep(0)
-            assert sender.unread_bytes <= 4 * SIZE
-        await asyncio.wait_for(asyncio.gather(*sending), 60)
-        assert [call.written for call in calls] == [100, 100]
-        # The last one of each may still be on its way.
-        assert sender.unread_bytes == 2 * SIZE
+async def test_who_reads_gets_any_number_of_messages() -> None:
+    # Two may be unread; a hundred are sent to each of two calls.
+    sender = ResultSender(5 * SIZE, 100 * SIZE)
+    calls = [Call(), Call()]
+    sending = [asyncio.create_task(sender.send_stream(call, chunks(100))) for call in calls]
+    for _ in range(100):
         for call in calls:
-            call.end()
-        assert sender.unread_bytes == 0
+            call.read()
+        await asyncio.sleep(0)
+        await asyncio.sleep(0)
+        assert sender.unread_bytes <= 4 * SIZE
+    await asyncio.wait_for(asyncio.gather(*sending), 60)
+    assert [call.written for call in calls] == [100, 100]
+    # The last one of each may still be on its way.
+    assert sender.unread_bytes == 2 * SIZE
+    for call in calls:
+        call.end()
+    assert sender.unread_bytes == 0
 
-    asyncio.run(test())
 
-
-def test_who_reads_nothing_is_sent_nothing_more() -> None:
-    async def test() -> None:
-        sender = ResultSender(2 * SIZE, 100 * SIZE)
-        deaf = [Call(), Call()]
-        for call in deaf:
-            sender.reserve(call, (bytes(SIZE),))
-        with pytest.raises(RefusedError) as refused:
-            sender.reserve(Call(), (bytes(SIZE),))
-        assert refused.value.reason is Reason.SERVER_BUSY
-        # Others have room, and small results are not counted.
-        sender.reserve(Call("192.0.2.2"), (bytes(SIZE),))
-        sender.reserve(Call(), (bytes(SMALL_BYTES),))
-        deaf[0].end()
-        is_read = sender.reserve(Call(), (bytes(SIZE),))
-        is_read()
-        is_read()
-        assert sender.unread_bytes == 2 * SIZE
-
-    asyncio.run(test())
+async def test_who_reads_nothing_is_sent_nothing_more() -> None:
+    sender = ResultSender(2 * SIZE, 100 * SIZE)
+    deaf = [Call(), Call()]
+    for call in deaf:
+        sender.reserve(call, (bytes(SIZE),))
+    with pytest.raises(RefusedError) as refused:
+        sender.reserve(Call(), (bytes(SIZE),))
+    assert refused.value.reason is Reason.SERVER_BUSY
+    # Others have room, and small results are not counted.
+    sender.reserve(Call("192.0.2.2"), (bytes(SIZE),))
+    sender.reserve(Call(), (bytes(SMALL_BYTES),))
+    deaf[0].end()
+    is_read = sender.reserve(Call(), (bytes(SIZE),))
+    is_read()
+    is_read()
+    assert sender.unread_bytes == 2 * SIZE

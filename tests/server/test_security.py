@@ -141,7 +141,7 @@ class TestTls:
             shutil.copy(other_key, key)
             check(address, ca=second.file)
 
-    def test_a_certificate_that_does_not_fit_is_told_once_for_each_change(
+    def test_a_certificate_that_does_not_fit_is_reported_once_for_each_change(
         self, tmp_path: Path, caplog: pytest.LogCaptureFixture
     ) -> None:
         first = Authority(tmp_path, "first")
@@ -186,7 +186,7 @@ class TestTls:
                     with pytest.raises(ServerUnavailableError):
                         check(address, ca=authority.file, certificate=certificate, key=key)
 
-    def test_a_key_that_others_may_read_is_told(self, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    def test_a_key_that_others_may_read_is_reported(self, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
         certificate, key = Authority(tmp_path).sign("server")
         key.chmod(0o640)
         with serving(ServerSecurity(certificate=certificate, key=key)):
@@ -276,7 +276,7 @@ class TestTokens:
         assert "the token 'caller' is not for" in caplog.text
         assert secret not in caplog.text + "".join(capfd.readouterr())
 
-    def test_a_token_that_has_expired_is_told(self, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
+    def test_a_token_that_has_expired_is_reported(self, tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
         token, line = make_token("caller", (Scope.SYNTHESIZE,), expires_s=1_000_000_000)
         other, tokens = token_in(tmp_path, Scope.SYNTHESIZE, name="other")
         tokens.write_text(f"{line}\n{tokens.read_text()}")
@@ -305,7 +305,7 @@ class TestTokens:
 
 
 class TestQuotas:
-    def test_beyond_its_quota_a_caller_is_told_when_to_come_again_and_others_go_on(self, tmp_path: Path) -> None:
+    def test_beyond_its_quota_a_caller_learns_when_to_come_again_and_others_go_on(self, tmp_path: Path) -> None:
         token, tokens = token_in(tmp_path, Scope.SYNTHESIZE, quota=Quota(per_minute=2))
         other, other_tokens = token_in(tmp_path, Scope.SYNTHESIZE, name="other")
         tokens.write_text(tokens.read_text() + other_tokens.read_text())
@@ -369,13 +369,13 @@ class TestWhereItListens:
         with refused, served(given_workers=Quick(), host=host):
             pass
 
-    def test_unless_it_is_told_otherwise(self, secure: ServerSecurity, authority: Authority) -> None:
+    def test_unless_it_is_set_otherwise(self, secure: ServerSecurity, authority: Authority) -> None:
         with serving(ServerSecurity(insecure_beyond_loopback=True), host="0.0.0.0") as address:
             check(address.replace("0.0.0.0", "127.0.0.1"))
         with serving(secure, host="0.0.0.0") as address:
             check(address.replace("0.0.0.0", "127.0.0.1"), ca=authority.file)
 
-    def test_files_that_do_not_fit_are_told_at_the_start(
+    def test_files_that_do_not_fit_are_reported_at_the_start(
         self, tmp_path: Path, authority: Authority, secure: ServerSecurity
     ) -> None:
         assert secure.certificate is not None

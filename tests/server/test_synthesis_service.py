@@ -32,7 +32,7 @@ from robosc_server.synthesis_service import _ProgressWriter, progress_message
 from robosc_server.tasks.task import Report
 from support.background import is_running, is_stopped
 from support.fake_tasks import TASK_FUNCTION as FAKE
-from support.held_time import HeldLoop, on_held_time
+from support.held_time import HeldLoop
 from support.job_workers import StartedWorkers
 from support.models import EXAMPLES
 from support.service import served
@@ -161,51 +161,48 @@ class TestWork:
         call = STUB(fake).Synthesize(request, timeout=PATIENCE_S)
         pid = int(next(call).progress.message)
         goes_on(pid)
-        told: list[int] = []
-        # What is newest is told in any case, and nothing is told after what is newer.
+        received: list[int] = []
+        # What is newest is sent in any case, and nothing is sent after what is newer.
         for response in call:
-            told.append(int(response.progress.message.removeprefix("step ")))
-            if told[-1] == 19:
+            received.append(int(response.progress.message.removeprefix("step ")))
+            if received[-1] == 19:
                 break
-        assert told == sorted(set(told))
+        assert received == sorted(set(received))
         goes_on(pid)
         (last,) = call
         assert last.result.reason == "because"
 
-    def test_nobody_is_told_of_work_more_often_than_is_of_use(self) -> None:
-        told: list[bytes] = []
+    async def test_nobody_receives_progress_more_often_than_is_of_use(self, loop: HeldLoop) -> None:
+        received: list[bytes] = []
 
         class Context:
             async def write(self, message: bytes) -> None:
-                told.append(message)
+                received.append(message)
 
         def report(number: int) -> Report:
             return Report("synthesis", f"step {number}")
 
-        async def test(loop: HeldLoop) -> None:
-            context: Any = Context()
-            async with _ProgressWriter(context) as progress:
-                for number in range(100):
-                    await progress.report(report(number))
-                await loop.passed(PAUSE_S / 2)
-                assert told == []
-                await loop.passed(PAUSE_S / 2)
-                assert told == [progress_message(report(99))]
-                await progress.report(report(100))
-                await progress.report(report(101))
-                await loop.passed(PAUSE_S / 2)
-                assert len(told) == 1
-                await loop.passed(PAUSE_S / 2)
-                assert told[1:] == [progress_message(report(101))]
-                # After a while without a word, the next one is told at once.
-                await loop.passed(10.0)
-                await progress.report(report(102))
-                await loop.passed(0.0)
-                assert told[2:] == [progress_message(report(102))]
+        context: Any = Context()
+        async with _ProgressWriter(context) as progress:
+            for number in range(100):
+                await progress.report(report(number))
+            await loop.passed(PAUSE_S / 2)
+            assert received == []
+            await loop.passed(PAUSE_S / 2)
+            assert received == [progress_message(report(99))]
+            await progress.report(report(100))
+            await progress.report(report(101))
+            await loop.passed(PAUSE_S / 2)
+            assert len(received) == 1
+            await loop.passed(PAUSE_S / 2)
+            assert received[1:] == [progress_message(report(101))]
+            # After a while without a word, the next one is sent at once.
+            await loop.passed(10.0)
+            await progress.report(report(102))
+            await loop.passed(0.0)
+            assert received[2:] == [progress_message(report(102))]
 
-        on_held_time(test)
-
-    def test_what_is_done_at_once_tells_nothing_of_its_progress(
+    def test_what_is_done_at_once_reports_nothing_of_its_progress(
         self, fake: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr("robosc_server.synthesis_service.PROGRESS_PERIOD_S", PATIENCE_S)
@@ -229,7 +226,7 @@ class TestWork:
     @pytest.mark.parametrize(
         ("text", "reason"), [("raise", "INTERNAL_FAULT"), ("die 9", "WORKER_DIED"), ("exit 3", "WORKER_DIED")]
     )
-    def test_a_fault_is_told_and_the_server_lives_on(self, fake: Any, text: str, reason: str) -> None:
+    def test_a_fault_is_reported_and_the_server_lives_on(self, fake: Any, text: str, reason: str) -> None:
         found, details, _ = refusal(partial(check, fake, text))
         assert found == reason
         assert "on purpose" not in details
@@ -282,11 +279,8 @@ class TestEnding:
             reason, _, error = refusal(call.result)
             assert (reason, error.code()) == ("TIME_LIMIT", grpc.StatusCode.DEADLINE_EXCEEDED)
 
-    def test_too_many_that_wait_are_refused_and_told_when_to_come_again(self) -> None:
-        with (
-            served(FAKE, waiting_tasks=1) as address,
-            grpc.insecure_channel(address) as channel,
-        ):
+    def test_too_many_that_wait_are_refused_and_learn_when_to_come_again(self) -> None:
+        with served(FAKE, waiting_tasks=1) as address, grpc.insecure_channel(address) as channel:
             call, _ = stuck(channel)
             ended: queue.SimpleQueue[Any] = queue.SimpleQueue()
             calls = [
@@ -362,7 +356,7 @@ def is_taken(call: Callable[[], object]) -> bool:
 
 @contextmanager
 def line_that_dies(address: str) -> Iterator[tuple[str, threading.Event]]:
-    """A line to a server that carries nothing any more, and tells nobody, once the event is set; its address."""
+    """A line to a server that carries nothing any more, and notifies nobody, once the event is set; its address."""
     host, _, port = address.rpartition(":")
     is_dead = threading.Event()
     with socket.create_server(("127.0.0.1", 0)) as listener:
@@ -401,7 +395,7 @@ class TestLostCallers:
         ):
             _, pid = stuck(channel)
             is_dead.set()
-            # No end of the connection was told to the server: it asks for a sign of life, and gets none.
+            # No end of the connection reached the server: it asks for a sign of life, and gets none.
             assert eventually(partial(has_ended, pid))
 
 

@@ -215,7 +215,7 @@ class TestHostileBytes:
         ],
     )  # fmt: skip
     @pytest.mark.parametrize("kind", [TaskKind.SYNTHESIZE, TaskKind.CHECK])
-    def test_what_is_no_message_is_told_in_our_own_words(self, kind: TaskKind, content: bytes) -> None:
+    def test_what_is_no_message_is_refused_in_our_own_words(self, kind: TaskKind, content: bytes) -> None:
         found = refusal(kind, content)
         assert (found.reason, found.message) == (Reason.MALFORMED_REQUEST, NOT_A_MESSAGE)
         assert found.__cause__ is None
@@ -511,7 +511,7 @@ class TestRecentRequests:
         for _ in range(2):
             for kind in MESSAGES:
                 for content in contents:
-                    assert told(cache.accept, kind, content) == told(
+                    assert outcome(cache.accept, kind, content) == outcome(
                         partial(accept_request, limits=LIMITS), kind, content
                     )
 
@@ -553,7 +553,7 @@ class TestRecentRequests:
         assert not cached_contents(cache)
 
 
-def told(accept: Callable[[TaskKind, bytes], Task], kind: TaskKind, content: bytes) -> object:
+def outcome(accept: Callable[[TaskKind, bytes], Task], kind: TaskKind, content: bytes) -> object:
     """Return the outcome of a request: a task, or the refusal's reason and words."""
     try:
         return accept(kind, content)

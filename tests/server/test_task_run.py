@@ -61,11 +61,11 @@ def failure(kind: TaskKind, request: Any, limits: TaskLimits = LIMITS) -> Failur
     return found
 
 
-Told = Callable[..., tuple[int, str]]
+CommandLine = Callable[..., tuple[int, str]]
 
 
 @pytest.fixture
-def told(capsys: pytest.CaptureFixture[str]) -> Told:
+def cli(capsys: pytest.CaptureFixture[str]) -> CommandLine:
     """Exit status and standard output of `robosc`."""
 
     def run(*arguments: object) -> tuple[int, str]:
@@ -106,17 +106,19 @@ class TestCheck:
     @pytest.mark.parametrize(
         "text", ["robot R {", "library l { datatype d from a }", "robot R { component C {} component C {} }", "é"]
     )
-    def test_the_findings_of_the_command_line(self, tmp_path: Path, told: Told, text: str) -> None:
+    def test_the_findings_of_the_command_line(self, tmp_path: Path, cli: CommandLine, text: str) -> None:
         model = model_in(tmp_path, text)
         (answer,) = answers(TaskKind.CHECK, pb.CheckRequest(bundle=bundle_at(model)))
-        assert findings_json(answer.diagnostics) == json.loads(told("check", model, "--json")[1])["diagnostics"]
+        assert findings_json(answer.diagnostics) == json.loads(cli("check", model, "--json")[1])["diagnostics"]
         assert answer.diagnostics
 
-    def test_a_missing_library_is_told_with_the_places_that_were_searched(self, tmp_path: Path, told: Told) -> None:
+    def test_a_missing_library_is_reported_with_the_places_that_were_searched(
+        self, tmp_path: Path, cli: CommandLine
+    ) -> None:
         model = model_in(tmp_path, "import nothing\nrobot R {}")
         request = pb.CheckRequest(bundle=bundle_at(model))
         (answer,) = answers(TaskKind.CHECK, request)
-        assert findings_json(answer.diagnostics) == json.loads(told("check", model, "--json")[1])["diagnostics"]
+        assert findings_json(answer.diagnostics) == json.loads(cli("check", model, "--json")[1])["diagnostics"]
 
 
 class TestSynthesize:
@@ -128,9 +130,9 @@ class TestSynthesize:
             (MAZE_SOLVER, "controller"),
         ],
     )
-    def test_the_file_of_the_command_line(self, tmp_path: Path, told: Told, model: Path, deployment: str) -> None:
+    def test_the_file_of_the_command_line(self, tmp_path: Path, cli: CommandLine, model: Path, deployment: str) -> None:
         file = tmp_path / "out.rsup"
-        status, text = told("synth", model, "--deployment", deployment, "-o", file, "--json")
+        status, text = cli("synth", model, "--deployment", deployment, "-o", file, "--json")
         document = json.loads(text)
         number = pb.DEPLOYMENT_LAYER if deployment == "layer" else pb.DEPLOYMENT_CONTROLLER
         request = pb.SynthesizeRequest(bundle=bundle_at(model), options=pb.SynthesisOptions(deployment=number))
@@ -140,7 +142,7 @@ class TestSynthesize:
         assert result.supervisor == file.read_bytes()
         assert result.supervisor_digest == hashlib.sha256(file.read_bytes()).digest()
         assert findings_json(result.diagnostics) == document["diagnostics"]
-        assert result.summary.text == told("synth", model, "--deployment", deployment)[1]
+        assert result.summary.text == cli("synth", model, "--deployment", deployment)[1]
         assert result.summary.states == str(document["summary"]["states"])
         expected = make_supervisor(load_bundle(model), deployment=Deployment(deployment)).statistics
         assert expected is not None
@@ -155,18 +157,18 @@ class TestSynthesize:
         assert (result.reason, result.explanation, result.signature) == ("", "", b"")
 
     @pytest.mark.parametrize("states", [0, 5, 200_000])
-    def test_verified_as_far_as_it_is_asked_for(self, tmp_path: Path, told: Told, states: int) -> None:
+    def test_verified_as_far_as_it_is_asked_for(self, tmp_path: Path, cli: CommandLine, states: int) -> None:
         file = tmp_path / "out.rsup"
-        assert told("synth", LINE_FOLLOWER, "--verify-limit", states, "-o", file)[0] == 0
+        assert cli("synth", LINE_FOLLOWER, "--verify-limit", states, "-o", file)[0] == 0
         options = pb.SynthesisOptions(verified_states=states)
         (answer,) = answers(TaskKind.SYNTHESIZE, pb.SynthesizeRequest(bundle=bundle_at(LINE_FOLLOWER), options=options))
         assert answer.result.supervisor == file.read_bytes()
         assert (b'"not checked"' in file.read_bytes()) is (states < 10)
 
-    def test_no_supervisor(self, tmp_path: Path, told: Told) -> None:
+    def test_no_supervisor(self, tmp_path: Path, cli: CommandLine) -> None:
         model = model_in(tmp_path, EMPTY)
         (answer,) = answers(TaskKind.SYNTHESIZE, pb.SynthesizeRequest(bundle=bundle_at(model)))
-        status, text = told("synth", model, "--json")
+        status, text = cli("synth", model, "--json")
         document = json.loads(text)
         assert (status, answer.result.status) == (1, pb.SYNTHESIS_STATUS_EMPTY)
         assert answer.result.reason == document["reason"]
@@ -202,9 +204,9 @@ class TestGenerate:
         }
 
     @pytest.mark.parametrize("target", ["ros2", "c99", "all"])
-    def test_the_files_of_the_command_line(self, tmp_path: Path, told: Told, target: str) -> None:
+    def test_the_files_of_the_command_line(self, tmp_path: Path, cli: CommandLine, target: str) -> None:
         folder = tmp_path / "out"
-        assert told("generate", LINE_FOLLOWER, "--target", target, "-o", folder, "--package", "mine")[0] == 0
+        assert cli("generate", LINE_FOLLOWER, "--target", target, "-o", folder, "--package", "mine")[0] == 0
         generation = pb.GenerateOptions(package="mine")
         request = pb.GenerateRequest(bundle=bundle_at(LINE_FOLLOWER), target=target, generation=generation)
         first, *chunks = answers(TaskKind.GENERATE, request)
@@ -271,10 +273,10 @@ class TestGenerate:
 
 
 class TestExplore:
-    def test_the_graph_of_the_command_line(self, told: Told) -> None:
+    def test_the_graph_of_the_command_line(self, cli: CommandLine) -> None:
         first, *chunks = answers(TaskKind.EXPLORE, pb.ExploreRequest(bundle=bundle_at(LINE_FOLLOWER)))
         graph = b"".join(message.chunk for message in chunks)
-        assert graph.decode() == told("explore", LINE_FOLLOWER, "--json")[1]
+        assert graph.decode() == cli("explore", LINE_FOLLOWER, "--json")[1]
         document = json.loads(graph)
         result = first.result
         assert (result.states, result.transitions) == (len(document["states"]), len(document["transitions"]))
@@ -311,26 +313,26 @@ class TestVerify:
         return answer.result
 
     @pytest.mark.parametrize("is_strict", [False, True])
-    def test_a_right_supervisor(self, told: Told, supervisor: Path, is_strict: bool) -> None:
+    def test_a_right_supervisor(self, cli: CommandLine, supervisor: Path, is_strict: bool) -> None:
         result = self.verified(supervisor=supervisor.read_bytes(), strict=is_strict)
-        status, text = told("verify", supervisor, LINE_FOLLOWER, "--json", *["--strict"] * is_strict)
+        status, text = cli("verify", supervisor, LINE_FOLLOWER, "--json", *["--strict"] * is_strict)
         assert (status, result.status, result.report) == (0, pb.VERIFICATION_STATUS_PASSED, text)
         assert result.reason == ""
 
-    def test_a_supervisor_of_another_model(self, told: Told, supervisor: Path) -> None:
+    def test_a_supervisor_of_another_model(self, cli: CommandLine, supervisor: Path) -> None:
         result = self.verified(MAZE_SOLVER, supervisor=supervisor.read_bytes())
-        status, text = told("verify", supervisor, MAZE_SOLVER, "--json")
+        status, text = cli("verify", supervisor, MAZE_SOLVER, "--json")
         assert (status, result.status, result.report) == (1, pb.VERIFICATION_STATUS_FAILED, text)
 
-    def test_what_was_not_looked_at(self, told: Told, supervisor: Path) -> None:
+    def test_what_was_not_looked_at(self, cli: CommandLine, supervisor: Path) -> None:
         result = self.verified(supervisor=supervisor.read_bytes(), strict=True, maximum_states=1)
-        _, text = told("verify", supervisor, LINE_FOLLOWER, "--json", "--strict", "--limit", "1")
+        _, text = cli("verify", supervisor, LINE_FOLLOWER, "--json", "--strict", "--limit", "1")
         assert (result.status, result.report) == (pb.VERIFICATION_STATUS_NOT_CHECKED, text)
 
-    def test_texts_with_errors(self, tmp_path: Path, told: Told, supervisor: Path) -> None:
+    def test_texts_with_errors(self, tmp_path: Path, cli: CommandLine, supervisor: Path) -> None:
         model = model_in(tmp_path, "robot R {")
         result = self.verified(model, supervisor=supervisor.read_bytes())
-        _, text = told("verify", supervisor, model, "--json")
+        _, text = cli("verify", supervisor, model, "--json")
         assert (result.status, result.report) == (pb.VERIFICATION_STATUS_FAILED, text)
         assert findings_json(result.diagnostics) == json.loads(text)["diagnostics"]
 
@@ -339,20 +341,20 @@ class TestVerify:
         assert result.status == pb.VERIFICATION_STATUS_NOT_CHECKED
         assert "library" in result.reason
 
-    def test_what_is_no_supervisor(self, tmp_path: Path, told: Told) -> None:
+    def test_what_is_no_supervisor(self, tmp_path: Path, cli: CommandLine) -> None:
         file = tmp_path / "no.rsup"
         file.write_bytes(b"nonsense")
         result = self.verified(supervisor=b"nonsense")
-        _, text = told("verify", file, LINE_FOLLOWER, "--json")
+        _, text = cli("verify", file, LINE_FOLLOWER, "--json")
         assert (result.status, result.report) == (pb.VERIFICATION_STATUS_FAILED, text)
         assert result.reason == json.loads(text)["reason"]
 
-    def test_another_deployment(self, told: Told, tmp_path: Path) -> None:
+    def test_another_deployment(self, cli: CommandLine, tmp_path: Path) -> None:
         file = tmp_path / "maze.rsup"
-        assert told("synth", MAZE_SOLVER, "-o", file)[0] == 0
+        assert cli("synth", MAZE_SOLVER, "-o", file)[0] == 0
         options = pb.SynthesisOptions(deployment=pb.DEPLOYMENT_LAYER)
         result = self.verified(MAZE_SOLVER, supervisor=file.read_bytes(), options=options)
-        _, text = told("verify", file, MAZE_SOLVER, "--deployment", "layer", "--json")
+        _, text = cli("verify", file, MAZE_SOLVER, "--deployment", "layer", "--json")
         assert result.report == text
 
     @pytest.mark.parametrize(
@@ -364,18 +366,20 @@ class TestVerify:
         ],
     )
     @pytest.mark.parametrize("is_given", [False, True])
-    def test_properties(self, told: Told, supervisor: Path, claims: list[str], status: Any, is_given: bool) -> None:
+    def test_properties(
+        self, cli: CommandLine, supervisor: Path, claims: list[str], status: Any, is_given: bool
+    ) -> None:
         options = [word for claim in claims for word in ("--property", claim)]
-        _, text = told("verify", *[supervisor] * is_given, LINE_FOLLOWER, "--json", *options)
+        _, text = cli("verify", *[supervisor] * is_given, LINE_FOLLOWER, "--json", *options)
         given = supervisor.read_bytes() if is_given else b""
         result = self.verified(supervisor=given, properties=claims)
         assert (result.status, result.report) == (status, text)
         assert bool(result.diagnostics) == (status == pb.VERIFICATION_STATUS_PROPERTY_ERRORS)
 
-    def test_files_of_properties(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, told: Told) -> None:
+    def test_files_of_properties(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, cli: CommandLine) -> None:
         monkeypatch.chdir(tmp_path)
         Path("claims").write_text("# a comment\nreachable true\n\nAG true\n")
-        _, text = told("verify", LINE_FOLLOWER, "--json", "--properties", "claims")
+        _, text = cli("verify", LINE_FOLLOWER, "--json", "--properties", "claims")
         result = self.verified(property_files=[pb.SourceFile(name="claims", text=Path("claims").read_text())])
         assert (result.status, result.report) == (pb.VERIFICATION_STATUS_PASSED, text)
 
@@ -385,19 +389,19 @@ class TestVerify:
         assert (found.reason, found.message) == (Reason.MALFORMED_REQUEST, "there is no property in a")
 
     @pytest.mark.parametrize("text", [EMPTY, "robot R {"])
-    def test_no_supervisor(self, tmp_path: Path, told: Told, text: str) -> None:
+    def test_no_supervisor(self, tmp_path: Path, cli: CommandLine, text: str) -> None:
         model = model_in(tmp_path, text)
         result = self.verified(model, properties=["reachable true"])
-        _, printed = told("verify", model, "--json", "--property", "reachable true")
+        _, printed = cli("verify", model, "--json", "--property", "reachable true")
         assert (result.status, result.report) == (pb.VERIFICATION_STATUS_NO_SUPERVISOR, printed)
 
 
 class TestFormat:
-    def test_the_layout_of_the_command_line(self, tmp_path: Path, told: Told) -> None:
+    def test_the_layout_of_the_command_line(self, tmp_path: Path, cli: CommandLine) -> None:
         model = model_in(tmp_path, "robot R{component C{}}\r\n")
         request = small_request(TaskKind.FORMAT, "robot R{component C{}}\r\n")
         (answer,) = answers(TaskKind.FORMAT, request)
-        assert told("format", model)[0] == 0
+        assert cli("format", model)[0] == 0
         assert answer.text.encode() == model.read_bytes()
         assert not answer.diagnostics
 
@@ -501,10 +505,10 @@ class TestFailures:
             confinement.raise_memory_limit()
             print(found.reason)
         """
-        told = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
-        assert told.stdout == "MEMORY_LIMIT\n"
+        done = subprocess.run([sys.executable, "-c", program], check=True, capture_output=True, text=True)
+        assert done.stdout == "MEMORY_LIMIT\n"
 
-    def test_a_fault_tells_places_and_nothing_of_the_model(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_a_fault_reports_places_and_nothing_of_the_model(self, monkeypatch: pytest.MonkeyPatch) -> None:
         def faulty(*_: Any) -> Any:
             try:
                 raise KeyError("SecretName")
@@ -525,10 +529,10 @@ class TestFailures:
 
 
 class TestReports:
-    def test_each_stage_is_told_once_if_it_is_short(self) -> None:
+    def test_each_stage_is_reported_once_if_it_is_short(self) -> None:
         now_s = [0.0]
-        told: list[Report] = []
-        paced = ThrottledReports(told.append, lambda: now_s[0])
+        reports: list[Report] = []
+        paced = ThrottledReports(reports.append, lambda: now_s[0])
         for stage, message, pause_s in [
             ("check", "1", 0.0),
             ("check", "2", PAUSE_S / 2),
@@ -539,7 +543,7 @@ class TestReports:
         ]:
             now_s[0] += pause_s
             paced(Report(stage, message))
-        assert [report.message for report in told] == ["1", "3", "4", "6"]
+        assert [report.message for report in reports] == ["1", "3", "4", "6"]
 
     def test_of_each_kind(self) -> None:
         for kind, stages in {
@@ -550,10 +554,10 @@ class TestReports:
             TaskKind.VERIFY: ["check", "synthesis", "verification", "controller", "verification"],
             TaskKind.FORMAT: [],
         }.items():
-            told: list[Report] = []
+            reports: list[Report] = []
             request = small_request(kind, LINE_FOLLOWER.read_text()).SerializeToString()
-            run_task(kind, request, LIMITS, told.append)
-            assert list(dict.fromkeys(report.stage for report in told)) == list(dict.fromkeys(stages))
+            run_task(kind, request, LIMITS, reports.append)
+            assert list(dict.fromkeys(report.stage for report in reports)) == list(dict.fromkeys(stages))
 
 
 class TestDescription:
@@ -569,8 +573,8 @@ class TestDescription:
         )
         found = version_response(limits)
         assert found.engines[-1] == "autoref"
-        told = json_text({field.name: getattr(found.limits, field.name) for field in found.limits.DESCRIPTOR.fields})
-        assert json.loads(told) == {
+        printed = json_text({field.name: getattr(found.limits, field.name) for field in found.limits.DESCRIPTOR.fields})
+        assert json.loads(printed) == {
             "bundle_bytes": 2**20,
             "bundle_files": 1000,
             "task_seconds": 600.0,

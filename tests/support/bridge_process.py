@@ -28,7 +28,7 @@ def bridge(*arguments: str) -> subprocess.CompletedProcess[str]:
     return subprocess.run(command, capture_output=True, text=True, check=False)
 
 
-def configured(folder: Path, robot: SimulatedTurtleBot3, base: str, address: str = "null") -> Path:
+def configured(folder: Path, robot: SimulatedTurtleBot3, base: str, address: str = "null", model: Path = MODEL) -> Path:
     """A configuration as `init` writes it, with the ports of a simulated robot.
 
     Args:
@@ -36,9 +36,10 @@ def configured(folder: Path, robot: SimulatedTurtleBot3, base: str, address: str
         robot: The robot.
         base: Driver of its drive base.
         address: Address of its remote endpoint; null: there is none.
+        model: Its model.
     """
     first = "opencr" if base == "mavlink-rover" else base
-    made = bridge("init", "--model", str(MODEL), "--drive", first, "--scanner", "lds01")
+    made = bridge("init", "--model", str(model), "--drive", first, "--scanner", "lds01")
     assert made.returncode == 0, made.stderr
     ports = iter((robot.base_path, robot.scanner_path))
     text = re.sub(r"^  port: .*$", lambda _: f"  port: {next(ports)}", made.stdout, flags=re.MULTILINE)
@@ -75,6 +76,12 @@ def running(
         process.communicate()
 
 
-def stands_still(robot: SimulatedTurtleBot3) -> bool:
+def speeds(robot: SimulatedTurtleBot3) -> tuple[float, float]:
+    """Return the speeds of the wheels now, in rad/s."""
     robot.world.catch_up()
-    return robot.world.left.speed_rad_s == 0.0 == robot.world.right.speed_rad_s
+    return robot.world.left.speed_rad_s, robot.world.right.speed_rad_s
+
+
+def stands_still(robot: SimulatedTurtleBot3) -> bool:
+    """Return True if no wheel turns."""
+    return speeds(robot) == (0.0, 0.0)

@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from typing import Self
 
 from robosc_simulated import SimulatedTurtleBot3
 from support.waiting import wait_until
@@ -49,11 +50,17 @@ def configured(
 
 
 class Running:
-    """The program, and what it has written."""
+    """Program that runs, and its errors.
 
-    def __init__(self, configuration: Path, *options: str) -> None:
+    Args:
+        configuration: File of the configuration.
+        options: Further arguments of `run`.
+        model: File of the model; None: the one beside the configuration.
+    """
+
+    def __init__(self, configuration: Path, *options: str, model: Path | None = None) -> None:
         line = [sys.executable, "-m", "robosc_bridge.main", "run", "--standby", *options]
-        line += ["--model", str(configuration.with_suffix(".rscd")), "--config", str(configuration)]
+        line += ["--model", str(model or configuration.with_suffix(".rscd")), "--config", str(configuration)]
         self.process = subprocess.Popen(line, stderr=subprocess.PIPE, text=True)
         self.written = ""
         self._thread = threading.Thread(target=self._read)
@@ -64,16 +71,27 @@ class Running:
         for line in self.process.stderr:
             self.written += line
 
-    def address(self) -> str:
-        """Return the address that its endpoint listens on."""
+    def said(self, pattern: str) -> str:
+        """Return the group of a pattern that occurs in the errors sooner or later."""
 
         def look() -> re.Match[str] | None:
             assert self.process.poll() is None, self.written
-            return re.search(r"the remote endpoint listens on (\S+)\n", self.written)
+            return re.search(pattern, self.written)
 
         return wait_until(look, limit_s=START_LIMIT_S)[1]
 
+    def address(self) -> str:
+        """Return the address that its endpoint listens on."""
+        return self.said(r"the remote endpoint listens on (\S+)\n")
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.end()
+
     def end(self) -> None:
+        """Kill it."""
         self.process.kill()
         self.process.wait()
         self._thread.join(LIMIT_S)

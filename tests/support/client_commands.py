@@ -4,6 +4,7 @@ import signal
 import subprocess
 import sys
 import threading
+from collections.abc import Callable
 from typing import Any
 
 import pytest
@@ -34,10 +35,17 @@ FINDING = pb.Diagnostic(
 NOTHING: Any = {"status": pb.SYNTHESIS_STATUS_MODEL_ERRORS, "diagnostics": [FINDING]}
 SUCCEEDED = jobs_pb2.JOB_STATE_SUCCEEDED
 
+Run = Callable[..., tuple[int, str, str]]
+"""A command's exit status, output and errors from its arguments."""
 
-def run(capfd: pytest.CaptureFixture[str], *arguments: Any) -> Any:
+
+def run(capfd: pytest.CaptureFixture[str], *arguments: Any) -> tuple[int, str, str]:
     """Exit status, output and errors of a command."""
-    status = main([*map(str, arguments)])
+    try:
+        status = main([*map(str, arguments)])
+    except SystemExit as left:
+        assert isinstance(left.code, int)
+        status = left.code
     printed = capfd.readouterr()
     assert "Traceback" not in printed.err
     return status, printed.out, printed.err

@@ -9,6 +9,8 @@ from collections.abc import Callable, Coroutine
 from concurrent.futures import Future
 from typing import Any
 
+import pytest
+
 from support.waiting import PATIENCE_S
 
 
@@ -58,6 +60,12 @@ class HeldLoop(asyncio.SelectorEventLoop):
                 return
             self._now_s = max(self._now_s, next_s)
         self.call_soon(self._pass, until_s, done)
+
+
+@pytest.fixture
+def loop() -> HeldLoop:
+    """Loop that a test which is a coroutine runs on."""
+    return HeldLoop()
 
 
 def on_held_time[T](test: Callable[[HeldLoop], Coroutine[Any, Any, T]]) -> T:

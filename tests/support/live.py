@@ -4,12 +4,13 @@
 """
 
 import argparse
+import asyncio
 import contextlib
 import math
 import sys
 import threading
 import time
-from collections.abc import Iterator, Mapping
+from collections.abc import AsyncIterator, Iterator, Mapping
 from random import Random
 from typing import Any
 
@@ -229,6 +230,17 @@ def viewed(robot: LiveRobot, address: str = "127.0.0.1:0") -> Iterator[ViewEndpo
         yield endpoint
     finally:
         endpoint.stop()
+
+
+@contextlib.asynccontextmanager
+async def viewed_meanwhile(robot: LiveRobot) -> AsyncIterator[ViewEndpoint]:
+    """The same for a coroutine, whose connections end while it stops."""
+    endpoint = ViewEndpoint(robot.operations, ViewSettings("127.0.0.1:0"))
+    endpoint.start()
+    try:
+        yield endpoint
+    finally:
+        await asyncio.to_thread(endpoint.stop)
 
 
 def main(argv: list[str] | None = None) -> int:

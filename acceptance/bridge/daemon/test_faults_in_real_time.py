@@ -57,7 +57,7 @@ def test_a_lidar_that_is_silent_stops_the_wheels_until_it_is_not() -> None:
         bridge.moves()
 
 
-def test_a_port_that_may_not_be_opened_is_told_once_and_tried_until_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_port_that_may_not_be_opened_is_reported_once_and_tried_until_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
     # Root may open everything: the system's answer is what is played.
     opened = os.open
 

@@ -81,10 +81,7 @@ def halted(
     folder: Path, base: str, number: signal.Signals, address: str = "null"
 ) -> Iterator[tuple[subprocess.Popen[str], Wheels]]:
     """The bridge and the wheels, once these have stopped without it."""
-    with (
-        SimulatedTurtleBot3("burger", base, "lds01") as robot,
-        running(folder, robot, base, address) as process,
-    ):
+    with SimulatedTurtleBot3("burger", base, "lds01") as robot, running(folder, robot, base, address) as process:
         wheels = Wheels(robot)
         wheels.check_that_they_stop(wheels.signal(process, number), PROMISED_S[base])
         yield process, wheels

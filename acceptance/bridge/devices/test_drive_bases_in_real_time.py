@@ -25,7 +25,7 @@ def bench(request: pytest.FixtureRequest) -> Iterator[Rig]:
         yield found
 
 
-def test_silence_is_told_in_time_and_a_driver_that_dies_stops_the_wheels(bench: Rig) -> None:
+def test_silence_is_reported_in_time_and_a_driver_that_dies_stops_the_wheels(bench: Rig) -> None:
     bench.start()
     assert bench.drive(FORWARD, 0.4).velocity.linear_m_s == pytest.approx(0.15, abs=0.001)
     bench.hurry()
@@ -37,7 +37,7 @@ def test_silence_is_told_in_time_and_a_driver_that_dies_stops_the_wheels(bench: 
     assert bench.stops_within(0.7)
 
 
-def test_an_unplugged_line_is_told_at_once_and_no_descriptor_is_left(bench: Rig) -> None:
+def test_an_unplugged_line_is_reported_at_once_and_no_descriptor_is_left(bench: Rig) -> None:
     before = open_descriptors()
     bench.start()
     bench.robot.base_line.disconnect()

@@ -1,4 +1,4 @@
-"""Requests without an answer over a real pseudo-terminal: told in time, and nothing is computed meanwhile.
+"""Requests without an answer over a real pseudo-terminal: reported in time, and nothing is computed meanwhile.
 
 It is the witness that what `tests/bridge/devices/test_dynamixel_bus.py` shows on a virtual host is so in real time.
 """
@@ -17,7 +17,7 @@ LIMIT_S = 0.1
 
 
 @pytest.mark.real_time
-def test_silence_is_told_in_time_and_waiting_costs_nothing() -> None:
+def test_silence_is_reported_in_time_and_waiting_costs_nothing() -> None:
     with Peer(lambda request: [status(7, b"1234")]) as peer, SerialLine(peer.path, 1_000_000) as line:
         bus = DynamixelBus(line, lambda device: f"device {device}", LIMIT_S)
         bus.begin(10.0)

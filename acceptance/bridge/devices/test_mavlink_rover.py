@@ -4,17 +4,14 @@ import math
 
 import pytest
 
-from robosc_bridge.devices.interface import (
-    STANDSTILL,
-    Velocity,
-)
+from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_simulated.rover import GUIDED
 from support.rovers import FORWARD, POSE, Bench
 
 pytestmark = pytest.mark.real_time
 
 
-def test_it_opens_disarmed_and_drives_as_told(any_bench: Bench) -> None:
+def test_it_opens_disarmed_and_drives_as_commanded(any_bench: Bench) -> None:
     bench = any_bench
     bench.base.open()
     reading = bench.drive(FORWARD, 0.2)

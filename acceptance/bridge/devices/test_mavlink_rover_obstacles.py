@@ -9,7 +9,7 @@ from support.rovers import rig
 pytestmark = pytest.mark.real_time
 
 
-def test_obstacles_come_and_it_is_told_that_somebody_is_there() -> None:
+def test_obstacles_come_and_it_is_reported_that_somebody_is_there() -> None:
     with rig("udpin") as bench:
         scanner = make_range_scanner("mavlink-rover", path=bench.path)
         scanner.open()

@@ -57,7 +57,7 @@ def test_a_model_without_velocities_has_no_cycles_with_middleware() -> None:
 
 
 @pytest.mark.skipif(not HAS_ROSCPP, reason="gcc, g++ or roscpp is not installed")
-def test_what_does_not_compile_is_told(supervisor: Supervisor, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_does_not_compile_is_reported(supervisor: Supervisor, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robosc_experiments.cycles.driving._LIBRARIES", ("nowhere",))
     found = measured_driving("roscpp", "line", supervisor, 1, 1)
     assert isinstance(found, str)

@@ -69,12 +69,12 @@ def test_a_dry_run_decides_and_drives_nowhere(base: str, tmp_path: Path) -> None
         ]
         process = subprocess.Popen(command, stderr=subprocess.PIPE, text=True)
         try:
-            told: list[str] = []
+            lines: list[str] = []
             end_s = time.monotonic() + START_LIMIT_S
             assert process.stderr is not None
-            while not any("it would drive at 0." in line and "at 0.00 m/s, 0.00" not in line for line in told):
-                assert time.monotonic() < end_s, told
-                told.append(process.stderr.readline())
+            while not any("it would drive at 0." in line and "at 0.00 m/s, 0.00" not in line for line in lines):
+                assert time.monotonic() < end_s, lines
+                lines.append(process.stderr.readline())
             time.sleep(2.0)
             status = json.loads(bridge("status", "--json", "--address", address).stdout)
             robot.world.catch_up()

@@ -19,14 +19,12 @@ import pytest
 from pymavlink import mavutil
 
 from robosc_simulated import SimulatedTurtleBot3
+from support.bridge_process import LIMIT_S, MODEL, START_LIMIT_S, configured, speeds
 from support.ground import joined_texts
-from support.models import EXAMPLES
 from support.waiting import wait_until
 
 pytestmark = pytest.mark.real_time
 
-MODEL = EXAMPLES / "maze_solver" / "maze_solver.rscd"
-START_LIMIT_S, LIMIT_S = 90.0, 30.0
 HELD_BACK = "Held back: /cmd_vel: not allowed now"
 
 LAYER = """
@@ -107,50 +105,22 @@ def _armed(beat: Any) -> bool:
     return bool(beat.base_mode & 128)
 
 
-def _configured(folder: Path, robot: SimulatedTurtleBot3, remote: str, model: Path = MODEL) -> Path:
-    command = [sys.executable, "-m", "robosc_bridge.main", "init", "--model", str(model), "--scanner", "lds01"]
-    made = subprocess.run(command, capture_output=True, text=True, check=True)
-    ports = iter((robot.base_path, robot.scanner_path))
-    text = re.sub(r"^  port: .*$", lambda _: f"  port: {next(ports)}", made.stdout, flags=re.MULTILINE)
-    # A machine on which tests run is not one for robots.
-    times = r"^  (overrun_s|motor_timeout_s|scan_timeout_s|command_timeout_s): .*$"
-    text = re.sub(times, r"  \1: 1.0", text, flags=re.MULTILINE)
-    text, count = re.subn(r"^  mavlink_url: .*$", f"  mavlink_url: '{remote}'", text, flags=re.MULTILINE)
-    assert count == 1
-    file = folder / "bridge.yaml"
-    file.write_text(text)
-    return file
-
-
 @contextmanager
 def _running(
     folder: Path, robot: SimulatedTurtleBot3, remote: str, model: Path = MODEL, deployment: str = "controller"
 ) -> Iterator[subprocess.Popen[str]]:
-    file = _configured(folder, robot, remote, model)
-    command = [
-        sys.executable,
-        "-m",
-        "robosc_bridge.main",
-        "run",
-        "--standby",
-        "--deployment",
-        deployment,
-        "--model",
-        str(model),
-        "--config",
-        str(file),
-    ]
+    file = configured(folder, robot, "opencr", model=model)
+    text, count = re.subn(r"^  mavlink_url: .*$", f"  mavlink_url: '{remote}'", file.read_text(), flags=re.MULTILINE)
+    assert count == 1
+    file.write_text(text)
+    command = [sys.executable, "-m", "robosc_bridge.main", "run", "--standby", "--deployment", deployment]
+    command += ["--model", str(model), "--config", str(file)]
     process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         yield process
     finally:
         process.kill()
         process.communicate()
-
-
-def _speeds(robot: SimulatedTurtleBot3) -> tuple[float, float]:
-    robot.world.catch_up()
-    return robot.world.left.speed_rad_s, robot.world.right.speed_rad_s
 
 
 @pytest.fixture
@@ -174,26 +144,26 @@ def test_a_ground_station_starts_holds_and_stops_the_robot(tmp_path: Path, stati
         # Arming is answered once it runs.
         assert there.command(400, 1.0) == 0
         there.beat("arming", _armed)
-        wait_until(lambda: _speeds(robot) != (0.0, 0.0), "motion")
+        wait_until(lambda: speeds(robot) != (0.0, 0.0), "motion")
         there.until(lambda item: item.get_type() == "ODOMETRY" and (item.x, item.y) != (0.0, 0.0), "odometry")
         # HOLD stops the wheels before it is answered, but for what the motors need.
         assert there.command(176, 1.0, 4.0) == 0
-        wait_until(lambda: _speeds(robot) == (0.0, 0.0), "standstill", 1.0)
+        wait_until(lambda: speeds(robot) == (0.0, 0.0), "standstill", 1.0)
         beat = there.beat("HOLD", lambda beat: beat.custom_mode == 4)
         assert _armed(beat)
         assert there.command(400, 1.0) == 1
         assert "Not armed: An operator has stopped the robot. Resume or reset it first." in joined_texts(there.heard)
         assert there.command(176, 1.0, 10.0) == 0
         there.beat("AUTO", lambda beat: beat.custom_mode == 10)
-        wait_until(lambda: _speeds(robot) != (0.0, 0.0), "motion")
+        wait_until(lambda: speeds(robot) != (0.0, 0.0), "motion")
         # Disarming leaves torque off.
         assert there.command(400, 0.0) == 0
-        wait_until(lambda: _speeds(robot) == (0.0, 0.0), "standstill", 1.0)
+        wait_until(lambda: speeds(robot) == (0.0, 0.0), "standstill", 1.0)
         there.beat("disarming", lambda beat: not _armed(beat))
         wait_until(lambda: robot.left.table["torque enable"] == 0, "torque off")
         assert there.command(400, 1.0) == 0
         there.beat("arming", _armed)
-        # A fault of a device is told, and after a reset and its return it goes on.
+        # A fault of a device is reported, and after a reset and its return it goes on.
         robot.base_line.disconnect()
         there.beat("a fault", lambda beat: beat.system_status == 6 and not _armed(beat))
         there.until(lambda item: "drive base is lost" in " ".join(joined_texts(there.heard)), "its reason")
@@ -224,17 +194,17 @@ def test_set_points_move_the_wheels_as_far_as_the_layer_lets_them(tmp_path: Path
         there.velocity(0.1)
         assert there.command(400, 1.0) == 0
         there.beat("arming", _armed)
-        assert _speeds(robot) == (0.0, 0.0)
-        there.asking_for(0.1, lambda: min(_speeds(robot)) > 0.0, "motion")
+        assert speeds(robot) == (0.0, 0.0)
+        there.asking_for(0.1, lambda: min(speeds(robot)) > 0.0, "motion")
         # Where the layer says no, the wheels stop although the set-points go on.
-        told = joined_texts(there.heard).count(HELD_BACK)
+        count = joined_texts(there.heard).count(HELD_BACK)
         robot.world.place(1.5, 0.0, 0.0)
-        there.asking_for(0.1, lambda: _speeds(robot) == (0.0, 0.0), "standstill before a wall")
-        there.asking_for(0.1, lambda: joined_texts(there.heard).count(HELD_BACK) > told, "the refusal in words")
+        there.asking_for(0.1, lambda: speeds(robot) == (0.0, 0.0), "standstill before a wall")
+        there.asking_for(0.1, lambda: joined_texts(there.heard).count(HELD_BACK) > count, "the refusal in words")
         robot.world.place(0.0, 0.0, 0.0)
-        there.asking_for(0.1, lambda: min(_speeds(robot)) > 0.0, "motion")
+        there.asking_for(0.1, lambda: min(speeds(robot)) > 0.0, "motion")
         # A station that falls silent leaves a robot that stands.
-        wait_until(lambda: _speeds(robot) == (0.0, 0.0), "standstill", 5.0)
+        wait_until(lambda: speeds(robot) == (0.0, 0.0), "standstill", 5.0)
         process.send_signal(signal.SIGTERM)
         _, errors = process.communicate(timeout=LIMIT_S)
         assert process.returncode == 0, errors

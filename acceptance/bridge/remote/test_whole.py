@@ -5,14 +5,14 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_simulated import SimulatedTurtleBot3
+from support.bridge_process import speeds
 from support.bridge_runs import LIMIT_S, RUNNER, START_LIMIT_S, Running, configured
 from support.real_time import preferred
 from support.remote import Attachment, connected
@@ -47,18 +47,8 @@ CART = """robot Cart {
 """
 
 
-@contextmanager
-def running(folder: Path, robot: SimulatedTurtleBot3) -> Iterator[Running]:
-    bridge = Running(configured(folder, robot, RUNNER))
-    try:
-        yield bridge
-    finally:
-        bridge.end()
-
-
-def speeds(robot: SimulatedTurtleBot3) -> tuple[float, float]:
-    robot.world.catch_up()
-    return robot.world.left.speed_rad_s, robot.world.right.speed_rad_s
+def running(folder: Path, robot: SimulatedTurtleBot3) -> Running:
+    return Running(configured(folder, robot, RUNNER))
 
 
 def becomes(look: Callable[[], bool]) -> None:
@@ -73,12 +63,6 @@ def moves(robot: SimulatedTurtleBot3) -> bool:
 
 def state(address: str) -> str:
     return str(json.loads(command("status", "--json", "--address", address).stdout)["state"])
-
-
-@pytest.fixture
-def robot() -> Iterator[SimulatedTurtleBot3]:
-    with preferred(), SimulatedTurtleBot3("burger", "opencr", "lds01") as made:
-        yield made
 
 
 def test_a_robot_is_started_watched_stopped_and_let_go_on_from_elsewhere(
@@ -99,8 +83,8 @@ def test_a_robot_is_started_watched_stopped_and_let_go_on_from_elsewhere(
             stopped = command("stop", "--address", address)
             assert (stopped.returncode, stopped.stderr) == (0, "")
             becomes(lambda: not moves(robot))
-            told = command("status", "--address", address)
-            assert "nothing moves: An operator has stopped the robot. (until reset)" in told.stdout
+            done = command("status", "--address", address)
+            assert "nothing moves: An operator has stopped the robot. (until reset)" in done.stdout
 
             resumed = command("resume", "--address", address)
             assert (resumed.returncode, resumed.stderr) == (0, "")
@@ -140,14 +124,14 @@ def test_a_stop_reaches_the_motors_at_once(
                 assert time.monotonic() - begin_s < 5.0
                 time.sleep(0.0005)
             record_property("stop over gRPC, answered (ms)", round(1000.0 * answered_s, 1))
-            record_property("stop over gRPC, motors told (ms)", round(1000.0 * (time.monotonic() - begin_s), 1))
+            record_property("stop over gRPC, motors commanded (ms)", round(1000.0 * (time.monotonic() - begin_s), 1))
 
         line = [sys.executable, "-m", "robosc_bridge.command", "watch", "--address", address]
         with subprocess.Popen(line, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as watcher:
             assert watcher.stdout is not None
             assert watcher.stderr is not None
             watcher.stdout.readline()
-            # A bridge that hangs is told to whoever relies on it.
+            # A bridge that hangs is reported to whoever relies on it.
             bridge.process.send_signal(signal.SIGSTOP)
             stopped = command("stop", "--address", address)
             assert stopped.returncode == 2
@@ -199,9 +183,9 @@ def test_a_robot_is_driven_by_keys_as_far_as_the_layer_lets_it(tmp_path: Path) -
                 finally:
                     terminal.close()
                 gate.send(give=pb.Message(identifier="/nowhere"))
-                while not (told := gate.receive()).HasField("refused"):
+                while not (message := gate.receive()).HasField("refused"):
                     pass
-                assert "/nowhere" in told.refused.why
+                assert "/nowhere" in message.refused.why
                 gate.end()
             bridge.process.send_signal(signal.SIGTERM)
             assert bridge.process.wait(LIMIT_S) == 0

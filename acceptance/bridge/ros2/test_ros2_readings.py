@@ -18,7 +18,6 @@ from robosc_bridge.terminal.client import BridgeClient, RequestedCommand
 from robosc_simulated import SimulatedTurtleBot3
 from support.bridge_runs import LIMIT_S, RUNNER, START_LIMIT_S, Running, configured
 from support.colcon import Workspace
-from support.real_time import preferred
 from support.ros2 import Peer, RosProcess, environment, own_domain
 from support.waiting import wait_until
 
@@ -57,12 +56,12 @@ class Heard:
         self.diagnostics = received(DiagnosticArray, "/diagnostics")
 
     def level(self, name: str) -> bytes:
-        """Return the level of an entry as it was told last."""
+        """Return the level of an entry as it was published last."""
         status = self.diagnostics[-1][1].status if self.diagnostics else ()
         return next((bytes(item.level) for item in status if item.name == f"robosc_bridge: {name}"), b"")
 
     def message(self, name: str) -> str:
-        """Return the message of an entry as it was told last."""
+        """Return the message of an entry as it was published last."""
         status = self.diagnostics[-1][1].status
         return next(str(item.message) for item in status if item.name == f"robosc_bridge: {name}")
 
@@ -76,12 +75,6 @@ def yaw(orientation: Any) -> float:
 
 
 @pytest.fixture
-def robot() -> Iterator[SimulatedTurtleBot3]:
-    with preferred(), SimulatedTurtleBot3("burger", "opencr", "lds01") as made:
-        yield made
-
-
-@pytest.fixture
 def peer(tmp_path: Path) -> Iterator[Peer]:
     with own_domain() as domain, Peer(domain, environment(domain, tmp_path)) as made:
         yield made
@@ -89,12 +82,9 @@ def peer(tmp_path: Path) -> Iterator[Peer]:
 
 @contextmanager
 def bridge_of(folder: Path, robot: SimulatedTurtleBot3, address: str = "127.0.0.1:0") -> Iterator[Running]:
-    made = Running(configured(folder, robot, RUNNER, address=address, lidar="lds01"))
-    try:
+    with Running(configured(folder, robot, RUNNER, address=address, lidar="lds01")) as made:
         made.address()
         yield made
-    finally:
-        made.end()
 
 
 def published(address: str, folder: Path, *options: str) -> RosProcess:
@@ -119,7 +109,7 @@ def test_other_nodes_see_the_robot(robot: SimulatedTurtleBot3, peer: Peer, tmp_p
 
             client.request(RequestedCommand.START)
             becomes(lambda: heard.odometry[-1][1].pose.pose.position.x > 0.15, "the robot to drive")
-            becomes(lambda: heard.message("bridge") == "running", "the state to be told")
+            becomes(lambda: heard.message("bridge") == "running", "the state to be reported")
             odometry, joints = heard.odometry[-1][1], heard.joints[-1][1]
             assert (odometry.header.frame_id, odometry.child_frame_id) == ("odom", "base_footprint")
             assert odometry.twist.twist.linear.x == pytest.approx(0.1, abs=0.02)
@@ -139,7 +129,7 @@ def test_other_nodes_see_the_robot(robot: SimulatedTurtleBot3, peer: Peer, tmp_p
             assert heard.batteries[-1][1].voltage == pytest.approx(12.0, abs=0.1)
 
             client.stop()
-            becomes(lambda: heard.level("safety") == ERROR, "the stop to be told")
+            becomes(lambda: heard.level("safety") == ERROR, "the stop to be reported")
             assert "An operator has stopped the robot." in heard.message("safety")
             becomes(lambda: heard.odometry[-1][1].twist.twist.linear.x == 0.0, "the robot to stop")
             count = len(heard.odometry)
@@ -168,8 +158,8 @@ def test_other_nodes_see_the_robot(robot: SimulatedTurtleBot3, peer: Peer, tmp_p
             )
             process.signal(signal.SIGTERM)
             assert process.wait() == 0
-            told = process.stderr.splitlines()
-            assert [line.split(" at ")[0] for line in told] == ["robosc-bridge: publishes what the bridge of Runner"]
+            lines = process.stderr.splitlines()
+            assert [line.split(" at ")[0] for line in lines] == ["robosc-bridge: publishes what the bridge of Runner"]
 
 
 def test_a_bridge_that_is_pulled_away_and_comes_back(robot: SimulatedTurtleBot3, peer: Peer, tmp_path: Path) -> None:
@@ -179,9 +169,9 @@ def test_a_bridge_that_is_pulled_away_and_comes_back(robot: SimulatedTurtleBot3,
         heard, becomes = Heard(peer), until(peer, process)
         with process:
             becomes(lambda: bool(heard.odometry) and heard.level("bridge") == OK, "a bridge")
-            # It hangs: nothing old is told as new.
+            # It hangs: nothing old is published as new.
             bridge.process.send_signal(signal.SIGSTOP)
-            becomes(lambda: heard.level("bridge") == ERROR, "a bridge that hangs to be told")
+            becomes(lambda: heard.level("bridge") == ERROR, "a bridge that hangs to be reported")
             assert heard.level("drive") == heard.level("safety") == STALE
             count = len(heard.odometry)
             peer.spin_for(1.0)
@@ -192,7 +182,7 @@ def test_a_bridge_that_is_pulled_away_and_comes_back(robot: SimulatedTurtleBot3,
             assert late_s < 0.6
 
             bridge.end()
-            becomes(lambda: heard.level("bridge") == ERROR, "a bridge that is gone to be told")
+            becomes(lambda: heard.level("bridge") == ERROR, "a bridge that is gone to be reported")
             assert "bridge" in heard.message("bridge")
             count = len(heard.odometry)
             peer.spin_for(1.0)
@@ -213,7 +203,7 @@ def test_it_waits_for_a_bridge_that_is_not_there_yet(robot: SimulatedTurtleBot3,
 
         heard, becomes = Heard(peer, "/r1"), until(peer, process)
         odometry = peer.receive(Odometry, "/r1/wheels")
-        becomes(lambda: heard.level("bridge") == ERROR, "a bridge that is not there to be told")
+        becomes(lambda: heard.level("bridge") == ERROR, "a bridge that is not there to be reported")
         wait_until(lambda: "no bridge answers at" in process.stderr, limit_s=LIMIT_S)
         with bridge_of(tmp_path, robot, address):
             becomes(lambda: bool(odometry) and bool(heard.scans), "readings under their names")
@@ -256,9 +246,9 @@ def heard(message):
     for item in message.transforms:
         place, turn = item.transform.translation, item.transform.rotation
         stamp = item.header.stamp.sec + item.header.stamp.nanosec / 1e9
-        told = [item.header.frame_id, item.child_frame_id, stamp, [place.x, place.y, place.z],
+        line = [item.header.frame_id, item.child_frame_id, stamp, [place.x, place.y, place.z],
                 [turn.x, turn.y, turn.z, turn.w]]
-        print(json.dumps(told), flush=True)
+        print(json.dumps(line), flush=True)
 
 rclpy.init()
 node = rclpy.create_node("tf_listener")

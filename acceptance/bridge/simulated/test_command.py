@@ -1,4 +1,4 @@
-"""The simulator as a program of its own, and what can be told to it."""
+"""The simulator as a program of its own, and its commands."""
 
 import re
 import signal
@@ -29,12 +29,12 @@ class Program:
         assert self.process.stdout is not None
         self.input, self.output = self.process.stdin, self.process.stdout
 
-    def tell(self, line: str) -> None:
+    def send(self, line: str) -> None:
         self.input.write(line + "\n")
         self.input.flush()
 
     def ask(self, line: str) -> str:
-        self.tell(line)
+        self.send(line)
         return self.output.readline().strip()
 
 
@@ -54,7 +54,7 @@ def test_it_serves_until_it_is_interrupted(number: int, tmp_path: Path) -> None:
             assert b"\x54\x2c" in host.receive(200)
         assert program.ask("pose") == "pose 0.0000 0.0000 0.0000"
         assert program.ask("jump").startswith("error: unknown command 'jump'")
-        program.tell("base disconnect")
+        program.send("base disconnect")
         wait_until(lambda: not links[0].is_symlink())
         process.send_signal(number)
         assert process.wait(10) == 0
@@ -88,8 +88,8 @@ def test_a_scene_is_served_and_its_motion_recorded(tmp_path: Path) -> None:
     with program.process as process:
         assert [program.output.readline().split()[0] for _ in range(2)] == ["base", "scanner"]
         assert program.ask("goal") == "not yet"
-        program.tell("obstacle box 2 1")
-        program.tell("pose 1 0 0")
+        program.send("obstacle box 2 1")
+        program.send("pose 1 0 0")
         assert re.fullmatch(r"reached [0-9.]+", program.ask("goal"))
         process.terminate()
         assert process.wait(10) == 0
@@ -103,7 +103,7 @@ def test_a_maze_on_the_command_line_has_an_exit() -> None:
     with program.process as process:
         program.output.readline()
         program.output.readline()
-        program.tell("pose 2 2 0")
+        program.send("pose 2 2 0")
         assert program.ask("goal").startswith("reached")
         process.terminate()
         assert process.wait(10) == 0

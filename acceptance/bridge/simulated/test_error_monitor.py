@@ -13,7 +13,7 @@ FULL = Path("/dev/full")
 
 
 @pytest.mark.parametrize("option", ["--record", "--motion"])
-def test_on_a_full_disk_the_robot_goes_on_and_it_is_told(option: str) -> None:
+def test_on_a_full_disk_the_robot_goes_on_and_it_is_reported(option: str) -> None:
     command = [sys.executable, "-m", "robosc_simulated", "--base", "dynamixel", option, str(FULL)]
     with subprocess.Popen(
         command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True

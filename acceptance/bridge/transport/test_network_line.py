@@ -31,7 +31,7 @@ def _port(of: socket.socket) -> int:
 
 
 @pytest.mark.real_time
-def test_a_connection_that_takes_no_more_is_told_in_time(server: socket.socket) -> None:
+def test_a_connection_that_takes_no_more_is_reported_in_time(server: socket.socket) -> None:
     line = NetworkLine(f"tcp:127.0.0.1:{_port(server)}")
     other, _ = server.accept()
     begin_s = time.monotonic()

@@ -5,9 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from robosc_bridge.errors import (
-    LineLostError,
-)
+from robosc_bridge.errors import LineLostError
 from robosc_bridge.transport.serial_line import SerialLine
 from support.pty_end import LIMIT_S, PtyEnd
 

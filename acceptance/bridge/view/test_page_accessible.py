@@ -140,7 +140,7 @@ def test_tab_goes_through_everything_in_the_order_of_the_page(seen: Visit) -> No
     assert [name for name, is_seen in order if not is_seen and name != "INPUT"] == []
 
 
-def test_graph_and_canvas_are_told_in_words(server: StandIn, seen: Visit) -> None:
+def test_graph_and_canvas_are_described_in_words(server: StandIn, seen: Visit) -> None:
     server.send(events([entry(1, transitions=[taken("Base", 10)])]))
     picture = seen.page.get_by_role("img", name="Automaton of Base")
     seen.wait("() => document.querySelector('[data-component=Base] desc').textContent.includes('Last transition')")

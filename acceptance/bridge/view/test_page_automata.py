@@ -37,7 +37,7 @@ def test_automata_are_played_with(browser: Browser, tmp_path: Path) -> None:
     file.write_text(TANK_AND_BELT, encoding="utf-8")
     with view_process(file) as (_, url), visit(browser, url) as seen:
         page = seen.page
-        told, count = page.locator("#play-report"), page.locator("#play-count")
+        outcome, count = page.locator("#play-report"), page.locator("#play-count")
 
         def happen(name: str) -> None:
             page.locator(form_of(name)).locator("button").first.click()
@@ -48,17 +48,17 @@ def test_automata_are_played_with(browser: Browser, tmp_path: Path) -> None:
         # A run of automata is not saved: nothing offers that.
         for button in ("#play-log", "#play-test"):
             expect(page.locator(button)).to_be_hidden()
-        expect(told).to_contain_text("there are 4 states to begin in, and this begins where tank.level = 0")
+        expect(outcome).to_contain_text("there are 4 states to begin in, and this begins where tank.level = 0")
         page.locator("#play-beginning").select_option("tank.level = 1")
         page.locator("#play-restart").click()
-        expect(told).to_have_text("back in the initial state")
+        expect(outcome).to_have_text("back in the initial state")
         expect(page.locator('[data-component="tank"] .variables')).to_have_text("level1")
         draining = page.locator(form_of("tank.u_drain"))
         expect(draining.locator("button")).to_have_attribute("aria-disabled", "true")
         expect(draining.locator(".play-why")).to_have_text("tank: tank.level > 1 does not hold (tank.level is 1)")
         # The person chooses one of several outcomes, and the page marks the edge that was taken.
         happen("line.belt.u_go")
-        expect(told).to_contain_text("line.belt.u_go can lead to 2 states: choose one beside its button")
+        expect(outcome).to_contain_text("line.belt.u_go can lead to 2 states: choose one beside its button")
         ways = page.locator(form_of("line.belt.u_go")).locator(".play-ways button")
         expect(ways).to_have_text(["line.belt = jam", "line.belt = run"])
         seen.picture("automata-choice")
@@ -69,27 +69,27 @@ def test_automata_are_played_with(browser: Browser, tmp_path: Path) -> None:
         # The value of an input variable is entered.
         page.locator(form_of("sensor")).locator("select").select_option("true")
         happen("sensor")
-        expect(told).to_have_text("sensor (value = true): sensor.value = true")
+        expect(outcome).to_have_text("sensor (value = true): sensor.value = true")
         for _ in range(2):
             happen("tank.c_fill")
         filling = page.locator(form_of("tank.c_fill"))
         expect(filling.locator(".play-why")).to_contain_text("the supervisor forbids it")
         page.keyboard.press("Control+z")
-        expect(told).to_have_text("taken back: tank.c_fill")
+        expect(outcome).to_have_text("taken back: tank.c_fill")
         page.keyboard.press("Control+y")
         expect(count).to_contain_text("4 events")
         page.reload()
-        expect(told).to_have_text("what this page did before is here again")
+        expect(outcome).to_have_text("what this page did before is here again")
         expect(page.locator("#play-beginning")).to_have_value("tank.level = 1")
         # The page shows the findings of a wrong file, too.
         file.write_text(TANK_AND_BELT.replace("!= 4", "< 3"), encoding="utf-8")
-        expect(told).to_contain_text("the supervisor adds to tank.c_fill: tank.level <= 1", timeout=SYNTHESIS_MS)
+        expect(outcome).to_contain_text("the supervisor adds to tank.c_fill: tank.level <= 1", timeout=SYNTHESIS_MS)
         expect(page.locator("#play-beginning")).to_have_value("tank.level = 1")
         seen.picture("automata")
         page.locator("#play-finding").click()
-        expect(told).to_contain_text("Found: blocked at ")
+        expect(outcome).to_contain_text("Found: blocked at ")
         page.locator("#play-link").click()
-        expect(told).to_contain_text("the link to this model is")
+        expect(outcome).to_contain_text("the link to this model is")
         link = page.evaluate("location.hash")
         assert link.startswith("#model.cif=")
         file.write_text(TANK_AND_BELT.replace("when level > 1 do", "do"), encoding="utf-8")

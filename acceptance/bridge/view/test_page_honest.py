@@ -1,4 +1,4 @@
-"""The page never shows what is old as if it were so now, runs nothing that a robot tells it, and asks nobody else."""
+"""The page never shows what is old as if it were so now, runs nothing that a robot sends it, and asks nobody else."""
 
 import re
 from collections.abc import Iterator
@@ -13,12 +13,6 @@ from support.live_view import PAGE, Message, StandIn
 from support.view_messages import component, definition, entry, events, graph, taken, update
 
 FRESHNESS_IS = "(word) => document.documentElement.dataset.freshness === word"
-
-
-@pytest.fixture
-def server() -> Iterator[StandIn]:
-    with StandIn([definition(), update()]) as standing_in:
-        yield standing_in
 
 
 @pytest.fixture
@@ -63,12 +57,12 @@ def test_a_server_that_falls_silent_is_noticed(server: StandIn, seen: Visit) -> 
     seen.wait(FRESHNESS_IS, "live")
 
 
-def test_a_loop_that_hangs_is_told_with_its_age(server: StandIn, seen: Visit) -> None:
+def test_a_loop_that_hangs_is_reported_with_its_age(server: StandIn, seen: Visit) -> None:
     server.send(update(age_s=75.0))
     seen.wait(FRESHNESS_IS, "old")
     assert seen.page.get_by_role("alert").inner_text() == "The bridge's loop hangs: nothing shown here is live."
-    told = re.fullmatch(r"The state below is (\d+) s old\.", seen.text("#stale-age"))
-    assert told is not None and int(told[1]) >= 75
+    age = re.fullmatch(r"The state below is (\d+) s old\.", seen.text("#stale-age"))
+    assert age is not None and int(age[1]) >= 75
 
 
 def test_a_source_that_is_gone_says_why_until_it_is_back(server: StandIn, seen: Visit) -> None:
@@ -92,10 +86,10 @@ def test_a_source_that_stays_gone_is_noted_once(server: StandIn, seen: Visit) ->
     ]
 
 
-def test_a_request_of_which_nothing_was_told_is_not_known(server: StandIn, seen: Visit) -> None:
+def test_a_request_of_which_nothing_was_reported_is_not_known(server: StandIn, seen: Visit) -> None:
     server.send(update(enabled=["grip.request"], disabled=[{"event": "go.request", "why": ["No."]}]))
     seen.wait("() => document.querySelector('#requests-count').textContent === '1 of 4 enabled, 2 not known'")
-    told = {
+    texts = {
         line.get_attribute("data-request"): (
             line.get_attribute("data-enabled"),
             line.locator(".request-word").inner_text(),
@@ -103,7 +97,7 @@ def test_a_request_of_which_nothing_was_told_is_not_known(server: StandIn, seen:
         for line in seen.page.locator(".request").all()
     }
     unknown = ("unknown", "? not known")
-    assert told == {
+    assert texts == {
         "grip.request": ("true", "✓ enabled"),
         "move.request": unknown,
         "go.request": ("false", "✕ not now"),
@@ -154,7 +148,7 @@ def test_the_last_transition_is_that_of_the_place_in_a_recorded_run(server: Stan
     seen.wait(LAST_IS, [1, 10])
     words = "() => document.querySelector('[data-component=Gripper] desc').textContent.includes('Last transition')"
     assert seen.page.evaluate(words)
-    # Elsewhere, with entries that were not told.
+    # Elsewhere, with entries that were not sent.
     server.send(update(last={"Gripper": 2}))
     seen.wait(LAST_IS, [2, None])
     server.send(update(last={}))

@@ -14,12 +14,6 @@ STOPPED = {"code": "operator_stop", "text": "An operator has stopped the robot."
 
 
 @pytest.fixture
-def server() -> Iterator[StandIn]:
-    with StandIn([definition(), update()]) as standing_in:
-        yield standing_in
-
-
-@pytest.fixture
 def seen(browser: Browser, server: StandIn) -> Iterator[Visit]:
     with visit(browser, server.address) as opened:
         server.wait_for_pages(1)
@@ -67,7 +61,7 @@ def test_a_graph_in_full_size_leaves_the_stop_and_the_age_in_reach(
         assert server.wait_for_messages(1) == [{"type": "stop"}]
         server.send({"type": "done", "what": "stop"})
         seen.wait("() => document.querySelector('#large-answer').textContent === 'STOP was heard.'")
-        # A screen reader is told, too: what the dialog covers it does not read.
+        # A screen reader says it, too: what the dialog covers it does not read.
         seen.wait("() => document.querySelector('dialog #polite').textContent.includes('STOP was heard.')")
         server.away()
         seen.wait("() => document.documentElement.dataset.freshness === 'lost'")
@@ -104,7 +98,7 @@ def test_another_robot_closes_the_graph_in_full_size(server: StandIn, seen: Visi
     assert seen.errors == []
 
 
-def test_a_stop_that_nobody_confirms_is_told(server: StandIn, seen: Visit) -> None:
+def test_a_stop_that_nobody_confirms_is_reported(server: StandIn, seen: Visit) -> None:
     seen.page.get_by_role("button", name="STOP").click()
     server.wait_for_messages(1)
     seen.wait(ANSWER_IS, "STOP was not confirmed within 2 s. Use the switch on the robot.")
@@ -112,7 +106,7 @@ def test_a_stop_that_nobody_confirms_is_told(server: StandIn, seen: Visit) -> No
     seen.wait(ANSWER_IS, "STOP was heard.")
 
 
-def test_a_stop_without_a_connection_is_told_and_sent_later(server: StandIn, seen: Visit) -> None:
+def test_a_stop_without_a_connection_is_reported_and_sent_later(server: StandIn, seen: Visit) -> None:
     seen.wait("() => !document.querySelector('#stop').hidden")
     server.away()
     seen.wait("() => document.documentElement.dataset.freshness === 'lost'")

@@ -49,7 +49,7 @@ def test_a_model_is_played_with(browser: Browser, tmp_path: Path) -> None:
         def event(name: str) -> str:
             return f'form[data-event="{name}"]'
 
-        opening, told = page.locator(event("open.request")), page.locator("#play-report")
+        opening, outcome = page.locator(event("open.request")), page.locator("#play-report")
         expect(opening.locator("button")).to_have_attribute("aria-disabled", "true")
         expect(opening.locator(".play-why")).to_contain_text("requirement open needs Sensor.light = day")
         expect(page.locator("#requests-panel")).to_be_hidden()
@@ -58,7 +58,7 @@ def test_a_model_is_played_with(browser: Browser, tmp_path: Path) -> None:
         expect(page.locator("#play-count")).to_have_text("0 events · marked")
         page.locator(event("light.response")).locator("select").select_option("day")
         page.locator(event("light.response")).locator("button").click()
-        expect(told).to_have_text("light.response (value = day): Sensor.light = day")
+        expect(outcome).to_have_text("light.response (value = day): Sensor.light = day")
         expect(opening.locator(".play-why")).to_be_hidden()
         opening.locator("button").click()
         expect(page.locator('[data-component="Gate"] .card-state')).to_have_text("opened")
@@ -66,18 +66,18 @@ def test_a_model_is_played_with(browser: Browser, tmp_path: Path) -> None:
         # One part of an object is entered, and the other stays unknown.
         page.locator(event("seen.response")).locator("input").first.fill("2")
         page.locator(event("seen.response")).locator("button").click()
-        expect(told).to_contain_text("Sensor.name keeps its value, since what it was to take is unknown")
+        expect(outcome).to_contain_text("Sensor.name keeps its value, since what it was to take is unknown")
         expect(page.locator(event("shut.request")).locator(".play-why")).to_contain_text("(Sensor.people is 2)")
         page.keyboard.press("Control+z")
-        expect(told).to_have_text("taken back: seen.response")
+        expect(outcome).to_have_text("taken back: seen.response")
         expect(page.locator("#stream-rows .row")).to_have_count(2)
         page.locator("#play-redo").click()
-        expect(told).to_have_text("taken again: seen.response")
+        expect(outcome).to_have_text("taken again: seen.response")
         page.reload()
-        expect(told).to_have_text("what this page did before is here again")
+        expect(outcome).to_have_text("what this page did before is here again")
         expect(page.locator("#stream-rows .row")).to_have_count(4)
         page.locator("#play-finding").click()
-        expect(told).to_contain_text("Found:")
+        expect(outcome).to_contain_text("Found:")
         for button, name in (("#play-log", "gate.jsonl"), ("#play-test", "test_gate.py")):
             with page.expect_download() as download:
                 page.locator(button).click()
@@ -87,12 +87,12 @@ def test_a_model_is_played_with(browser: Browser, tmp_path: Path) -> None:
         compile((tmp_path / "test_gate.py").read_text(encoding="utf-8"), "test_gate.py", "exec")
         seen.picture("playground")
         page.locator(event("light.response")).locator("select").select_option("day")
-        # The file is saved: what has changed is told, and what was entered stays.
+        # The file is saved: what has changed is reported, and what was entered stays.
         file.write_text(GATE.replace("needs Sensor.people = 0", "needs Sensor.people < 3"), encoding="utf-8")
-        expect(told).to_contain_text("the model has changed")
+        expect(outcome).to_contain_text("the model has changed")
         expect(page.locator(event("light.response")).locator("select")).to_have_value("day")
         page.locator("#play-link").click()
-        expect(told).to_contain_text("the link to this model is")
+        expect(outcome).to_contain_text("the link to this model is")
         link = page.evaluate("location.hash")
         page.locator("#play-restart").click()
         expect(page.locator("#play-count")).to_have_text("0 events · marked")

@@ -17,14 +17,6 @@ def server() -> Iterator[StandIn]:
         yield standing_in
 
 
-@pytest.fixture
-def seen(browser: Browser, server: StandIn) -> Iterator[Visit]:
-    with visit(browser, server.address) as opened:
-        server.wait_for_pages(1)
-        yield opened
-        assert opened.errors == []
-
-
 # In the browser: everything that the page says about the state, as the server's words have it.
 SHOWN = """() => {
   const text = (element) => element.textContent.trim();
@@ -77,7 +69,7 @@ STATE_IS = "(word) => document.querySelector('#state-word').textContent === word
 
 
 @pytest.mark.smoke
-def test_everything_that_an_update_tells_is_shown(server: StandIn, seen: Visit) -> None:
+def test_everything_that_an_update_reports_is_shown(server: StandIn, seen: Visit) -> None:
     server.send(update())
 
     shown = shown_when(seen, STATE_IS, "running")
@@ -160,7 +152,7 @@ def test_only_the_latest_of_many_updates_counts(server: StandIn, seen: Visit) ->
     shown = shown_when(seen, "() => document.querySelector('[data-component=Base] dd')?.textContent === '199'")
     assert shown["components"]["Base"]["state"] == "driving"
     assert shown["components"]["Base"]["active"] == ["driving"]
-    # Nothing is told about it any more.
+    # Nothing is sent about it any more.
     assert shown["components"]["Gripper"]["state"] == "not known"
     assert shown["components"]["Gripper"]["active"] == []
 
@@ -178,8 +170,8 @@ ENDS = """() => {
 
 def test_a_graph_as_the_layout_has_it(browser: Browser) -> None:
     laid_out = graph(["a", "b"], [("a", "b", "go.request", "controllable")])
-    told = definition(components=[component("C", [], laid_out)], communications=[])
-    with StandIn([told]) as server, visit(browser, server.address) as seen:
+    defined = definition(components=[component("C", [], laid_out)], communications=[])
+    with StandIn([defined]) as server, visit(browser, server.address) as seen:
         seen.wait("() => document.querySelector('.graph')")
         assert seen.page.evaluate(BOXES) == [
             [state["name"], state["x"], state["y"], state["width"], state["height"], state["is_marked"]]
@@ -192,7 +184,7 @@ def test_a_graph_as_the_layout_has_it(browser: Browser) -> None:
         assert seen.errors == []
 
 
-def test_a_graph_that_is_too_large_is_told(server: StandIn, seen: Visit) -> None:
+def test_a_graph_that_is_too_large_is_reported(server: StandIn, seen: Visit) -> None:
     note = "() => document.querySelector('[data-component=Sensor] p')?.textContent"
     seen.wait(f"() => ({note})() === 'No behaviour of its own.'")
     server.send(update(components=parts(Sensor="seeing")))
@@ -228,6 +220,6 @@ def test_a_graph_in_full_size_goes_on_living(server: StandIn, seen: Visit) -> No
     server.send(update(components=parts(Base="driving")))
     seen.wait("() => document.querySelector('dialog .state.is-active')?.dataset.state === 'driving'")
     seen.page.get_by_role("button", name="Close").click()
-    # A dialog tells that it is closed a moment later.
+    # A dialog reports that it is closed a moment later.
     seen.page.locator("[data-component=Base] svg.graph").wait_for()
     seen.wait("() => document.activeElement?.getAttribute('aria-label') === 'Enlarge the graph of Base'")

@@ -2,32 +2,16 @@
 
 import json
 import time
-from collections.abc import Iterator
 from typing import Any
 
-import pytest
 from playwright.sync_api import Browser
 
 from support.browser import Visit, visit
 from support.live_view import StandIn
-from support.view_messages import BEGIN_S, definition, entry, events, many, taken, update
+from support.view_messages import BEGIN_S, entry, events, many, taken, update
 
 EVENTS_A_S = 50
 PARTS = 60
-
-
-@pytest.fixture
-def server() -> Iterator[StandIn]:
-    with StandIn([definition(), update()]) as standing_in:
-        yield standing_in
-
-
-@pytest.fixture
-def seen(browser: Browser, server: StandIn) -> Iterator[Visit]:
-    with visit(browser, server.address) as opened:
-        server.wait_for_pages(1)
-        yield opened
-        assert opened.errors == []
 
 
 def counted(seen: Visit, words: str) -> None:
@@ -100,7 +84,7 @@ def test_scrolling_shows_all_of_them(server: StandIn, seen: Visit) -> None:
     counted(seen, "301 entries")
 
 
-def test_lost_entries_are_told_where_they_are_missing(server: StandIn, seen: Visit) -> None:
+def test_lost_entries_are_reported_where_they_are_missing(server: StandIn, seen: Visit) -> None:
     server.send(events([entry(1)]), events([entry(15), entry(16)], lost=13))
     counted(seen, "4 entries")
     assert [item["kind"] for item in saved(seen)] == ["event", "lost", "event", "event"]
@@ -155,7 +139,7 @@ def test_a_pause_goes_on_collecting(server: StandIn, seen: Visit) -> None:
     assert [item["number"] for item in saved(seen)] == list(range(1, 103))
 
 
-def test_memory_is_bounded_and_what_goes_is_told(server: StandIn, seen: Visit) -> None:
+def test_memory_is_bounded_and_what_goes_is_reported(server: StandIn, seen: Visit) -> None:
     for first in range(1, 23_001, 1000):
         server.send(events([entry(number) for number in range(first, first + 1000)]))
     seen.wait("() => document.querySelector('#stream-lost').textContent.includes('not kept any more')")
@@ -167,21 +151,21 @@ def test_memory_is_bounded_and_what_goes_is_told(server: StandIn, seen: Visit) -
 
 
 def test_the_keyboard_goes_through_the_stream(server: StandIn, seen: Visit) -> None:
-    server.send(events([entry(number, text=f"told {number}") for number in range(1, 201)]))
+    server.send(events([entry(number, text=f"text {number}") for number in range(1, 201)]))
     counted(seen, "200 entries")
     box = seen.page.get_by_role("listbox", name="Events")
     box.focus()
     seen.page.keyboard.press("Home")
-    seen.wait("() => document.querySelector('#stream-detail').textContent.includes('told 1')")
+    seen.wait("() => document.querySelector('#stream-detail').textContent.includes('text 1')")
     for _ in range(3):
         seen.page.keyboard.press("ArrowDown")
-    seen.wait("() => document.querySelector('#stream-detail').textContent.endsWith('told 4')")
+    seen.wait("() => document.querySelector('#stream-detail').textContent.endsWith('text 4')")
     seen.wait(
         "() => document.getElementById(document.querySelector('#stream').getAttribute('aria-activedescendant'))"
         "?.getAttribute('aria-posinset') === '4'"
     )
     seen.page.keyboard.press("End")
-    seen.wait("() => document.querySelector('#stream-detail').textContent.endsWith('told 200')")
+    seen.wait("() => document.querySelector('#stream-detail').textContent.endsWith('text 200')")
 
 
 # In the browser: how many changes of the document the cards of the components have cost.
@@ -200,10 +184,10 @@ The state in words, two boxes, two lines and their labels, the description, the 
 
 def test_sixty_components_at_fifty_events_a_second(browser: Browser) -> None:
     """No entry is left out, the last state is shown at the end, and no event costs more than what it has changed."""
-    told = many(PARTS)
+    defined = many(PARTS)
     count = 4 * EVENTS_A_S
     busy = [False] * PARTS
-    with StandIn([told, update(components=_state_of(busy))]) as server, visit(browser, server.address) as seen:
+    with StandIn([defined, update(components=_state_of(busy))]) as server, visit(browser, server.address) as seen:
         server.wait_for_pages(1)
         seen.wait("(count) => document.querySelectorAll('.state.is-active').length === count", PARTS)
         seen.page.evaluate(COUNT_CHANGES)

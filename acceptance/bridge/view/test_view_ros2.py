@@ -27,14 +27,14 @@ def peer(tmp_path: Path) -> Iterator[Peer]:
 
 @pytest.mark.smoke
 @pytest.mark.ros2
-def test_a_node_is_shown_over_dds(peer: Peer, tmp_path: Path) -> None:
+async def test_a_node_is_shown_over_dds(peer: Peer, tmp_path: Path) -> None:
     from std_msgs.msg import String
 
     supervisor = example_supervisor(MAZE)
     node = Node(supervisor, tmp_path / "package")
     publisher = peer.publisher(String, "/robot1/state")
 
-    async def told(page: OpenPage, fits: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
+    async def next_message(page: OpenPage, fits: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
         """Return the message that fits, while the node publishes now and then.
 
         It never publishes so much that the topic would let go of something.
@@ -54,54 +54,47 @@ def test_a_node_is_shown_over_dds(peer: Peer, tmp_path: Path) -> None:
             and message["enabled"] == node.enabled()
         )
 
-    async def look() -> None:
-        async with (
-            asyncio.timeout(LIMIT_S),
-            served(lambda: StateTopic("/robot1", supervisor)) as server,
-            opened(server.url) as page,
-        ):
-            definition = await told(page, lambda message: message["type"] == "definition")
-            assert (definition["robot"], definition["source"]) == (supervisor.model.name, "ros2")
-            assert definition["can_command"] is False
-            await told(page, is_now)
-            reader, wanted = StateReader(supervisor), []
-            for _ in range(30):
-                while node.step() is None:
-                    pass
-                text = node.system.report()
-                wanted += [item["event"] for item in reader.read(text, 1.0)[2]]
-                publisher.publish(String(data=text))
-                shown = await told(page, is_now)
-                assert len(shown["enabled"]) + len(shown["disabled"]) == len(definition["requests"])
-            assert len(wanted) >= 10
-            while len(page.entries()) < len(wanted):
-                await page.next()
-            assert [entry["event"] for entry in page.entries()] == wanted
-            await page.send(type="stop")
-            assert (await page.told("refused"))["what"] == "stop"
-
-    asyncio.run(look())
+    async with (
+        asyncio.timeout(LIMIT_S),
+        served(lambda: StateTopic("/robot1", supervisor)) as server,
+        opened(server.url) as page,
+    ):
+        definition = await next_message(page, lambda message: message["type"] == "definition")
+        assert (definition["robot"], definition["source"]) == (supervisor.model.name, "ros2")
+        assert definition["can_command"] is False
+        await next_message(page, is_now)
+        reader, wanted = StateReader(supervisor), []
+        for _ in range(30):
+            while node.step() is None:
+                pass
+            text = node.system.report()
+            wanted += [item["event"] for item in reader.read(text, 1.0)[2]]
+            publisher.publish(String(data=text))
+            shown = await next_message(page, is_now)
+            assert len(shown["enabled"]) + len(shown["disabled"]) == len(definition["requests"])
+        assert len(wanted) >= 10
+        while len(page.entries()) < len(wanted):
+            await page.next()
+        assert [entry["event"] for entry in page.entries()] == wanted
+        await page.send(type="stop")
+        assert (await page.told("refused"))["what"] == "stop"
 
 
 @pytest.mark.ros2
-def test_a_node_that_is_not_there_is_told_and_found_when_it_comes(
+async def test_a_node_that_is_not_there_is_reported_and_found_when_it_comes(
     peer: Peer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     from std_msgs.msg import String
 
     monkeypatch.setattr("robosc_view.ros2_topic.SILENCE_S", 1.0)
     node = Node(supervisor_without_synthesis(large_model(3)), tmp_path / "package")
-
-    async def look() -> None:
-        async with served(StateTopic) as server, opened(server.url) as page:
-            assert "/state" in (await page.told("gone"))["why"]
-            publisher, end_s = peer.publisher(String, "/state"), time.monotonic() + 30
-            task = asyncio.create_task(page.told("definition"))
-            while not task.done():
-                assert time.monotonic() < end_s
-                publisher.publish(String(data=node.system.report()))
-                await asyncio.sleep(0.02)
-            await page.told("update")
-            assert "/state" in (await page.told("gone"))["why"]
-
-    asyncio.run(look())
+    async with served(StateTopic) as server, opened(server.url) as page:
+        assert "/state" in (await page.told("gone"))["why"]
+        publisher, end_s = peer.publisher(String, "/state"), time.monotonic() + 30
+        task = asyncio.create_task(page.told("definition"))
+        while not task.done():
+            assert time.monotonic() < end_s
+            publisher.publish(String(data=node.system.report()))
+            await asyncio.sleep(0.02)
+        await page.told("update")
+        assert "/state" in (await page.told("gone"))["why"]

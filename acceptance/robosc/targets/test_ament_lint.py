@@ -81,10 +81,10 @@ def test_the_linter_knows_the_licence_of_every_file(license_: str, target: str, 
     write_files(generate(example_supervisor(MAZE), target, GenerateOptions(metadata=metadata)), tmp_path)
     done = linted("ament_copyright", tmp_path, "--verbose")
     assert done.returncode == 0, done.stdout + done.stderr
-    told = [line.partition(": ")[2] for line in done.stdout.splitlines() if "copyright=" in line]
-    assert len(told) > 15
-    assert {line.partition(", license=")[2] for line in told} == {LICENSES[license_]}
-    assert all(line.startswith("copyright=Zo\u00eb Doe (2") for line in told)
+    copyrights = [line.partition(": ")[2] for line in done.stdout.splitlines() if "copyright=" in line]
+    assert len(copyrights) > 15
+    assert {line.partition(", license=")[2] for line in copyrights} == {LICENSES[license_]}
+    assert all(line.startswith("copyright=Zo\u00eb Doe (2") for line in copyrights)
 
 
 @pytest.mark.smoke

@@ -38,8 +38,8 @@ async def job_at(stub: Any, job_id: str) -> Any:
 async def watched(stub: Any, job_id: str, after_revision: int = 0) -> Any:
     """A job when it has ended."""
     async with asyncio.timeout(PATIENCE_S):
-        async for told in stub.WatchJob(pb.WatchJobRequest(id=job_id, after_revision=after_revision)):
-            job = told.job
+        async for news in stub.WatchJob(pb.WatchJobRequest(id=job_id, after_revision=after_revision)):
+            job = news.job
     assert job.HasField("end_time")
     return job
 
@@ -50,7 +50,7 @@ async def result_at(stub: Any, job_id: str) -> list[bytes]:
 
 
 def text_of(number: int, folder: Path) -> str:
-    """Writes down that it has begun, and ends when it is told to."""
+    """Writes down that it has begun, and ends when it is released."""
     return f"log {folder / 'begun'}\nuntil {folder / f'gate{number}'}\nreport 2\nbig 100000"
 
 
@@ -74,7 +74,7 @@ async def all_ended(stub: Any, ids: list[str]) -> None:
         await watched(stub, job_id)
 
 
-def test_a_server_is_killed_in_the_middle_of_fifty_jobs_and_nothing_is_lost(tmp_path: Path) -> None:
+async def test_a_server_is_killed_in_the_middle_of_fifty_jobs_and_nothing_is_lost(tmp_path: Path) -> None:
     state = tmp_path / "state"
 
     async def before(process: subprocess.Popen[str], address: str) -> tuple[list[str], list[Any], list[list[bytes]]]:
@@ -99,7 +99,9 @@ def test_a_server_is_killed_in_the_middle_of_fifty_jobs_and_nothing_is_lost(tmp_
             await asyncio.gather(late, return_exceptions=True)
         return ids, jobs, results
 
-    async def after(address: str, ids: list[str], jobs: list[Any], results: list[list[bytes]]) -> None:
+    with job_server(state) as (process, address):
+        ids, jobs, results = await before(process, address)
+    with job_server(state) as (_, address):
         async with stub_for(address) as stub:
             # What had ended is as it was, with its result.
             assert [await job_at(stub, job_id) for job_id in ids[:12]] == jobs[:12]
@@ -129,19 +131,14 @@ def test_a_server_is_killed_in_the_middle_of_fifty_jobs_and_nothing_is_lost(tmp_
             (response,) = [r async for r in stub.GetJobResult(pb.GetJobResultRequest(id=ids[-1]))]
             assert response.synthesize.SerializeToString() == expected
 
-    with job_server(state) as (process, address):
-        ids, jobs, results = asyncio.run(before(process, address))
-    with job_server(state) as (_, address):
-        asyncio.run(after(address, ids, jobs, results))
-
 
 def test_a_server_is_killed_again_and_again_at_any_moment_and_each_answer_holds(tmp_path: Path) -> None:
     """Jobs end by themselves while others come in; what a server said before its end is true after it."""
-    told: dict[str, tuple[str, Any]] = {}
+    accepted: dict[str, tuple[str, Any]] = {}
 
     async def work(process: subprocess.Popen[str], address: str, life: int) -> None:
         async with stub_for(address) as stub:
-            for job_id, (_, last) in told.items():
+            for job_id, (_, last) in accepted.items():
                 job = await job_at(stub, job_id)
                 assert job.revision >= last.revision
                 assert job == last or not last.HasField("end_time")
@@ -150,13 +147,13 @@ def test_a_server_is_killed_again_and_again_at_any_moment_and_each_answer_holds(
                 key = f"{life}.{number}"
                 request = pb.SubmitJobRequest(task=task_message(f"report 1\nbig {number}"), idempotency_key=key)
                 answer = await stub.SubmitJob(request)
-                told[answer.job.id] = key, answer.job
+                accepted[answer.job.id] = key, answer.job
                 async for news in stub.WatchJob(pb.WatchJobRequest(id=answer.job.id)):
-                    told[answer.job.id] = key, news.job
+                    accepted[answer.job.id] = key, news.job
 
             submitting = [asyncio.create_task(submit(number)) for number in range(15)]
             # Each time a little later.
-            await until(lambda: _so_many(told, life, life * 3))
+            await until(lambda: _so_many(accepted, life, life * 3))
             process.kill()
             await asyncio.gather(*submitting, return_exceptions=True)
 
@@ -167,7 +164,7 @@ def test_a_server_is_killed_again_and_again_at_any_moment_and_each_answer_holds(
     async def last(address: str) -> None:
         async with stub_for(address) as stub:
             listed = (await stub.ListJobs(pb.ListJobsRequest(page_size=1000))).jobs
-            assert {job.id for job in listed} >= set(told)
+            assert {job.id for job in listed} >= set(accepted)
             done = [await watched(stub, job.id) for job in listed]
             assert {job.state for job in done} <= {pb.JOB_STATE_SUCCEEDED, pb.JOB_STATE_FAILED}
             assert {job.failure.reason for job in done} <= {"", "SERVER_DIED"}
@@ -177,8 +174,8 @@ def test_a_server_is_killed_again_and_again_at_any_moment_and_each_answer_holds(
         asyncio.run(last(address))
 
 
-async def _so_many(told: dict[str, tuple[str, Any]], life: int, number: int) -> bool:
-    return sum(key.startswith(f"{life}.") for key, _ in told.values()) >= number
+async def _so_many(accepted: dict[str, tuple[str, Any]], life: int, number: int) -> bool:
+    return sum(key.startswith(f"{life}.") for key, _ in accepted.values()) >= number
 
 
 _REAL_JOBS = 10
@@ -240,8 +237,12 @@ def children_of_session(folder_of: int) -> list[int]:
     return found
 
 
-def test_of_two_servers_one_is_killed_and_the_other_carries_its_jobs_on(tmp_path: Path, database_url: str) -> None:
-    async def test(process: subprocess.Popen[str], dying: str, living: str) -> None:
+async def test_of_two_servers_one_is_killed_and_the_other_carries_its_jobs_on(
+    tmp_path: Path, database_url: str
+) -> None:
+    with ExitStack() as stack:
+        process, dying = stack.enter_context(job_server(tmp_path / "a", database_url))
+        _, living = stack.enter_context(job_server(tmp_path / "b", database_url))
         async with stub_for(dying) as first, stub_for(living) as second:
             ids = await submit_all(first, tmp_path)
             for number in range(5):
@@ -258,11 +259,6 @@ def test_of_two_servers_one_is_killed_and_the_other_carries_its_jobs_on(tmp_path
             assert sum(job.attempts - 1 for job in done) <= 2
             assert sum(begun(tmp_path).values()) <= _JOBS + 2
             assert await submit_all(second, tmp_path) == ids
-
-    with ExitStack() as stack:
-        process, dying = stack.enter_context(job_server(tmp_path / "a", database_url))
-        _, living = stack.enter_context(job_server(tmp_path / "b", database_url))
-        asyncio.run(test(process, dying, living))
 
 
 def test_a_full_disk_refuses_jobs_and_the_server_lives_on(tmp_path: Path) -> None:

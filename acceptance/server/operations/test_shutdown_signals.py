@@ -1,4 +1,4 @@
-"""A server that is told to end does, whatever hangs: whole processes, in which something is made to hang."""
+"""A server that is asked to end does, whatever hangs: whole processes, in which something is made to hang."""
 
 import contextlib
 import signal
@@ -34,7 +34,7 @@ main(["--port", "0", "--worker-processes", "1", "--state-dir", sys.argv[1], "--d
 
 @contextmanager
 def hanging(how: str, limit_s: float, folder: Path) -> Iterator[subprocess.Popen[str]]:
-    """A server that has begun to serve, and will hang when it is told to end."""
+    """A server that has begun to serve, and will hang when it is asked to end."""
     program = _HANGING.replace("LIMIT", str(limit_s)).replace("HOW", how)
     command = [sys.executable, "-c", program, str(folder)]
     with subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True) as process:
@@ -46,13 +46,13 @@ def hanging(how: str, limit_s: float, folder: Path) -> Iterator[subprocess.Popen
             process.kill()
 
 
-@pytest.mark.parametrize(("how", "told"), [("waiting", "waits at "), ("working", " in working")])
-def test_an_end_that_hangs_is_forced_and_told(how: str, told: str, tmp_path: Path) -> None:
+@pytest.mark.parametrize(("how", "words"), [("waiting", "waits at "), ("working", " in working")])
+def test_an_end_that_hangs_is_forced_and_reported(how: str, words: str, tmp_path: Path) -> None:
     with hanging(how, 1.0, tmp_path) as process:
         process.send_signal(signal.SIGTERM)
         _, log = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1, log
-    assert told in log
+    assert words in log
     # Where it hangs is in the program of this test, which is no file.
     assert "<string>" in log
 

@@ -127,7 +127,7 @@ class TestTasks:
         assert said(future.result(60)) == "hello"
         assert running.reports == [Report("synthesis", f"step {number}") for number in range(3)]
 
-    def test_the_last_of_very_many_reports_are_told(self, running: Running) -> None:
+    def test_the_last_of_very_many_reports_arrive(self, running: Running) -> None:
         future = running.start("reports 900\nsleep 0.3\necho done")
         assert said(future.result(60)) == "done"
         assert running.reports[-1] == Report("synthesis", "step 899")
@@ -146,7 +146,7 @@ class TestTasks:
         assert running.failure("stop", replace(LIMITS, seconds=0.2)).reason is Reason.TIME_LIMIT
         assert running.failure("size 1000000").reason is Reason.RESULT_TOO_LARGE
 
-    def test_what_tasks_take_of_processors_is_told_however_they_end(self, running: Running) -> None:
+    def test_what_tasks_take_of_processors_is_reported_however_they_end(self, running: Running) -> None:
         for text in ("work 0.4", "work 0.4\ndie 9", "work 0.4\npid\nsleep 600"):
             running.spent = []
             future = running.start(text)
@@ -159,7 +159,7 @@ class TestTasks:
             assert 0.4 <= running.spent[0] < 5.0
             assert len(running.spent) == 1
 
-    def test_deaths_and_faults_are_told_there_as_well(self, running: Running) -> None:
+    def test_deaths_and_faults_are_reported_there_as_well(self, running: Running) -> None:
         failure = running.failure("die 11")
         assert failure.reason is Reason.WORKER_DIED
         assert failure.message == "the worker process was ended by SIGSEGV"
@@ -187,23 +187,23 @@ class TestTasks:
         with pytest.raises(WorkersError, match="was lost"):
             future.result(60)
         with BackgroundLoop() as loop, pytest.raises(WorkersError, match="workers are shut down"):
-            loop.run(other.workers.run(fake_task("echo"), LIMITS, None))  # type: ignore[arg-type]  # never told
+            loop.run(other.workers.run(fake_task("echo"), LIMITS, None))  # type: ignore[arg-type]  # never called
 
 
 @pytest.mark.parametrize(
-    ("change", "told"),
+    ("change", "words"),
     [
         ("import robosc\nrobosc.__version__ = '0.0.1'\n", "has RoboSC 0.0.1, but this server"),
         ("import sys\nsys.modules['robosc_server'] = None\n", "cannot load RoboSC: "),
     ],
 )
-def test_a_worker_of_another_version_is_told_of_and_left_out(
-    cluster: Cluster, running: Running, tmp_path: Path, caplog: pytest.LogCaptureFixture, change: str, told: str
+def test_a_worker_of_another_version_is_reported_and_left_out(
+    cluster: Cluster, running: Running, tmp_path: Path, caplog: pytest.LogCaptureFixture, change: str, words: str
 ) -> None:
     (tmp_path / "sitecustomize.py").write_text(change)
     path = os.pathsep.join((str(tmp_path), *(path for path in sys.path if path)))
     worker = cluster.start_worker(environment={"PYTHONPATH": path})
-    assert eventually(lambda: told in caplog.text)
+    assert eventually(lambda: words in caplog.text)
     assert running.workers.capacity == 2
     for _ in range(4):
         assert said(running.run("echo fine")) == "fine"
@@ -270,10 +270,7 @@ def test_losses(tmp_path: Path) -> None:
 def test_workers_that_are_lost_before_they_begin_are_not_the_tasks_fault(tmp_path: Path) -> None:
     # The scheduler itself does not try again.
     patience = {"DASK_DISTRIBUTED__SCHEDULER__ALLOWED_FAILURES": "0"}
-    with (
-        dask_cluster(tmp_path, workers=3, environment=patience) as cluster,
-        running_on(cluster.address, 3) as running,
-    ):
+    with dask_cluster(tmp_path, workers=3, environment=patience) as cluster, running_on(cluster.address, 3) as running:
 
         def stop_all() -> None:
             """They take tasks, and do not begin them."""
@@ -311,6 +308,6 @@ def test_workers_that_are_lost_before_they_begin_are_not_the_tasks_fault(tmp_pat
 
 def test_a_cluster_that_is_away_is_waited_for(tmp_path: Path) -> None:
     cluster = Cluster(tmp_path)
-    told = f"the Dask scheduler at {cluster.address} cannot be reached"
-    with running_on(cluster.address, 0) as running, pytest.raises(WorkersError, match=told):
+    problem = f"the Dask scheduler at {cluster.address} cannot be reached"
+    with running_on(cluster.address, 0) as running, pytest.raises(WorkersError, match=problem):
         running.run("echo")

@@ -71,8 +71,8 @@ def config_checked(spec: str, environment: dict[str, str]) -> tuple[str, str]:
     """Return the grade and the message of `check-config` about the workers."""
     command = [sys.executable, "-m", "robosc_server.main", "check-config", "--json", "--port", "0", "--workers", spec]
     variables = {"PYTHONPATH": ":".join(filter(None, sys.path)), "PATH": "/usr/bin:/bin", "HOME": "/nowhere"}
-    told = subprocess.run(command, env=variables | environment, check=False, capture_output=True, text=True)
-    (found,) = [found for found in json.loads(told.stdout)["findings"] if found["part"] == "workers"]
+    done = subprocess.run(command, env=variables | environment, check=False, capture_output=True, text=True)
+    (found,) = [found for found in json.loads(done.stdout)["findings"] if found["part"] == "workers"]
     return found["grade"], found["message"]
 
 
@@ -92,7 +92,7 @@ def test_a_call_is_done_by_a_cluster_with_tls(site: Site, cluster: Cluster) -> N
     assert config_checked(spec, ours) == ("ok", f"127.0.0.1:{cluster.port} answers")
 
 
-def test_certificates_that_are_wrong_are_told_in_one_sentence(site: Site, cluster: Cluster, tmp_path: Path) -> None:
+def test_certificates_that_are_wrong_are_reported_in_one_sentence(site: Site, cluster: Cluster, tmp_path: Path) -> None:
     stranger = Authority(tmp_path, "stranger")
     spec = spec_of(cluster)
     refused_as(
@@ -103,9 +103,9 @@ def test_certificates_that_are_wrong_are_told_in_one_sentence(site: Site, cluste
     late = settings_of(site.authority.file, "CLIENT", site.authority.sign("late", days=-1))
     refused_as(spec, late, "alert certificate expired")
     strange = settings_of(site.authority.file, "CLIENT", stranger.sign("stranger"))
-    for ours, told in ((late, "alert certificate expired"), (strange, "alert unknown ca")):
+    for ours, words in ((late, "alert certificate expired"), (strange, "alert unknown ca")):
         grade, message = config_checked(spec, ours)
-        assert (grade, message.endswith(told)) == ("error", True), message
+        assert (grade, message.endswith(words)) == ("error", True), message
         assert message.startswith(f"127.0.0.1:{cluster.port}: TLS fails: ")
 
 
@@ -119,14 +119,14 @@ def test_a_scheduler_whose_certificate_has_expired_is_not_believed(tmp_path: Pat
 def test_a_scheduler_with_tls_is_not_reached_without(site: Site, cluster: Cluster) -> None:
     assert config_checked(spec_of(cluster), {})[0] == "error"
     command = [sys.executable, "-m", "robosc_server.main", "--port", "0", "--workers", spec_of(cluster)]
-    told = subprocess.run(command, check=False, capture_output=True, text=True, timeout=PATIENCE_S)
-    assert told.returncode != 0
-    assert "workers on dask+tls:// need Dask's settings DASK_DISTRIBUTED__COMM__TLS__CA_FILE" in told.stderr
-    assert "Traceback" not in told.stderr
+    done = subprocess.run(command, check=False, capture_output=True, text=True, timeout=PATIENCE_S)
+    assert done.returncode != 0
+    assert "workers on dask+tls:// need Dask's settings DASK_DISTRIBUTED__COMM__TLS__CA_FILE" in done.stderr
+    assert "Traceback" not in done.stderr
 
 
-def refused_as(spec: str, environment: dict[str, str], told: str) -> None:
-    """A server that cannot use its cluster refuses calls, and tells why in its log."""
+def refused_as(spec: str, environment: dict[str, str], words: str) -> None:
+    """A server that cannot use its cluster refuses calls, and says why in its log."""
     with logged_server_process("--workers", spec, **environment) as (_, address, log):
         with pytest.raises(grpc.RpcError) as refused:
             check(address)
@@ -136,7 +136,7 @@ def refused_as(spec: str, environment: dict[str, str], told: str) -> None:
         info = error_details_pb2.ErrorInfo()
         assert status.details[0].Unpack(info)
         assert info.reason == "WORKERS_UNAVAILABLE"
-        assert eventually(lambda: any(told in line for line in log)), log
+        assert eventually(lambda: any(words in line for line in log)), log
         # Once, however often it is tried.
-        assert sum(told in line for line in log) == 1
+        assert sum(words in line for line in log) == 1
         assert not any("Traceback" in line for line in log)

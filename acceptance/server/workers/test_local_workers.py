@@ -1,4 +1,4 @@
-"""Processes of this machine: they do what they are told, die of what they may not, and are killed in time."""
+"""Processes of this machine: they do what they are asked to, die of what they may not, and are killed in time."""
 
 import asyncio
 import os
@@ -31,7 +31,7 @@ class TestSpending:
 
     @pytest.fixture(autouse=True)
     def nothing_spent(self, running: Running) -> None:
-        # Those of earlier tests are told when their processes are gone.
+        # Those of earlier tests are reported when their processes are gone.
         assert eventually(lambda: len(running.local.pids) == 2)
         running.spent = []
 

@@ -4,7 +4,7 @@ Usage: bridge_process.py MODEL CONFIGURATION STANDBY_S RUNNING_S [WATCHERS [PAGE
 
 Watchers take everything that the bridge shows, as soon as there is something new, and put the measurements of each
 snapshot into JSON as a remote endpoint would. Pages of the live view are open in processes of their own; what a browser
-does with what it is told is no part of them. Without any there is no live view.
+does with what it receives is no part of them. Without any there is no live view.
 
 Prints one JSON document: by how much each decision was late, overruns, and how much of a processor the process took.
 """
@@ -90,7 +90,7 @@ class _Pages:
                 self._open.append(subprocess.Popen(line, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True))
 
     def close(self) -> None:
-        """End them; each tells how many messages it got."""
+        """End them; each prints how many messages it got."""
         for page in self._open:
             self.messages.append(int(page.communicate(timeout=LIMIT_S)[0]))
         if self._face is not None:

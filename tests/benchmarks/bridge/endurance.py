@@ -155,10 +155,7 @@ def drive(base: str, hours: float) -> dict[str, Any]:
         RuntimeError: Something has stopped the robot.
     """
     begin_s = time.monotonic()
-    with (
-        VirtualHost() as host,
-        SimulatedTurtleBot3("burger", base, SCANNER, walls=room(4.0, 3.0), clock=host) as robot,
-    ):
+    with VirtualHost() as host, SimulatedTurtleBot3("burger", base, SCANNER, walls=room(4.0, 3.0), clock=host) as robot:
         configuration = f"""
 robot: burger
 drive: {{driver: {base}, port: {robot.base_path}}}

@@ -75,15 +75,15 @@ async def look(url: str, until_s: float, seen: Seen) -> None:
                 if message.type is not aiohttp.WSMsgType.TEXT:
                     return
                 now_s = time.time()
-                told = json.loads(message.data)
-                if told["type"] == "events":
-                    for entry in told["entries"]:
+                content = json.loads(message.data)
+                if content["type"] == "events":
+                    for entry in content["entries"]:
                         seen.late_s.append(now_s - entry["time_s"])
                         seen.numbers.append(entry["number"])
                         waiting.append(entry["time_s"])
-                elif told["type"] == "update":
-                    seen.update_s += [now_s - time_s for time_s in waiting if time_s <= told["time_s"]]
-                    waiting = [time_s for time_s in waiting if time_s > told["time_s"]]
+                elif content["type"] == "update":
+                    seen.update_s += [now_s - time_s for time_s in waiting if time_s <= content["time_s"]]
+                    waiting = [time_s for time_s in waiting if time_s > content["time_s"]]
 
 
 def cpu_s(process: int) -> float:

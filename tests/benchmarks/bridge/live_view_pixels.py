@@ -36,9 +36,9 @@ KEPT_S = 1.0
 WATCH = """() => {
   window.rowsMs = {};
   window.statesMs = [];
-  const painted = (tell) => requestAnimationFrame(() => {
+  const painted = (report) => requestAnimationFrame(() => {
     const { port1, port2 } = new MessageChannel();
-    port1.onmessage = () => tell(performance.timeOrigin + performance.now());
+    port1.onmessage = () => report(performance.timeOrigin + performance.now());
     port2.postMessage(0);
   });
   new MutationObserver((records) => {
@@ -48,8 +48,8 @@ WATCH = """() => {
   const text = { subtree: true, childList: true, characterData: true };
   for (const [i, state] of document.querySelectorAll(".card-state").entries()) {
     new MutationObserver(() => {
-      const told = state.textContent;
-      painted((ms) => window.statesMs.push([i, told, ms]));
+      const text = state.textContent;
+      painted((ms) => window.statesMs.push([i, text, ms]));
     }).observe(state, text);
   }
 }"""
@@ -131,7 +131,7 @@ def _until_states(changes: list[tuple[float, int, str]], seen: list[tuple[int, s
         others = (*changes[:number], *changes[number + 1 :])
         if any(j == i and abs(then_s - at_s) < KEPT_S for then_s, j, _ in others):
             continue
-        later = [ms for j, told, ms in seen if (j, told) == (i, state) and ms >= 1000 * at_s]
+        later = [ms for j, text, ms in seen if (j, text) == (i, state) and ms >= 1000 * at_s]
         yield later[0] - 1000 * at_s if later else math.inf
 
 

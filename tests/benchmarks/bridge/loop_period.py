@@ -92,7 +92,7 @@ def measured(
     if found["problem"]:
         raise RuntimeError(f"the robot was stopped: {found['problem']}")
     if any(count < seconds for count in found["messages"]):
-        raise RuntimeError(f"a page was told next to nothing: {found['messages']} messages")
+        raise RuntimeError(f"a page received next to nothing: {found['messages']} messages")
     return Measured(
         tuple(found["late_s"]), found["overruns"], found["standby"], found["running"], tuple(found["messages"])
     )

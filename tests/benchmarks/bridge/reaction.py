@@ -127,14 +127,14 @@ def commands(records: Sequence[Record]) -> Iterator[tuple[float, bool]]:
 
 def trials(records: Sequence[Record], lidar: str) -> list[Trial]:
     """Return the outcome of each obstacle that was shown while the robot was driving."""
-    seen, told = list(turns(records, lidar)), list(commands(records))
+    seen, sent = list(turns(records, lidar)), list(commands(records))
     found = []
     before = True
     for index, (shown_s, is_obstructed) in enumerate(seen):
         if is_obstructed and not before:
-            last_zero = [is_zero for time_s, is_zero in told if time_s < shown_s][-1:]
+            last_zero = [is_zero for time_s, is_zero in sent if time_s < shown_s][-1:]
             clear_again_s = next((time_s for time_s, is_one in seen[index:] if not is_one), math.inf)
-            stopped_s = next((time_s for time_s, is_zero in told if time_s >= shown_s and is_zero), None)
+            stopped_s = next((time_s for time_s, is_zero in sent if time_s >= shown_s and is_zero), None)
             if last_zero == [False]:
                 is_missed = stopped_s is None or stopped_s > clear_again_s
                 found.append(Trial(shown_s, math.inf if stopped_s is None or is_missed else stopped_s))
@@ -153,11 +153,11 @@ def _drive(robot: Simulator, process: "subprocess.Popen[str]", lidar: str, count
         time.sleep(0.05)
     for _ in range(count):
         # Two turns and more: the first one is of both places. Never at the same phase of turns, decisions, exchanges.
-        robot.tell(FAR)
+        robot.send(FAR)
         time.sleep((2.3 + chance.random()) * TURN_S[lidar] + 0.1)
-        robot.tell(NEAR)
+        robot.send(NEAR)
         time.sleep((2.3 + chance.random()) * TURN_S[lidar] + 0.3)
-    robot.tell(FAR)
+    robot.send(FAR)
     time.sleep(3 * TURN_S[lidar])
 
 

@@ -47,7 +47,7 @@ class Simulator:
         assert self._process.stdout is not None
         return self._process.stdout.readline()
 
-    def tell(self, command: str) -> None:
+    def send(self, command: str) -> None:
         """Have it do something that it does not answer."""
         assert self._process.stdin is not None
         self._process.stdin.write(command + "\n")
@@ -55,7 +55,7 @@ class Simulator:
 
     def ask(self, command: str) -> str:
         """Have it answer."""
-        self.tell(command)
+        self.send(command)
         return self._line().strip()
 
 

@@ -2,9 +2,9 @@
 
 The bridge is a process as its unit of systemd runs it, and so is the simulated robot at the other end of real
 pseudo-terminals; both have priority over other programs where that is permitted. *Ready*: from the start of the process
-until it tells systemd that it is ready, and until the robot moves; the supervisor is made in between. *CPU*: user and
+until it reports ready to systemd, and until the robot moves; the supervisor is made in between. *CPU*: user and
 system time of the whole process over the time that passed, in a maze. *Scan to wheel byte* (until the bytes of the
-velocity have been written to the port), *to decision* and *exchange*: as the bridge itself tells them (`robosc-bridge
+velocity have been written to the port), *to decision* and *exchange*: as the bridge itself reports them (`robosc-bridge
 status --json`), with and without a neighbour that keeps each processor busy.
 
 In a maze few scans have another velocity, which is what *scan to wheel byte* counts. So there are rows with a model
@@ -86,14 +86,14 @@ def _cpu_s(process: int) -> float:
 
 
 def _status(address: str) -> dict[str, Any] | None:
-    told = subprocess.run(
+    done = subprocess.run(
         _command("status", "--json", "--address", address),
         env=environment(),
         capture_output=True,
         text=True,
         check=False,
     )
-    found: dict[str, Any] | None = json.loads(told.stdout) if told.stdout else None
+    found: dict[str, Any] | None = json.loads(done.stdout) if done.stdout else None
     return found
 
 
@@ -127,9 +127,9 @@ def _measure(model: Path, base: str, lidar: str, is_busy: bool, seconds: float) 
             try:
                 ready_s = moves_s = 0.0
                 while not moves_s:
-                    told = manager.recv(4096).decode()
-                    ready_s = time.monotonic() - begin_s if told == "READY=1" else ready_s
-                    moves_s = time.monotonic() - begin_s if told == "STATUS=running" else moves_s
+                    notice = manager.recv(4096).decode()
+                    ready_s = time.monotonic() - begin_s if notice == "READY=1" else ready_s
+                    moves_s = time.monotonic() - begin_s if notice == "STATUS=running" else moves_s
                 with _neighbours((os.cpu_count() or 1) if is_busy else 0):
                     before_cpu_s, before_s = _cpu_s(bridge.pid), time.monotonic()
                     time.sleep(seconds)

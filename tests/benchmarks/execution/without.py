@@ -5,7 +5,7 @@ silent steps and releases, with a middleware that does nothing. An *event* is `r
 the step, silent steps; where one message stands for several events, such as the maze solver's scans for three, its time
 is shared among them. Cycles are measured in one state, and while the sensors change, so that decisions differ.
 
-There is no event log: with one, each event is read, taken and told by itself, and its time is that of telling it. What
+There is no event log: with one, each event is read, taken and reported by itself, which takes time. What
 an executor need not do again it is not seen to do here: a request is asked whether it is allowed only after something
 changed that it depends on, so a large robot's cycle takes little longer than a small one's.
 """

@@ -37,8 +37,8 @@ def test_a_capture_is_understood_as_it_was(file: Path) -> None:
     found = {name: asdict(summary) for name, summary in summaries(capture).items()}
     expected = file.with_suffix(".json")
     if expected.exists():
-        told = json.loads(expected.read_text())
-        assert (found, capture.is_whole) == (told["lines"], told["is_whole"])
+        wanted = json.loads(expected.read_text())
+        assert (found, capture.is_whole) == (wanted["lines"], wanted["is_whole"])
     else:
         assert all(line["readings"] or line["scans"] for line in found.values()), found
         assert not any(line["problems"] for line in found.values()), found

@@ -32,7 +32,7 @@ def host() -> Iterator[VirtualHost]:
 
 
 class Stuck(io.BytesIO):
-    """A file on a disk that does not answer until it is told to."""
+    """A file on a disk that does not answer until it is released."""
 
     def __init__(self, goes_on: threading.Event) -> None:
         super().__init__()
@@ -135,7 +135,7 @@ def _ranges(item: Item) -> list[float | None]:
     return found
 
 
-def test_what_happens_to_a_line_is_recorded_and_told_on(host: VirtualHost, tmp_path: Path) -> None:
+def test_what_happens_to_a_line_is_recorded_and_passed_on(host: VirtualHost, tmp_path: Path) -> None:
     with SimulatedTurtleBot3("burger", "opencr", clock=host) as robot:
         path = robot.base_path
         recorder = Recorder(tmp_path / "run.mcap", {path: BASE}, host, 64 * MIB)
@@ -233,11 +233,11 @@ def test_a_disk_that_does_not_answer_costs_records_and_no_time(
     file = tmp_path / "kept.mcap"
     file.write_bytes(stream.getvalue())
     records = read_capture(file).records
-    told = [record.event["records"] for record in records if record.kind is Kind.EVENTS]
+    counts = [record.event["records"] for record in records if record.kind is Kind.EVENTS]
     # Once, or twice where some were lost before the disk was asked for the first time.
-    assert sum(told) == lost
-    assert 1 <= len(told) <= 2
-    assert len(records) == 3 * module._MOST_WAITING - lost + len(told)
+    assert sum(counts) == lost
+    assert 1 <= len(counts) <= 2
+    assert len(records) == 3 * module._MOST_WAITING - lost + len(counts)
 
 
 def test_a_full_disk_ends_the_recording_with_one_line_and_nothing_else(

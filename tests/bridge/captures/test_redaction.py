@@ -135,7 +135,7 @@ def test_the_commands_redact_and_replay(tmp_path: Path, capsys: pytest.CaptureFi
     assert "no line 'scanner'; it has base" in capsys.readouterr().err
 
 
-def test_problems_are_told_and_are_the_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_problems_are_reported_and_are_the_exit_status(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     answer = bytes.fromhex("fffffd00c8040055001 92d".replace(" ", ""))
     found = capture(LineInfo("base", "opencr", "burger"), answer)
     assert [item.kind for item in replay(found, {})] == ["problem"]

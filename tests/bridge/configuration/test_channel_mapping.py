@@ -101,7 +101,7 @@ def test_all_that_is_missing_is_one_error() -> None:
     ]
 
 
-def test_what_the_model_does_not_have_is_told() -> None:
+def test_what_the_model_does_not_have_is_reported() -> None:
     (line,) = errors_of(example("maze_solver/maze_solver"), MAZE + "  /scann: {channel: scanner}\n")
     assert line == "c.yaml:10: channels[\"/scann\"]: the model has no such communication; did you mean '/scan'?"
 
@@ -117,13 +117,13 @@ def test_names_of_communications_may_stand_for_their_identifiers() -> None:
     assert mapped(model, "channels: {m: {channel: drive}}").channels == {"m": kinds.DriveChannel()}
 
 
-def test_a_second_tie_is_told() -> None:
+def test_a_second_tie_is_reported() -> None:
     model = with_message("incoming", "Twist")
     (line,) = errors_of(model, "channels:\n  /m: {channel: drive}\n  m: {channel: log}\n")
     assert line == "c.yaml:6: channels.m: incoming message 'm' ('/m') is mapped here again, but '/m' maps it already"
 
 
-def test_messages_told_on_one_identifier_need_one_channel() -> None:
+def test_messages_on_one_identifier_need_one_channel() -> None:
     text = MAZE.replace("  /scan: {channel: scanner}\n", "").replace(
         "channels:\n",
         "channels:\n  scan_front: {channel: scanner}\n  scan_right: {channel: none}\n  scan_back_right: "
@@ -206,7 +206,7 @@ def test_data_and_direction_must_fit(direction: str, type_: str, channel: str, r
         ("provide m with { linear: { z: 1.0 - 1.0 }, angular: { x: 2.0, y: -1.0 } }", ["angular.x", "angular.y"]),
     ],
 )
-def test_velocities_that_the_wheels_cannot_do_are_told(provide: str, parts: list[str]) -> None:
+def test_velocities_that_the_wheels_cannot_do_are_reported(provide: str, parts: list[str]) -> None:
     model = with_message("incoming", "Twist", provide)
     reasons = unsuitable_because(model, model.communications[0], kinds.DriveChannel)
     assert [reason.split("'")[1] for reason in reasons if not reason.startswith("the model gives 'linear.z'")] == parts
@@ -276,21 +276,21 @@ def test_a_robot_of_ones_own_is_not_for_the_drives_of_a_turtlebot3() -> None:
         assert mapped(model, "channels: {/m: {channel: none}}", head).channels.keys() == {"m"}
 
 
-def test_devices_that_are_not_there_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_devices_that_are_not_there_are_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(driver_registry, "_registered", {})
     model = with_message("outgoing", "none")
     head = "robot: burger\ndrive: {driver: dynamixel, port: /dev/ttyUSB1}\n"
 
-    def told(channel: str, rest: str = "") -> str:
+    def problem(channel: str, rest: str = "") -> str:
         (line,) = errors_of(model, f"channels: {{/m: {channel}}}\n{rest}", head)
         return line.partition("]")[2] or line
 
-    assert told("{channel: scanner}") == ": there is no scanner: the section 'scanner' is missing"
-    assert told("{channel: fault, device: scanner}") == ": there is no scanner: the section 'scanner' is missing"
-    assert told("{channel: imu}") == ": the drive 'dynamixel' has no inertial sensor"
-    assert told("{channel: bumper}") == ": the drive 'dynamixel' has no bumpers"
-    assert told("{channel: button, name: x}") == ".name: the drive 'dynamixel' has no button 'x'; there is none"
-    line = told("{channel: none}", "skills: {emergency_stop: {stop_buttons: [button_1]}}")
+    assert problem("{channel: scanner}") == ": there is no scanner: the section 'scanner' is missing"
+    assert problem("{channel: fault, device: scanner}") == ": there is no scanner: the section 'scanner' is missing"
+    assert problem("{channel: imu}") == ": the drive 'dynamixel' has no inertial sensor"
+    assert problem("{channel: bumper}") == ": the drive 'dynamixel' has no bumpers"
+    assert problem("{channel: button, name: x}") == ".name: the drive 'dynamixel' has no button 'x'; there is none"
+    line = problem("{channel: none}", "skills: {emergency_stop: {stop_buttons: [button_1]}}")
     assert line == (
         "c.yaml:4: skills.emergency_stop.stop_buttons: the drive 'dynamixel' has no button 'button_1'; there is none"
     )

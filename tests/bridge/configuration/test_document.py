@@ -104,7 +104,7 @@ def test_every_key_has_its_line() -> None:
         (b" " * (MAXIMUM_BYTES + 1), f"c.yaml: is larger than {MAXIMUM_BYTES} bytes"),
     ],
 )
-def test_what_is_not_allowed_is_told_with_its_line(text: str | bytes, expected: str) -> None:
+def test_what_is_not_allowed_is_reported_with_its_line(text: str | bytes, expected: str) -> None:
     assert expected in error_of(text)
 
 
@@ -117,7 +117,7 @@ def test_what_is_just_allowed() -> None:
     assert parse_document(b" " * MAXIMUM_BYTES, "c.yaml").value is None
 
 
-def test_all_problems_are_told_at_once_and_by_line() -> None:
+def test_all_problems_are_reported_at_once_and_by_line() -> None:
     lines = error_of("a: !x 1\nb: &y 2\na: 3\n").splitlines()
     assert [line.split(":")[1] for line in lines] == ["1", "2", "3"]
 

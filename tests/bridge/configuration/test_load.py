@@ -64,8 +64,9 @@ skills: {rotate: {speed_rad_s: 1}, emergency_stop: {stop_keys: [s]}}
 remote: {grpc_address: "[::1]:50061"}
 channels:
   /cmd_vel: {channel: drive}
-  "": {channel: button, name: button_1}
-""".replace('"": ', "/b: ")
+  /b: {channel: button, name: button_1}
+  /r: {channel: rotate, unit: radians, direction: right}
+"""
     )
     assert found.scanner is not None
     assert found.scanner.options == {"baud": 115200, "tries": (1, 2.5, "no")}
@@ -77,10 +78,14 @@ channels:
     assert found.execution.service_timeout_s is None
     assert found.skills.rotate.speed_rad_s == 1.0
     assert found.skills.emergency_stop.stop_keys == ("s",)
-    assert found.channels == {"/cmd_vel": DriveChannel(), "/b": ButtonChannel(name="button_1", on="press")}
+    assert found.channels == {
+        "/cmd_vel": DriveChannel(),
+        "/b": ButtonChannel(name="button_1", on="press"),
+        "/r": RotateChannel(unit="radians", direction="right"),
+    }
 
 
-def test_every_mistake_is_told_at_once_with_its_place() -> None:
+def test_every_mistake_is_reported_at_once_with_its_place() -> None:
     found = errors_of(
         """execution:
   period_s: 0
@@ -141,7 +146,7 @@ def test_an_empty_file_lacks_what_is_required(text: str) -> None:
 
 
 @pytest.mark.parametrize(("text", "what"), [("[1]", "a list"), ("words", '"words"'), ("3", "3")])
-def test_a_file_that_is_no_mapping_is_told(text: str, what: str) -> None:
+def test_a_file_that_is_no_mapping_is_reported(text: str, what: str) -> None:
     (line,) = errors_of(text, head="")
     assert line.startswith(f"c.yaml:1: the file is {what}; it must be a mapping with robot, drive, scanner")
 
@@ -163,7 +168,7 @@ def test_a_file_that_is_no_mapping_is_told(text: str, what: str) -> None:
         ("every: " + "x" * 100, 'is "' + "x" * 56 + "...;"),
     ],
 )
-def test_values_of_a_wrong_kind_are_told(text: str, expected: str) -> None:
+def test_values_of_a_wrong_kind_are_reported(text: str, expected: str) -> None:
     (line,) = errors_of(f"execution:\n  {text}\n")
     assert line.startswith("c.yaml:4: execution.")
     assert expected in line
@@ -182,10 +187,7 @@ def test_the_server_is_a_host_with_or_without_a_port(address: str) -> None:
     (line,) = errors_of(f"supervisor: {{server: {json.dumps(address)}}}\n")
     assert "it must be a text like HOST or HOST:PORT" in line
     for right in ("localhost", "lab.example:1", "[::1]"):
-        assert (
-            parse(f"{HEAD}supervisor: {{server: '{right}'}}\n".encode(), "c.yaml").configuration.supervisor.server
-            == right
-        )
+        assert configuration(f"supervisor: {{server: '{right}'}}\n").supervisor.server == right
 
 
 @pytest.mark.parametrize(
@@ -233,7 +235,7 @@ def test_the_server_is_a_host_with_or_without_a_port(address: str) -> None:
         ("remote: {tokens: t}", "remote.tokens: has no effect without 'grpc_address'"),
     ],
 )
-def test_contradictions_are_told(text: str, expected: str) -> None:
+def test_contradictions_are_reported(text: str, expected: str) -> None:
     assert errors_of(text) == [f"c.yaml:3: {expected}"]
 
 
@@ -327,11 +329,6 @@ def test_the_decoder_takes_what_msgspec_takes(given_values: dict[str, object], i
     except ConfigurationError:
         found = None
     assert found == expected
-
-
-def test_a_channel_keeps_its_options() -> None:
-    found = configuration("channels: {/r: {channel: rotate, unit: radians, direction: right}}")
-    assert found.channels == {"/r": RotateChannel(unit="radians", direction="right")}
 
 
 def test_a_body_of_ones_own_is_checked_part_by_part() -> None:

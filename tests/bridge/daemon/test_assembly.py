@@ -124,14 +124,14 @@ def test_a_scanner_that_cannot_be_so_is_refused(scanner: str, why: str, supervis
     assert why in str(raised.value)
 
 
-@pytest.mark.parametrize(("place", "told"), [("", None), (", x_m: 0, y_m: -0.06", (0.0, -0.06))])
+@pytest.mark.parametrize(("place", "expected"), [("", None), (", x_m: 0, y_m: -0.06", (0.0, -0.06))])
 def test_the_place_of_the_scanner_is_that_of_the_configuration(
-    place: str, told: tuple[float, float] | None, supervisor: Supervisor
+    place: str, expected: tuple[float, float] | None, supervisor: Supervisor
 ) -> None:
     text = re.sub(
         r"^scanner: .*$", f"scanner: {{driver: lds03, port: /dev/scanner{place}}}", CONFIGURATION, flags=re.MULTILINE
     )
-    assert machine(supervisor, text).operations.scanner_place == told
+    assert machine(supervisor, text).operations.scanner_place == expected
 
 
 SET_MESSAGE_INTERVAL = 511

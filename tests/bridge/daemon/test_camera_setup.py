@@ -69,7 +69,7 @@ def test_a_warning_is_logged_when_it_begins(caplog: pytest.LogCaptureFixture) ->
     scene = Scene()
     blind, both = (Caution.SCAN_BLIND,), (Caution.BATTERY, Caution.SCAN_BLIND)
     for warnings in (blind, both, blind, (), blind):
-        scene.told(SafetyNotice((), warnings))
+        scene.report(SafetyNotice((), warnings))
     assert [record.message for record in caplog.records] == [
         Caution.SCAN_BLIND,
         Caution.BATTERY,
@@ -100,27 +100,27 @@ class Scene:
         stop = EmergencyStop(skills.emergency_stop)
         self.daemon = Daemon(job, SafetyLayer(LIMITS), Rotate(skills.rotate), stop, clock, self.log)
 
-    def told(self, *reports: Report) -> list[str]:
+    def report(self, *reports: Report) -> list[str]:
         """The model's events that follow."""
         before = len(self.log.entries)
         self.daemon.cycle(*reports)
         return [entry["event"] for entry in self.log.entries[before:] if entry["kind"] == "event"]
 
     def up(self) -> None:
-        self.told(DeviceUp(Device.DRIVE))
-        self.told(DeviceUp(Device.CAMERA))
+        self.report(DeviceUp(Device.DRIVE))
+        self.report(DeviceUp(Device.CAMERA))
         assert self.daemon.state is State.RUNNING
 
 
 def test_it_waits_for_the_camera_and_says_so(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level(logging.INFO, "robosc_bridge.daemon")
     scene = Scene()
-    scene.told()
-    scene.told(DeviceUp(Device.DRIVE))
-    scene.told(Sighting(50.0, None), DeviceDown(Device.CAMERA, "/dev/video0: there is no such camera", 1.0, True))
-    scene.told()
+    scene.report()
+    scene.report(DeviceUp(Device.DRIVE))
+    scene.report(Sighting(50.0, None), DeviceDown(Device.CAMERA, "/dev/video0: there is no such camera", 1.0, True))
+    scene.report()
     states = [scene.daemon.state]
-    scene.told(DeviceUp(Device.CAMERA))
+    scene.report(DeviceUp(Device.CAMERA))
     assert [*states, scene.daemon.state] == [State.STARTING, State.RUNNING]
     assert [record.message for record in caplog.records] == [
         "waiting: the drive base is not there",
@@ -133,33 +133,33 @@ def test_it_waits_for_the_camera_and_says_so(caplog: pytest.LogCaptureFixture) -
     ]
 
 
-def test_the_model_is_told_of_the_line_and_of_its_loss() -> None:
+def test_the_model_gets_the_line_and_its_loss() -> None:
     scene = Scene()
     scene.up()
-    assert scene.told(Sighting(50.0, 0.25)) == ["correction.response"]
+    assert scene.report(Sighting(50.0, 0.25)) == ["correction.response"]
     assert scene.log.entries[-1]["state"]["Eyes"] == {"state": "found", "variables": {"aside": 0.25}}
-    assert scene.told(Sighting(50.1, None)) == ["lost.response"]
+    assert scene.report(Sighting(50.1, None)) == ["lost.response"]
     assert scene.log.entries[-1]["state"]["Eyes"]["state"] == "nowhere"
-    assert scene.told(Sighting(50.2, -0.5)) == ["correction.response"]
+    assert scene.report(Sighting(50.2, -0.5)) == ["correction.response"]
 
 
-def test_the_model_is_told_of_the_cameras_faults_and_the_robot_is_not_stopped_for_them() -> None:
+def test_the_model_gets_the_cameras_faults_and_the_robot_is_not_stopped_for_them() -> None:
     scene = Scene()
     scene.up()
-    assert scene.told(DeviceDown(Device.CAMERA, "no picture for 0.5 s", 0.0, True)) == [
+    assert scene.report(DeviceDown(Device.CAMERA, "no picture for 0.5 s", 0.0, True)) == [
         "blind.response",
         "broken.response",
     ]
     # What only repeats it is no news.
-    assert scene.told(DeviceDown(Device.CAMERA, "gone", 1.0, False)) == []
-    assert scene.told(DeviceUp(Device.CAMERA)) == ["sees.response"]
+    assert scene.report(DeviceDown(Device.CAMERA, "gone", 1.0, False)) == []
+    assert scene.report(DeviceUp(Device.CAMERA)) == ["sees.response"]
     assert scene.daemon.state is State.RUNNING
 
 
 def test_a_lost_camera_is_no_lost_drive_base() -> None:
     scene = Scene()
     scene.up()
-    scene.told(DeviceDown(Device.CAMERA, "gone", 1.0, True))
+    scene.report(DeviceDown(Device.CAMERA, "gone", 1.0, True))
     assert (scene.daemon.state, scene.daemon.problem) == (State.RUNNING, "")
 
 
@@ -185,7 +185,7 @@ def check(configuration: Configuration, mapping: ChannelMapping) -> None:
     check_settings(configuration, mapping, Deployment.CONTROLLER)
 
 
-def test_a_line_that_nobody_tells_is_lost_is_refused() -> None:
+def test_a_line_whose_loss_no_message_reports_is_refused() -> None:
     with pytest.raises(AssemblyError, match=r"'correction' \('/line'\) is mapped to 'line', and no message reports a"):
         check(*mapped(lost="{channel: none}"))
     check(*mapped("execution: {max_age_s: {/line: 0.5}}\n", lost="{channel: none}"))

@@ -1,4 +1,4 @@
-"""The camera's worker, step by step, on a clock that a test sets: what is told of the line, and of the camera."""
+"""The camera's worker, step by step, on a clock that a test sets: what is reported of the line, and of the camera."""
 
 import numpy as np
 import pytest

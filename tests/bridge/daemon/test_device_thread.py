@@ -68,7 +68,7 @@ def test_a_thread_that_never_began_is_stopped_at_once() -> None:
     assert DeviceThread(worker, SYSTEM_HOST).stop(LIMIT_S)
 
 
-def test_a_step_that_hangs_is_told() -> None:
+def test_a_step_that_hangs_is_reported() -> None:
     worker = Worker()
     worker.blocks = threading.Event()
     worker.wake = lambda: None  # type: ignore[method-assign]

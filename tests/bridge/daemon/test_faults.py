@@ -1,8 +1,8 @@
-"""Every fault of a robot and its lines, on a whole bridge: within the stated time its wheels are told to stand still.
+"""Every fault of a robot and its lines, on a whole bridge: within the stated time its wheels are commanded to stop.
 
 The bridge is the real one with all its threads, on a virtual host; the devices are simulated at the other end of its
-serial lines, and what counts is what the simulated motors are told, when they hear it. The supervisor always wants to
-move. `acceptance/bridge/daemon/test_faults_in_real_time.py` is the witness on real lines. The times stand in
+serial lines, and what counts is what the simulated motors are commanded. The supervisor always wants to move.
+`acceptance/bridge/daemon/test_faults_in_real_time.py` is the witness on real lines. The times stand in
 docs/bridge-safety.md ("Every fault, measured at the motors"), whose table is read here.
 """
 
@@ -25,7 +25,7 @@ from robosc_simulated.virtual_host import VirtualHost
 from support.driven import LIMIT_S, PATIENT, Driven, driven
 from support.robot_faults import BASES, GRAVE, STATED_S, TABLE, Fault, answer_as, cases, speak, wires
 
-# A section `remote`; nothing listens there, the test itself is who can be told.
+# A section `remote`; nothing listens there, the test itself is the operator.
 REACHABLE = "{grpc_address: '127.0.0.1:1'}"
 # Enough for anything that goes on by itself to show.
 WHILE_S = 0.3
@@ -74,7 +74,7 @@ def test_a_base_that_is_silent_counts_as_lost_after_three_answers_that_do_not_co
     [
         ("opencr", 0.84),  # Those and a wait for a board that is slow, 0.65 s in all, and a last word.
         ("dynamixel", 0.48),  # The same, and a last word to both motors.
-        ("mavlink-rover", 2.0),  # Its last estimate holds for a second, and for another one it is told to disarm.
+        ("mavlink-rover", 2.0),  # Its last estimate holds for a second, and for another one it is asked to disarm.
     ],
 )
 def test_a_run_ends_so_soon_after_the_last_answer(base: str, limit_s: float) -> None:
@@ -88,7 +88,7 @@ def test_a_run_ends_so_soon_after_the_last_answer(base: str, limit_s: float) -> 
         assert bridge.host.monotonic() - begin_s == pytest.approx(limit_s, abs=0.06)
 
 
-def test_which_fault_a_motor_tells_is_told() -> None:
+def test_the_fault_that_a_motor_reports_is_named() -> None:
     with driven("dynamixel") as bridge:
         bridge.steady()
         bridge.robot.left.overload()
@@ -96,7 +96,7 @@ def test_which_fault_a_motor_tells_is_told() -> None:
         bridge.was_told("the motors report: overload")
 
 
-def test_a_voltage_that_is_out_of_range_is_told_and_stops_nothing() -> None:
+def test_a_voltage_that_is_out_of_range_is_reported_and_stops_nothing() -> None:
     with driven("dynamixel") as bridge:
         bridge.steady()
         bridge.robot.left.brown_out(14.5)
@@ -123,7 +123,7 @@ def test_a_disturbed_line_does_not_stop_the_wheels_for_good(base: str, wire: dic
 
 @pytest.mark.parametrize("base", BASES)
 @pytest.mark.parametrize("velocity", [(5.0, 0.0), (-5.0, 0.0), (0.0, 50.0), (5.0, -50.0)])
-def test_no_wheel_is_told_more_than_its_limit_nor_at_once(base: str, velocity: tuple[float, float]) -> None:
+def test_no_wheel_is_commanded_more_than_its_limit_nor_at_once(base: str, velocity: tuple[float, float]) -> None:
     linear_m_s2, angular_rad_s2, reach_s = 0.25, 2.0, 0.1
     safety = (
         f"{{linear_m_s: 0.1, angular_rad_s: 0.8, linear_acceleration_m_s2: {linear_m_s2}, "
@@ -132,17 +132,17 @@ def test_no_wheel_is_told_more_than_its_limit_nor_at_once(base: str, velocity: t
     with driven(base, velocity=velocity, safety=safety) as bridge:
         bridge.steady()
         half_m = bridge.limits.separation_m / 2
-        told = bridge.trace.told[1:]
-        for at_s, left_m_s, right_m_s in told:
+        commands = bridge.trace.told[1:]
+        for at_s, left_m_s, right_m_s in commands:
             linear_m_s, angular_rad_s = (left_m_s + right_m_s) / 2, (right_m_s - left_m_s) / 2 / half_m
             # Servos and OpenCR take whole steps: 0.8 mm/s of a wheel, and 0.01 m/s and 0.01 rad/s.
             assert abs(linear_m_s) <= 0.1 + 1e-3
             assert abs(angular_rad_s) <= 0.8 + 1e-2
             # Of what happened at the same speed before, the device hears a little later.
-            since_s = at_s - told[0][0] + reach_s
+            since_s = at_s - commands[0][0] + reach_s
             assert abs(linear_m_s) <= linear_m_s2 * since_s
             assert abs(angular_rad_s) <= angular_rad_s2 * since_s
-        fastest_m_s = max(abs(speed) for _, *wheels in told for speed in wheels)
+        fastest_m_s = max(abs(speed) for _, *wheels in commands for speed in wheels)
         assert fastest_m_s > 0.06
 
 
@@ -163,7 +163,7 @@ def test_motors_that_go_to_their_goals_slowly_are_no_fault_and_a_wheel_that_is_h
 @pytest.mark.parametrize(
     ("base", "voltage_v"), [("opencr", 11.4), ("opencr", 11.5), ("dynamixel", 6.9), ("mavlink-rover", 0.0)]
 )
-def test_a_battery_that_is_low_is_told_and_stops_nothing(base: str, voltage_v: float) -> None:
+def test_a_battery_that_is_low_is_reported_and_stops_nothing(base: str, voltage_v: float) -> None:
     with driven(base) as bridge:
         bridge.steady()
         for servo in (bridge.robot.left, bridge.robot.right):
@@ -236,9 +236,9 @@ def test_a_thread_that_is_halted_between_decision_and_writing_sends_no_old_veloc
         bridge.until(lambda: ends and _orders(bridge, base, ends[0]), "the first order after the gap")
         assert _orders(bridge, base, ends[0])[0]
         # What follows is decided anew, and begins at standstill.
-        told = len(bridge.trace.told)
+        before = len(bridge.trace.told)
         bridge.host.sleep(1.0)
-        assert all(max(map(abs, wheels)) < 0.05 for _, *wheels in bridge.trace.told[told : told + 1])
+        assert all(max(map(abs, wheels)) < 0.05 for _, *wheels in bridge.trace.told[before : before + 1])
 
 
 # The loop and the supervisor.
@@ -294,7 +294,7 @@ def test_an_exception_in_the_loop_stops_the_wheels(base: str, monkeypatch: pytes
 
 @pytest.mark.parametrize("is_off", [None, False])
 @pytest.mark.parametrize("is_button", [True, False])
-def test_what_is_stopped_stays_stopped_whatever_openCR_is_told_by_others(is_off: bool | None, is_button: bool) -> None:
+def test_what_is_stopped_stays_stopped_whatever_others_send_to_opencr(is_off: bool | None, is_button: bool) -> None:
     """Its buttons and its remote control move nothing without torque; with it, for half a second."""
     safety = "{}" if is_off is None else "{torque_off_on_operator_stop: false}"
     with driven("opencr", safety=safety) as bridge:
@@ -379,7 +379,7 @@ def test_an_operator_who_is_lost_stops_the_wheels_until_he_is_back() -> None:
             operator.join(LIMIT_S)
 
 
-# Where somebody can be told of it, the bridge stays; nothing moves before somebody says so.
+# Where an operator can learn of it, the bridge stays; nothing moves before somebody says so.
 
 
 def _ordered(bridge: Driven, command: OperatorCommand) -> str:
@@ -445,7 +445,7 @@ def test_a_bridge_that_is_killed_leaves_wheels_that_stop_by_themselves(base: str
     ("row", "happens", "problem"),
     [
         ("a rover is unplugged", lambda bridge: bridge.robot.base_line.disconnect(), "the drive base is lost"),
-        # It still tells that it moves.
+        # It still reports that it moves.
         ("a rover hears nothing", lambda bridge: wires(bridge, is_deaf=True), Reason.MOTOR_FAULT),
     ],
 )
@@ -457,7 +457,7 @@ def test_a_rover_that_is_not_reached_stops_by_itself(
         assert problem in bridge.ended()
 
 
-def test_whoever_arms_a_rover_is_told_how_long_it_goes_on_alone() -> None:
+def test_whoever_arms_a_rover_learns_how_long_it_goes_on_alone() -> None:
     with driven("mavlink-rover", remote=REACHABLE) as bridge:
         bridge.steady()
         for command in (OperatorCommand.STANDBY, OperatorCommand.START):
@@ -605,14 +605,14 @@ def _forbidden(robot: SimulatedTurtleBot3) -> Callable[[], object]:
     ],
     ids=["busy", "missing", "silent", "another id", "denied"],
 )
-def test_a_base_that_cannot_be_opened_is_told_once_and_tried_until_it_can(
+def test_a_base_that_cannot_be_opened_is_reported_once_and_tried_until_it_can(
     base: str, happens: Callable[[SimulatedTurtleBot3], Callable[[], object]], message: str
 ) -> None:
     fixed: list[Callable[[], object]] = []
     with driven(base, before=lambda robot: fixed.append(happens(robot))) as bridge:
         try:
             bridge.was_told(message)
-            # Two attempts more, at least, which nobody is told of.
+            # Two attempts more, at least, which are not reported.
             bridge.stays(2.5 * WHILE_S)
             bridge.was_told(message)
             assert bridge.state is State.STARTING
@@ -621,7 +621,7 @@ def test_a_base_that_cannot_be_opened_is_told_once_and_tried_until_it_can(
         bridge.moves()
 
 
-def test_another_baud_is_told_with_what_to_do() -> None:
+def test_another_baud_is_reported_with_what_to_do() -> None:
     def slow(robot: SimulatedTurtleBot3) -> None:
         for servo in (robot.left, robot.right):
             servo.table["baud rate"] = 1

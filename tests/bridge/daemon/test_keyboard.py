@@ -10,7 +10,7 @@ from robosc_bridge.daemon.keyboard import Keyboard
 LIMIT_S = 10.0
 
 
-def test_keys_are_told_one_by_one_and_the_terminal_is_as_before() -> None:
+def test_keys_are_read_one_by_one_and_the_terminal_is_as_before() -> None:
     host, terminal = pty.openpty()
     before = termios.tcgetattr(terminal)
     keys: queue.SimpleQueue[str] = queue.SimpleQueue()

@@ -1,4 +1,4 @@
-"""The layer in the daemon and the layer by itself are told the same, and must do the same, at random."""
+"""The layer in the daemon and the layer by itself get the same input, and must do the same, at random."""
 
 from collections.abc import Callable
 from typing import Any
@@ -139,7 +139,7 @@ class Twins:
         self.compare(live, lambda: self.twin.wait(seconds))
 
     def both(self, item: FromProgram, act: Callable[..., None], *arguments: Any) -> None:
-        """A program says something to the daemon, and the twin is told the same."""
+        """A program says something to the daemon, and the twin gets the same."""
 
         def say() -> None:
             self.scene.daemon.post(item)

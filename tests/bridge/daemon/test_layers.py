@@ -108,15 +108,15 @@ def program(scene: Scene) -> Connected:
     return Connected(scene, "an operator")
 
 
-def without_sensors(told: list[Any]) -> list[Any]:
-    return [item for item in told if not isinstance(item, PassedOn)]
+def without_sensors(messages: list[Any]) -> list[Any]:
+    return [item for item in messages if not isinstance(item, PassedOn)]
 
 
-def refused(told: list[Any]) -> list[str]:
-    return [item.why for item in told if isinstance(item, Refused)]
+def refused(messages: list[Any]) -> list[str]:
+    return [item.why for item in messages if isinstance(item, Refused)]
 
 
-def test_what_is_allowed_moves_the_wheels_and_what_is_not_is_told_to_who_asked(
+def test_what_is_allowed_moves_the_wheels_and_what_is_not_is_reported_to_its_sender(
     scene: Scene, program: Connected
 ) -> None:
     other = Connected(scene, "another")
@@ -261,7 +261,7 @@ def test_a_call_that_is_held_back_is_answered_by_default_at_once(scene: Scene, p
     ]
 
 
-def test_a_goal_is_taken_told_of_and_ends(scene: Scene, program: Connected) -> None:
+def test_a_goal_is_taken_reported_on_and_ends(scene: Scene, program: Connected) -> None:
     assert without_sensors(program.say(GoalRequested, "face", "g", {"angle": 20}))[0] == GoalTaken("g")
     scene.live(3.0, 2.0)
     assert program.of(FeedbackPassed)[0].goal_id == "g"

@@ -1,4 +1,4 @@
-"""One event log for all runs of a bridge: it tells where the model begins again, so that it can be checked."""
+"""One event log for all runs of a bridge: it says where the model begins again, so that it can be checked."""
 
 from pathlib import Path
 

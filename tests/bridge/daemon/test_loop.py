@@ -1,4 +1,4 @@
-"""The loop turn by turn, on a clock that the test sets: what the safety layer and the supervisor are told."""
+"""The loop turn by turn, on a clock that the test sets: what the safety layer and the supervisor get."""
 
 import math
 
@@ -55,7 +55,7 @@ def test_an_obstacle_stops_the_wheels_with_the_very_scan_that_shows_it(scene: Sc
     assert scene.hurries > hurries
 
 
-def test_it_turns_by_the_angle_that_is_asked_for_and_tells_when_it_has(scene: Scene) -> None:
+def test_it_turns_by_the_angle_that_is_asked_for_and_reports_its_end(scene: Scene) -> None:
     scene.up(0.3)
     scene.live(4.0, 0.3)
     assert scene.events().count("turn.request") >= 1
@@ -86,7 +86,7 @@ def test_a_silent_scanner_stops_the_wheels_and_they_go_on_when_it_is_back(scene:
     assert scene.out.linear_m_s == 0.1
 
 
-def test_a_scanner_that_is_unplugged_is_told_to_the_supervisor_once(scene: Scene) -> None:
+def test_a_scanner_that_is_unplugged_is_reported_to_the_supervisor_once(scene: Scene) -> None:
     scene.up()
     for is_first in (True, False, False):
         scene.daemon.post(DeviceDown(Device.SCANNER, "/dev/scanner: the line is gone", 0.25, is_first))
@@ -125,7 +125,9 @@ def test_a_notice_that_ends_by_itself_is_no_fault(scene: Scene) -> None:
     assert scene.daemon.state is State.RUNNING
 
 
-def test_why_nothing_moves_is_told_while_it_runs_and_not_before(scene: Scene, caplog: pytest.LogCaptureFixture) -> None:
+def test_why_nothing_moves_is_reported_while_it_runs_and_not_before(
+    scene: Scene, caplog: pytest.LogCaptureFixture
+) -> None:
     notice = SafetyNotice((Reason.SCAN_STALE, Reason.COMMAND_SILENT), ())
     scene.daemon.post(notice)
     scene.daemon.cycle()

@@ -111,9 +111,9 @@ def test_check_refuses_what_run_refuses(change: tuple[str, str], why: str, bridg
     text = file.read_text()
     assert change[0] in text
     file.write_text(text.replace(*change, 1))
-    told = [bridge(command, "--model", str(MODEL), "--config", str(file)) for command in ("check", "run")]
-    assert [done.returncode for done in told] == [2, 2]
-    lines = [[line for line in done.stderr.splitlines() if line.startswith("robosc-bridge: ")] for done in told]
+    results = [bridge(command, "--model", str(MODEL), "--config", str(file)) for command in ("check", "run")]
+    assert [done.returncode for done in results] == [2, 2]
+    lines = [[line for line in done.stderr.splitlines() if line.startswith("robosc-bridge: ")] for done in results]
     assert lines[0] == lines[1]
     assert why in lines[0][0]
 
@@ -141,14 +141,12 @@ def test_silent_steps_that_never_end_are_refused_unless_they_are_allowed(bridge:
         assert "to wait in standby" in allowed.stderr
 
 
-def test_what_a_server_made_is_kept_without_being_told_to(
-    bridge: Bridge, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_what_a_server_made_is_kept_unasked(bridge: Bridge, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("XDG_STATE_HOME", str(tmp_path / "state"))
     model, file = tmp_path / "r.rscd", tmp_path / "bridge.yaml"
     model.write_text('robot R { component C { incoming message go with identifier: "/go", type: none } }')
     file.write_text("robot: burger\ndrive: {driver: opencr, port: /dev/none}\nchannels: {/go: {channel: log}}\n")
-    # With a supervisor, the next thing that is wrong is told.
+    # With a supervisor, the next thing that is wrong is reported.
     command_line = ["run", "--standby", "--model", str(model), "--config", str(file), "--server"]
     with served() as address:
         first = bridge(*command_line, address)

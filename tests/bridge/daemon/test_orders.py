@@ -205,7 +205,7 @@ def test_a_stop_wins_over_what_was_ordered_before_it(command: OperatorCommand, b
     assert (len(answers), answers == [DONE]) == (1, is_done)
 
 
-def test_an_operators_stop_and_resume_are_told_to_the_model() -> None:
+def test_an_operators_stop_and_resume_are_events_of_the_model() -> None:
     scene = running()
     scene.order(OperatorCommand.STOP)
     scene.live(0.1, 2.0)
@@ -362,7 +362,7 @@ def test_a_reset_that_fails_or_never_ends_is_answered_and_the_fault_stays(proble
     assert scene.daemon.state is State.FAULT
 
 
-def test_motors_that_do_not_let_go_are_a_fault_that_the_order_is_told() -> None:
+def test_motors_that_do_not_let_go_are_a_fault_in_the_answer_to_the_order() -> None:
     scene = running()
     answers = scene.order(OperatorCommand.STANDBY)
     scene.daemon.cycle()

@@ -1,4 +1,4 @@
-"""The channel `grpc`: what the model and connected programs tell each other, and what makes no sense."""
+"""The channel `grpc`: what the model and connected programs send each other, and what makes no sense."""
 
 import math
 from typing import Any
@@ -97,11 +97,11 @@ def variable(scene: Scene, name: str) -> Any:
     return shown.components["World"]["variables"][name]
 
 
-def why(told: list[Any]) -> list[str]:
-    return [item.why for item in told if isinstance(item, Refused)]
+def why(messages: list[Any]) -> list[str]:
+    return [item.why for item in messages if isinstance(item, Refused)]
 
 
-def test_messages_go_both_ways_and_every_program_is_told() -> None:
+def test_messages_go_both_ways_and_reach_every_program() -> None:
     scene = helped()
     first, second = Connected(scene, "first"), Connected(scene, "second")
     first.say(MessageReceived, "/go", 1)
@@ -200,7 +200,7 @@ def fetching(scene: Scene) -> tuple[Connected, GoalMade]:
     return server, goal
 
 
-def test_a_goal_is_accepted_told_of_and_ended() -> None:
+def test_a_goal_is_accepted_reported_on_and_ended() -> None:
     scene = helped()
     server, goal = fetching(scene)
     assert (goal.name, goal.data) == ("fetch", {"x": 1.5, "name": "cup"})
@@ -273,7 +273,7 @@ def test_a_run_that_ends_takes_its_numbers_with_it() -> None:
     scene.daemon.post(OperatorCommand.STANDBY)
     server.told.clear()
     scene.live(0.3, 2.0)
-    # It had not been accepted: the program is told all the same that nobody wants it any more.
+    # It had not been accepted: the program learns all the same that nobody wants it any more.
     assert server.of(CancelMade) == [CancelMade("fetch", goal.number)]
     assert len(why(server.say(GoalAccepted, goal.number))) == 1
     scene.daemon.post(OperatorCommand.START)
@@ -381,7 +381,7 @@ def test_whatever_programs_say_the_bridge_goes_on(sayings: list[tuple[bool, tupl
         assert 0 <= variable(scene, "wanted") <= 9
 
 
-def test_who_sends_too_much_loses_it_and_is_told_and_others_are_not_held_up() -> None:
+def test_who_sends_too_much_loses_it_and_learns_it_and_others_are_not_held_up() -> None:
     scene = helped()
     loud, quiet = Connected(scene, "loud"), Connected(scene, "quiet")
     scene.daemon.cycle()

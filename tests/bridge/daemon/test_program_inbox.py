@@ -92,7 +92,7 @@ def test_one_message_waits_whatever_its_size() -> None:
     assert taken(box) == [large, Overflowed(sender)]
 
 
-def test_after_something_is_lost_nothing_is_kept_before_that_is_told() -> None:
+def test_after_something_is_lost_nothing_is_kept_before_that_is_reported() -> None:
     # Else a motion could come after the word that all has ended, and the stop that follows it be lost.
     box, sender, other = inbox(), program(), program("another")
     for number in range(MAXIMUM_WAITING + 1):

@@ -18,7 +18,7 @@ def test_a_promise_is_kept(promise: Promise) -> None:
     assert 0.0 <= took_s <= (promise.promised_s or GOES_ON_S)
 
 
-def test_a_promise_that_is_not_kept_is_told() -> None:
+def test_a_promise_that_is_not_kept_is_reported() -> None:
     (held,) = (each for each in PROMISES if each.base == "opencr" and each.fault.startswith("a motor is dead"))
     with pytest.raises(AssertionError, match=r"instead of 0\.300 s"):
         measured_s(replace(held, promised_s=0.3), random.Random(0))
@@ -27,7 +27,7 @@ def test_a_promise_that_is_not_kept_is_told() -> None:
         measured_s(replace(stops, promised_s=None), random.Random(0))
 
 
-def test_the_page_tells_every_promise_and_nothing_else() -> None:
+def test_the_page_lists_every_promise_and_nothing_else() -> None:
     rows = re.findall(r"^\| (.+) \|$", PAGE.read_text(encoding="utf-8").partition(HEAD)[2], re.MULTILINE)
     found = [tuple(row.split(" | ")) for row in rows]
     assert all(len(cells) == 6 and all(cells) for cells in found)

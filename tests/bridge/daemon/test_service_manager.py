@@ -47,67 +47,69 @@ def environment(manager: Manager, **more: str) -> dict[str, str]:
     return {"NOTIFY_SOCKET": manager.socket.getsockname(), "WATCHDOG_USEC": "9000000", "WATCHDOG_PID": "7", **more}
 
 
-def test_it_is_told_of_a_life(manager: Manager) -> None:
-    told = ServiceManager(lambda now_s: True, environment(manager), 7)
-    told.beat(100.0, "starting")
+def test_it_receives_the_states_of_a_life(manager: Manager) -> None:
+    service = ServiceManager(lambda now_s: True, environment(manager), 7)
+    service.beat(100.0, "starting")
     assert manager.heard() == ["STATUS=starting", "WATCHDOG=1"]
-    told.ready()
-    told.beat(102.9, "starting")
+    service.ready()
+    service.beat(102.9, "starting")
     assert manager.heard() == ["READY=1"]
-    told.beat(103.0, "running")
-    told.stopping()
-    told.close()
-    told.beat(200.0, "over")
+    service.beat(103.0, "running")
+    service.stopping()
+    service.close()
+    service.beat(200.0, "over")
     assert manager.heard() == ["STATUS=running", "WATCHDOG=1", "STOPPING=1"]
 
 
-def test_it_is_not_told_that_a_bridge_lives_whose_wheels_do_not(
+def test_no_sign_of_life_is_sent_of_a_bridge_whose_wheels_have_none(
     manager: Manager, caplog: pytest.LogCaptureFixture
 ) -> None:
     is_working = False
-    told = ServiceManager(lambda now_s: is_working, environment(manager), 7)
+    service = ServiceManager(lambda now_s: is_working, environment(manager), 7)
     for now_s in range(20):
-        told.beat(float(now_s), "running")
+        service.beat(float(now_s), "running")
     assert manager.heard() == ["STATUS=running"]
     assert len(caplog.messages) == 1
     is_working = True
-    told.beat(20.0, "running")
+    service.beat(20.0, "running")
     assert manager.heard() == ["WATCHDOG=1"]
-    told.close()
+    service.close()
 
 
 @pytest.mark.parametrize("more", [{"WATCHDOG_PID": "8"}, {"WATCHDOG_USEC": "0"}, {"WATCHDOG_USEC": "-1"}])
 def test_a_watchdog_of_another_process_or_none_is_not_fed(more: dict[str, str], manager: Manager) -> None:
-    told = ServiceManager(lambda now_s: True, environment(manager, **more), 7)
-    told.beat(100.0, "running")
-    told.ready()
+    service = ServiceManager(lambda now_s: True, environment(manager, **more), 7)
+    service.beat(100.0, "running")
+    service.ready()
     assert manager.heard() == ["STATUS=running", "READY=1"]
-    told.close()
+    service.close()
 
 
 def test_a_name_may_be_abstract() -> None:
     name = f"robosc-test-{id(object())}"
     manager = Manager("\0" + name)
-    told = ServiceManager(lambda now_s: True, {"NOTIFY_SOCKET": "@" + name}, 7)
-    told.ready()
+    service = ServiceManager(lambda now_s: True, {"NOTIFY_SOCKET": "@" + name}, 7)
+    service.ready()
     assert manager.heard() == ["READY=1"]
-    told.close()
+    service.close()
     manager.socket.close()
 
 
 def test_nobody_listens_and_nothing_happens(tmp_path: Path) -> None:
-    for told in (
+    for service in (
         ServiceManager(lambda now_s: True, {}, 7),
         ServiceManager(lambda now_s: True, {"NOTIFY_SOCKET": str(tmp_path / "gone"), "WATCHDOG_USEC": "1"}, 7),
     ):
-        told.ready()
-        told.beat(1.0, "running")
-        told.stopping()
-        told.close()
-        told.close()
+        service.ready()
+        service.beat(1.0, "running")
+        service.stopping()
+        service.close()
+        service.close()
 
 
-def test_a_bridge_tells_it_while_it_drives_and_that_it_ends(manager: Manager, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_bridge_notifies_it_while_it_drives_and_when_it_ends(
+    manager: Manager, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setenv("NOTIFY_SOCKET", manager.socket.getsockname())
     monkeypatch.setenv("WATCHDOG_USEC", "600000")
     monkeypatch.delenv("WATCHDOG_PID", raising=False)
@@ -126,7 +128,7 @@ def test_a_bridge_tells_it_while_it_drives_and_that_it_ends(manager: Manager, mo
 
 
 class Hanging:
-    """A drive base that hangs in its exchanges when it is told to: its clock goes on."""
+    """A drive base that hangs in its exchanges when it is set to: its clock goes on."""
 
     def __init__(self) -> None:
         self.now_s = 0.0

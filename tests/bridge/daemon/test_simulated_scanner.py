@@ -49,7 +49,7 @@ class Scene:
         """Let it work until something is so; how long that takes."""
         begin_s = self.time.monotonic()
         while not condition():
-            assert self.time.monotonic() - begin_s < limit_s, f"not within {limit_s} s; told: {self.reports}"
+            assert self.time.monotonic() - begin_s < limit_s, f"not within {limit_s} s; reports: {self.reports}"
             self.live(0.05)
         return self.time.monotonic() - begin_s
 
@@ -57,7 +57,7 @@ class Scene:
         return [item for item in self.reports if isinstance(item, DeviceDown)]
 
     def output(self, speed_m_s: float) -> tuple[Velocity, tuple[Reason, ...], tuple[Caution, ...]]:
-        """Return the output of the safety layer for a speed, with a drive base that does as it is told."""
+        """Return the output of the safety layer for a speed, with a drive base that does as commanded."""
         for _ in range(20):
             now_s = self.time.monotonic()
             self.safety.loop_cycled(now_s)

@@ -24,12 +24,12 @@ class Watched(Scene):
     def latest(self) -> Snapshot:
         return self.shown[-1]
 
-    def told(self) -> list[tuple[str, str]]:
+    def new_entries(self) -> list[tuple[str, str]]:
         entries = self.subscription.take().entries
         return [(entry["kind"], str(entry.get("what", entry.get("event")))) for entry in entries]
 
 
-def test_a_snapshot_tells_all_that_is_so() -> None:
+def test_a_snapshot_reports_all_that_is_so() -> None:
     scene = Watched()
     scene.up()
     shown = scene.latest
@@ -96,29 +96,29 @@ def test_a_fault_is_shown_with_its_problem() -> None:
     assert (scene.latest.reading, scene.latest.devices[Device.DRIVE]) == (None, False)
 
 
-def test_entries_of_the_log_and_of_the_bridge_are_told_and_the_log_knows_only_its_own() -> None:
+def test_entries_of_the_log_and_of_the_bridge_are_reported_and_the_log_knows_only_its_own() -> None:
     scene = Watched()
     scene.up()
-    assert {("event", "scan.response"), ("event", "drive.request"), ("state", "running")} <= set(scene.told())
+    assert {("event", "scan.response"), ("event", "drive.request"), ("state", "running")} <= set(scene.new_entries())
     scene.daemon.post(Order(OperatorCommand.STOP, "Ada", lambda why: None))
     scene.live(0.1, 2.0)
-    assert {("order", "stop (Ada)"), ("event", "stop.response")} <= set(scene.told())
+    assert {("order", "stop (Ada)"), ("event", "stop.response")} <= set(scene.new_entries())
     scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
     scene.live(0.1)
-    told = scene.told()
-    assert ("device", "drive: no answer") in told
-    assert ("state", "fault: the drive base is lost: no answer") in told
+    new_entries = scene.new_entries()
+    assert ("device", "drive: no answer") in new_entries
+    assert ("state", "fault: the drive base is lost: no answer") in new_entries
     assert {entry["kind"] for entry in scene.log.entries} <= {"event", "stop", "release", "unexpected"}
 
 
-def test_who_begins_to_look_later_is_told_all_the_same() -> None:
+def test_a_late_watcher_receives_all_the_same() -> None:
     """Also where no log is written: whether anybody wants entries is asked anew each time."""
     scene = Watched()
     scene.subscription.close()
     scene.log.is_active = False
     scene.up()
-    assert scene.told() == []
+    assert scene.new_entries() == []
     scene.subscription = scene.feed.subscribe(lambda: None)
     scene.scan(0.3)
     scene.daemon.cycle()
-    assert ("event", "scan.response") in scene.told()
+    assert ("event", "scan.response") in scene.new_entries()

@@ -90,9 +90,9 @@ def refusal(source: Source) -> str:
 
 def test_a_model_is_synthesized_here(tmp_path: Path) -> None:
     model = written(tmp_path)
-    told: list[str] = []
-    assert obtain(Source(model, CONTROLLER), told.append) == supervisor_of(model)
-    assert told == ["carrier.rscd: synthesis"]
+    messages: list[str] = []
+    assert obtain(Source(model, CONTROLLER), messages.append) == supervisor_of(model)
+    assert messages == ["carrier.rscd: synthesis"]
 
 
 def test_a_right_file_is_taken(tmp_path: Path) -> None:
@@ -185,9 +185,9 @@ def endless(tmp_path: Path) -> Path:
 def refused_unless_allowed(source: Source) -> None:
     problem = refusal(source)
     assert "silent steps never end (--allow-livelock overrides this)" in problem
-    told: list[str] = []
-    assert obtain(replace(source, allow_livelock=True), told.append)
-    assert "its silent steps may go on for ever" in told[-1]
+    messages: list[str] = []
+    assert obtain(replace(source, allow_livelock=True), messages.append)
+    assert "its silent steps may go on for ever" in messages[-1]
 
 
 def test_silent_steps_that_never_end_are_refused_of_a_model_and_a_file(endless: Path) -> None:
@@ -226,7 +226,7 @@ def test_they_are_refused_of_a_server_and_of_what_it_made_last(endless: Path, tm
     refused_unless_allowed(source)
 
 
-def test_a_robot_without_a_supervisor_is_told_so(tmp_path: Path) -> None:
+def test_a_robot_without_a_supervisor_is_reported(tmp_path: Path) -> None:
     text = """robot Stuck {
         component Base {
             incoming message drive with identifier: "/drive", type: double
@@ -277,10 +277,10 @@ def test_a_signed_file_is_taken_without_its_model_and_without_verification(
     signed: Signed, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delattr("robosc_bridge.daemon.supervisors.verify_supervisor_file")
-    told: list[str] = []
-    found = obtain(signed.source(signed.others, signed.ours), told.append)
+    messages: list[str] = []
+    found = obtain(signed.source(signed.others, signed.ours), messages.append)
     assert encode(found) == signed.file.read_bytes()
-    assert told == [f"{signed.file}: signed by {signed.ours}"]
+    assert messages == [f"{signed.file}: signed by {signed.ours}"]
 
 
 def test_a_signature_that_is_not_trusted_is_none(signed: Signed, tmp_path: Path) -> None:
@@ -289,10 +289,10 @@ def test_a_signature_that_is_not_trusted_is_none(signed: Signed, tmp_path: Path)
     assert "the model that it is checked against is missing" in refusal(signed.source())
     # With its model, the verifier decides.
     written(tmp_path)
-    told: list[str] = []
-    obtain(signed.source(signed.others), told.append)
-    assert "which is not a trusted key: it is verified instead" in told[0]
-    assert "verification against carrier.rscd" in told[1]
+    messages: list[str] = []
+    obtain(signed.source(signed.others), messages.append)
+    assert "which is not a trusted key: it is verified instead" in messages[0]
+    assert "verification against carrier.rscd" in messages[1]
     signed.signature.unlink()
     assert obtain(signed.source(signed.ours)) == supervisor_of(tmp_path / "carrier.rscd")
 
@@ -369,9 +369,9 @@ def test_what_a_server_makes_is_checked_kept_and_taken_again_without_it(tmp_path
         source = Source(model, CONTROLLER, address, kept)
         assert obtain(source) == supervisor_of(model)
     (file,) = kept.iterdir()
-    told: list[str] = []
-    assert obtain(source, told.append) == supervisor_of(model)
-    assert any("what it made last is taken" in text for text in told)
+    messages: list[str] = []
+    assert obtain(source, messages.append) == supervisor_of(model)
+    assert any("what it made last is taken" in text for text in messages)
     # Another model has none.
     other = Source(written(tmp_path, GATE.replace("0.2", "0.3"), "other"), CONTROLLER, address, kept)
     assert "none is kept of an earlier start" in refusal(other)
@@ -433,7 +433,7 @@ def test_a_folder_that_may_not_be_looked_into_holds_nothing(tmp_path: Path, monk
     assert "none is kept of an earlier start" in problem
 
 
-def test_what_a_server_refuses_is_told(tmp_path: Path) -> None:
+def test_what_a_server_refuses_is_reported(tmp_path: Path) -> None:
     with served() as address:
         assert "x.rscd:1:7: error" in refusal(Source(written(tmp_path, "robot {", "x"), CONTROLLER, address))
 

@@ -230,7 +230,7 @@ def test_prometheus_reads_what_the_bridge_measures() -> None:
     assert samples["robosc_bridge_stopped", "SCAN_STALE"] == 1.0
     assert samples["robosc_bridge_device_up", "scanner"] == 0.0
     assert samples["robosc_bridge_overruns_total",] == 4.0
-    # Every second bound is told.
+    # Every second bound is exported.
     buckets = {
         key[2]: value
         for key, value in samples.items()
@@ -251,7 +251,7 @@ def test_metrics_are_refused_where_they_may_not_be(address: str) -> None:
         MetricsEndpoint(daemon.feed, address)
 
 
-def test_an_address_that_is_taken_is_told() -> None:
+def test_an_address_that_is_taken_is_reported() -> None:
     with FakeDaemon() as daemon:
         first = MetricsEndpoint(daemon.feed, "127.0.0.1:0")
         first.start()

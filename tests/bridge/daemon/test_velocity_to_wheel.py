@@ -109,30 +109,30 @@ def _measured(base: str, profile: str) -> tuple[list[float], Latency]:
         for number in range(COMMANDS):
             command(Velocity(0.0, 0.5), 0.3 + number * 0.00037)
             command(STANDSTILL, 0.2)
-        (told,) = [one for one in timing.figures().latencies if one.name == "scan_to_wheel"]
+        (reported,) = [one for one in timing.figures().latencies if one.name == "scan_to_wheel"]
         thread.stop(5.0)
-    return found, told
+    return found, reported
 
 
 @pytest.mark.parametrize("profile", ["ideal", "typical"])
 def test_a_command_reaches_opencr_at_once_also_during_an_exchange(profile: str) -> None:
-    found, told = _measured("opencr", profile)
-    assert (len(found), told.count) == (COMMANDS, 2 * COMMANDS)
+    found, reported = _measured("opencr", profile)
+    assert (len(found), reported.count) == (COMMANDS, 2 * COMMANDS)
     assert max(found) == pytest.approx(0.0, abs=1e-9)
-    assert told.max_s == pytest.approx(0.0, abs=1e-9)
+    assert reported.max_s == pytest.approx(0.0, abs=1e-9)
 
 
 @pytest.mark.parametrize("profile", ["ideal", "typical"])
 def test_a_command_to_servos_waits_for_the_answers_that_are_on_the_bus(profile: str) -> None:
     limit_s = READ_S + PROFILES[profile].ftdi_s
-    found, told = _measured("dynamixel", profile)
-    assert (len(found), told.count) == (COMMANDS, 2 * COMMANDS)
+    found, reported = _measured("dynamixel", profile)
+    assert (len(found), reported.count) == (COMMANDS, 2 * COMMANDS)
     # It is not the end of the exchange, which comes later.
     assert limit_s / 3 < max(found) <= limit_s + 1e-6
-    assert max(found) <= told.max_s + 1e-6 <= limit_s + 2e-6
+    assert max(found) <= reported.max_s + 1e-6 <= limit_s + 2e-6
 
 
 def test_a_target_is_sent_to_a_rover_at_once() -> None:
-    _, told = _measured("mavlink-rover", "ideal")
-    assert told.count == 2 * COMMANDS
-    assert told.max_s == pytest.approx(0.0, abs=1e-9)
+    _, reported = _measured("mavlink-rover", "ideal")
+    assert reported.count == 2 * COMMANDS
+    assert reported.max_s == pytest.approx(0.0, abs=1e-9)

@@ -80,7 +80,7 @@ class SafetyGate:
 
 
 class Base:
-    """A drive base that remembers what it is told, and fails where a test says."""
+    """A drive base that remembers what it is commanded, and fails where a test says."""
 
     limits = DriveLimits(0.2, 2.0, 0.2)
 
@@ -306,7 +306,7 @@ def test_a_velocity_that_has_not_gone_out_when_the_base_fails_does_not_count() -
     assert scene.scan_to_wheel().count == 0
 
 
-def test_of_a_drive_base_that_does_not_tell_the_end_of_the_exchange_counts(scene: Scene) -> None:
+def test_the_end_of_the_exchange_counts_for_a_drive_base_that_reports_no_time(scene: Scene) -> None:
     scene.up()
     for is_torque_wanted, count in ((False, 0), (True, 1)):
         scene.gate.next = Output(FORWARD, is_torque_wanted)
@@ -446,14 +446,14 @@ def test_a_reset_is_done_once_before_the_next_exchange(scene: Scene) -> None:
     scene.worker.reset()
     scene.step()
     assert scene.taken() == ["reset", ("torque", True), ("exchange", STANDSTILL)]
-    # When it is told, it is known how the motors are.
+    # When it is reported, it is known how the motors are.
     assert scene.reports[0] == scene.gate.readings[-1]
     assert scene.reports[1] == ResetDone()
     scene.step()
     assert scene.taken() == [("exchange", STANDSTILL)]
 
 
-def test_a_reset_that_fails_is_told_with_its_reason(scene: Scene) -> None:
+def test_a_reset_that_fails_is_reported_with_its_reason(scene: Scene) -> None:
     scene.up()
     scene.worker.reset()
     scene.base.failing["reset"] = DeviceFaultError("still too hot")
@@ -560,13 +560,14 @@ def test_a_turn_that_shows_nothing_is_none_for_safety(turning: ScannerScene, val
     turning.step()
     assert turning.reports == ([shown] if counts else [])
     assert turning.gate.scans == ([100.1] if counts else [])
+    assert (turning.gate.ranges_m is shown.ranges_m) is counts
 
 
-def test_a_silent_scanner_is_told_once_and_its_first_turn_again(turning: ScannerScene) -> None:
+def test_a_silent_scanner_is_reported_once_and_its_first_turn_again(turning: ScannerScene) -> None:
     for _ in range(8):
         turning.step()
-    told = [item for item in turning.reports if isinstance(item, DeviceDown)]
-    assert told == [DeviceDown(Device.SCANNER, "no full revolution with valid ranges for 0.6 s", 0.0, is_first=True)]
+    losses = [item for item in turning.reports if isinstance(item, DeviceDown)]
+    assert losses == [DeviceDown(Device.SCANNER, "no full revolution with valid ranges for 0.6 s", 0.0, is_first=True)]
     turning.reports.clear()
     turning.scanner.coming = [scan(turning.clock.now_s)]
     turning.step()
@@ -602,14 +603,7 @@ def test_a_covered_scanner_that_turns_is_not_restarted(turning: ScannerScene) ->
     assert [type(item) for item in turning.reports] == [DeviceDown]
 
 
-def test_what_a_turn_shows_is_told_to_the_safety_layer(turning: ScannerScene) -> None:
-    shown = replace(scan(100.1), ranges_m=(*[1.0] * 180, *[math.nan] * 180))
-    turning.scanner.coming = [shown]
-    turning.step()
-    assert turning.gate.ranges_m == shown.ranges_m
-
-
-def test_damaged_frames_are_told_with_their_numbers_once(
+def test_damaged_frames_are_reported_with_their_numbers_once(
     turning: ScannerScene, caplog: pytest.LogCaptureFixture
 ) -> None:
     counters = turning.scanner.counters

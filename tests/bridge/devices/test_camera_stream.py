@@ -90,7 +90,7 @@ def test_one_who_sends_without_end_does_not_hold_it_up(served: Served, monkeypat
         assert time.monotonic() < end_s
 
 
-def test_what_are_no_pictures_is_told(served: Served) -> None:
+def test_what_are_no_pictures_is_reported(served: Served) -> None:
     served.end.sendall(b"HTTP/1.1 400 Bad Request\r\nContent-Length: 0\r\n\r\n")
     with pytest.raises(BridgeError, match=f"{served.path}: the stream does not hold grey pictures"):
         served.camera.receive(LIMIT_S)
@@ -113,7 +113,7 @@ def test_whoever_ends_is_gone_and_can_come_again(served: Served) -> None:
     again.close()
 
 
-def test_a_socket_that_is_missing_or_nobody_serves_is_told(tmp_path: Path) -> None:
+def test_a_socket_that_is_missing_or_nobody_serves_is_reported(tmp_path: Path) -> None:
     for path in (tmp_path / "none", tmp_path / "dead"):
         if path.name == "dead":
             with socket.socket(socket.AF_UNIX) as listener:
@@ -170,7 +170,7 @@ def test_its_process_ends_with_the_bridge_even_while_it_hangs(tmp_path: Path) ->
     camera.close()
 
 
-def test_a_process_that_is_killed_is_told(tmp_path: Path) -> None:
+def test_a_process_that_is_killed_is_reported(tmp_path: Path) -> None:
     camera = make_camera(str(film(tmp_path / "film.avi", 300, 20.0)))
     camera.open()
     process_of(camera).kill()
@@ -179,7 +179,7 @@ def test_a_process_that_is_killed_is_told(tmp_path: Path) -> None:
     camera.close()
 
 
-def test_what_is_wrong_with_a_camera_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_what_is_wrong_with_a_camera_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(LineMissingError, match="video7: there is no such camera"):
         make_camera(str(tmp_path / "video7")).open()
     text = tmp_path / "text"
@@ -196,7 +196,7 @@ def test_what_is_wrong_with_a_camera_is_told(tmp_path: Path, monkeypatch: pytest
         make_camera(str(text)).open()
 
 
-def test_a_process_that_cannot_be_started_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_process_that_cannot_be_started_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sys, "executable", str(tmp_path / "none"))
     with pytest.raises(LineError, match="no process for the camera could be started"):
         make_camera("/dev/null").open()

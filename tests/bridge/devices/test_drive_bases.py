@@ -59,7 +59,7 @@ def test_it_opens_at_a_standstill_with_torque_off(any_bench: Rig) -> None:
 
 @pytest.mark.parametrize("robot", sorted(ROBOTS))
 @pytest.mark.parametrize("kind", KINDS)
-def test_the_wheels_turn_as_told_and_the_odometry_follows_the_world(kind: str, robot: str) -> None:
+def test_the_wheels_turn_as_commanded_and_the_odometry_follows_the_world(kind: str, robot: str) -> None:
     with rig(kind, robot) as bench:
         bench.start()
         velocity = Velocity(0.15, 0.6)
@@ -145,7 +145,7 @@ def test_readings_are_of_now(bench: Rig) -> None:
     assert begin_s <= reading.time_s <= bench.host.monotonic()
 
 
-def test_it_tells_of_its_battery(bench: Rig) -> None:
+def test_it_reports_its_battery(bench: Rig) -> None:
     bench.base.open()
     assert bench.base.exchange(FORWARD).battery_v == pytest.approx(12.0)
 
@@ -180,7 +180,7 @@ def test_a_robot_that_stood_still_in_the_meantime_is_where_it_was(any_bench: Rig
 # Faults of the line.
 
 
-def test_silence_is_told_in_time_and_a_driver_that_dies_stops_the_wheels(bench: Rig) -> None:
+def test_silence_is_reported_in_time_and_a_driver_that_dies_stops_the_wheels(bench: Rig) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)
     bench.hurry()
@@ -193,7 +193,7 @@ def test_silence_is_told_in_time_and_a_driver_that_dies_stops_the_wheels(bench: 
     assert bench.stops_within(0.7)
 
 
-def test_an_unplugged_line_is_told_at_once_and_can_be_plugged_in_again(bench: Rig) -> None:
+def test_an_unplugged_line_is_reported_at_once_and_can_be_plugged_in_again(bench: Rig) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)
     bench.robot.base_line.disconnect()
@@ -313,7 +313,7 @@ def test_noise_leads_to_a_right_reading_or_to_none(bench: Rig, fault: str, share
         with contextlib.suppress(DeviceSilentError):
             reading = bench.base.exchange(Velocity(0.1, 0.0))
             readings += 1
-            # Forward only, never further than the world's robot, never faster than told.
+            # Forward only, never further than the world's robot, never faster than commanded.
             assert last_m - 1e-9 <= reading.pose.x_m <= bench.robot.world.pose[0] + 1e-4
             assert all(-0.002 <= speed <= 0.102 for speed in reading.wheels_m_s)
             last_m = reading.pose.x_m
@@ -339,7 +339,7 @@ def test_answers_that_are_late_for_a_while_are_never_taken_for_new_ones(bench: R
                 assert bench.host.monotonic() < end_s
                 continue
             break
-        # What OpenCR tells is at most 20 ms old, and the wheels slip nowhere.
+        # What OpenCR reports is at most 20 ms old, and the wheels slip nowhere.
         assert before_m - 0.1 * 0.045 <= reading.pose.x_m <= bench.robot.world.pose[0] + 1e-4
 
 
@@ -351,14 +351,14 @@ def test_another_id_is_not_its_device(bench: Rig) -> None:
         bench.base.open()
 
 
-def test_a_busy_port_is_told_as_such(bench: Rig) -> None:
+def test_a_busy_port_is_reported_as_such(bench: Rig) -> None:
     bench.base.open()
     other = make_drive_base(bench.kind, path=bench.robot.base_path, robot=ROBOTS["burger"], host=bench.host)
     with pytest.raises(Exception, match="another program uses this port"):
         other.open()
 
 
-def test_wheels_that_are_held_are_told(bench: Rig) -> None:
+def test_wheels_that_are_held_are_reported(bench: Rig) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)
     bench.robot.left.block_wheel()

@@ -1,4 +1,4 @@
-"""Options of drivers: as a file can say them, and as the page tells them."""
+"""Options of drivers: as a file can say them, and as the page lists them."""
 
 import inspect
 import json
@@ -23,7 +23,7 @@ BUILT_IN = [
 ]
 
 
-def _told(name: str) -> dict[str, Any]:
+def _documented(name: str) -> dict[str, Any]:
     """Options and defaults of the page's section."""
     section = next(text for text in re.split(r"^## ", PAGE, flags=re.MULTILINE) if f"`{name}`" in text.split("\n")[0])
     return {
@@ -33,16 +33,18 @@ def _told(name: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize(("kind", "name"), BUILT_IN)
-def test_the_page_tells_every_option_and_its_default(kind: Kind, name: str) -> None:
+def test_the_page_lists_every_option_and_its_default(kind: Kind, name: str) -> None:
     driver = find_driver(kind, name)
     types = option_types(driver)
     assert types is not None
     parameters = inspect.signature(driver.make).parameters
-    told = _told(name)
+    documented = _documented(name)
     if (kind, name) == (Kind.RANGE_SCANNER, "mavlink-rover"):
-        told = {option: told[option] for option in list(told)[: list(told).index("motion_limit_s")]}
+        documented = {
+            option: documented[option] for option in list(documented)[: list(documented).index("motion_limit_s")]
+        }
     # As JSON has them: tuples are lists there.
-    assert {option: json.loads(json.dumps(parameters[option].default)) for option in types} == told
+    assert {option: json.loads(json.dumps(parameters[option].default)) for option in types} == documented
 
 
 def test_options_are_converted_to_what_the_driver_takes() -> None:
@@ -61,7 +63,7 @@ def test_options_are_converted_to_what_the_driver_takes() -> None:
         ("mavlink-rover", {"signing": "key"}, "no option 'signing'; there is .*signing_key"),
     ],
 )
-def test_what_a_driver_does_not_take_is_told(name: str, options: dict[str, Any], problem: str) -> None:
+def test_what_a_driver_does_not_take_is_reported(name: str, options: dict[str, Any], problem: str) -> None:
     with pytest.raises(DriverOptionError, match=problem):
         checked_options(find_driver(Kind.DRIVE_BASE, name), options)
 

@@ -50,7 +50,7 @@ def test_drive_bases_are_listed() -> None:
     assert "U2D2" in infos["dynamixel"]
 
 
-def test_an_unknown_name_tells_the_nearest_or_all() -> None:
+def test_an_unknown_name_suggests_the_nearest_or_all() -> None:
     with pytest.raises(UnknownDriverError, match=r"unknown drive base 'open-cr'; did you mean 'opencr'\?"):
         make_drive_base("open-cr")
     with pytest.raises(UnknownDriverError, match=r"unknown drive base 'x'; there is .*dynamixel, .*opencr"):

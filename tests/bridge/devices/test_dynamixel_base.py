@@ -1,4 +1,4 @@
-"""Two servos as wheels: what they are told byte for byte, and what can be wrong with them."""
+"""Two servos as wheels: what they are sent byte for byte, and what can be wrong with them."""
 
 import logging
 from collections.abc import Callable, Iterable, Iterator
@@ -179,7 +179,7 @@ def test_arguments_out_of_their_range_are_refused(arguments: dict[str, object]) 
         DynamixelBase("/dev/none", BURGER, **arguments)  # type: ignore[arg-type]
 
 
-def test_a_wrong_voltage_is_told_and_stops_nothing(bench: Rig) -> None:
+def test_a_wrong_voltage_is_reported_and_stops_nothing(bench: Rig) -> None:
     bench.start()
     bench.robot.right.brown_out(5.8)
     reading = bench.drive(FORWARD, 0.3)
@@ -188,7 +188,7 @@ def test_a_wrong_voltage_is_told_and_stops_nothing(bench: Rig) -> None:
     assert reading.battery_v == pytest.approx(5.8)
 
 
-def test_an_overloaded_motor_is_restarted_when_told_to_and_has_not_jumped(bench: Rig) -> None:
+def test_an_overloaded_motor_is_restarted_when_asked_to_and_has_not_jumped(bench: Rig) -> None:
     bench.robot.left.set_position(4096 + 1000)
     bench.start()
     bench.drive(FORWARD, 0.3)
@@ -220,7 +220,7 @@ def test_a_hot_motor_is_not_restarted_before_it_is_cool(bench: Rig) -> None:
     assert bench.drive().faults == frozenset()
 
 
-def test_an_error_that_a_restart_does_not_end_is_told(bench: Rig) -> None:
+def test_an_error_that_a_restart_does_not_end_is_reported(bench: Rig) -> None:
     bench.start()
     bench.robot.left.brown_out(5.8)
     bench.robot.left.overload()
@@ -228,7 +228,7 @@ def test_an_error_that_a_restart_does_not_end_is_told(bench: Rig) -> None:
         bench.base.reset()
 
 
-def test_hardware_errors_from_before_are_told_when_it_is_opened(bench: Rig) -> None:
+def test_hardware_errors_from_before_are_reported_when_it_is_opened(bench: Rig) -> None:
     bench.robot.right.overload()
     bench.base.open()
     assert bench.drive(FORWARD).faults == {MotorFault.OVERLOAD}
@@ -237,7 +237,7 @@ def test_hardware_errors_from_before_are_told_when_it_is_opened(bench: Rig) -> N
     assert bench.drive(FORWARD).faults == frozenset()
 
 
-def test_a_pause_that_trips_the_watchdogs_is_told_and_nothing_goes_on_by_itself(bench: Rig) -> None:
+def test_a_pause_that_trips_the_watchdogs_is_reported_and_nothing_goes_on_by_itself(bench: Rig) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)
     bench.host.sleep(0.7)
@@ -356,7 +356,7 @@ def test_a_motor_that_shuts_down_stops_the_other_one_at_once(bench: Rig, provoke
         bench.base.set_torque(True)
 
 
-def test_a_watchdog_that_trips_unseen_is_told_soon(bench: Rig) -> None:
+def test_a_watchdog_that_trips_unseen_is_reported_soon(bench: Rig) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)
     bench.robot.right.table["bus watchdog"] = 0xFF
@@ -365,7 +365,7 @@ def test_a_watchdog_that_trips_unseen_is_told_soon(bench: Rig) -> None:
     assert bench.host.monotonic() - begin_s < 0.3
 
 
-def test_torque_that_is_lost_without_a_word_is_told_soon(bench: Rig) -> None:
+def test_torque_that_is_lost_without_a_word_is_reported_soon(bench: Rig) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)
     bench.robot.right.write(64, b"\0")
@@ -386,17 +386,17 @@ def test_a_motor_that_restarts_in_motion_has_not_jumped_and_stops_both(turns: in
         bench.drive(FORWARD, 0.3)
         bench.hurry()
         bench.robot.left.reboot()
-        told_at_s = bench.host.monotonic()
+        sent_at_s = bench.host.monotonic()
         with pytest.raises(DeviceSilentError, match=r"motor 1 \(left\)"):
             bench.drive(FORWARD, 1.0)
-        assert bench.host.monotonic() - told_at_s < 0.3
+        assert bench.host.monotonic() - sent_at_s < 0.3
         assert bench.stops_within(0.2)
         reading = None
         while reading is None:
             try:
                 reading = bench.base.exchange(FORWARD)
             except DeviceSilentError:
-                assert bench.host.monotonic() - told_at_s < 5.0
+                assert bench.host.monotonic() - sent_at_s < 5.0
                 assert bench.goals_rad_s() == (0.0, 0.0)
         assert MotorFault.TORQUE_LOST in reading.faults
         assert not reading.is_torque_on

@@ -36,7 +36,7 @@ def test_published_and_enforced_limits() -> None:
 
 
 @given(ANY, ANY, ROBOT, st.integers(1, 1023))
-def test_no_wheel_is_told_more_than_its_servo_takes(
+def test_no_wheel_is_commanded_more_than_its_servo_takes(
     linear: float, angular: float, robot: Robot, limit_raw: int
 ) -> None:
     goals = _goals(Velocity(linear, angular), robot, limit_raw)
@@ -84,7 +84,7 @@ def test_opencr_makes_nothing_of_it_that_a_servo_refuses(linear: float, angular:
 
 
 @given(st.floats(-0.19, 0.19), st.floats(-0.2, 0.2))
-def test_opencr_is_told_the_nearest_words_where_nothing_limits(linear: float, angular: float) -> None:
+def test_opencr_gets_the_nearest_words_where_nothing_limits(linear: float, angular: float) -> None:
     words = opencr_words(Velocity(linear, angular), BURGER.limits(265), BURGER.wheel_separation_m)
     if max(map(abs, wheel_speeds(Velocity(abs(linear) + 0.005, abs(angular) + 0.005), 0.16))) < 0.2097:
         assert words == (round(linear * 100), round(angular * 100))

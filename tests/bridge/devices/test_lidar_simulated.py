@@ -108,7 +108,7 @@ def test_what_is_beyond_the_sensors_reach_is_unknown(name: str) -> None:
 
 
 @each_lidar
-def test_a_covered_one_tells_scans_without_a_range(name: str) -> None:
+def test_a_covered_one_reports_scans_without_a_range(name: str) -> None:
     with scene(name) as seen:
         seen.robot.scanner.is_covered = True
         seen.lidar.open()
@@ -118,7 +118,7 @@ def test_a_covered_one_tells_scans_without_a_range(name: str) -> None:
 
 
 @each_lidar
-def test_a_slow_motor_tells_it(name: str) -> None:
+def test_a_slow_motor_reports_it(name: str) -> None:
     with scene(name) as seen:
         seen.robot.scanner.set_speed(0.5)
         seen.lidar.open()
@@ -169,7 +169,7 @@ def test_bytes_that_come_one_by_one_are_the_same_scan(name: str) -> None:
 
 
 @each_lidar
-def test_a_stalled_one_tells_nothing_and_goes_on_without_a_mixture(name: str) -> None:
+def test_a_stalled_one_reports_nothing_and_goes_on_without_a_mixture(name: str) -> None:
     with scene(name) as seen:
         seen.lidar.open()
         assert seen.scans(0.5)

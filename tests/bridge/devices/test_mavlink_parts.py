@@ -64,11 +64,11 @@ def test_long_texts_are_joined_and_lost_pieces_end_them() -> None:
     begin, middle, end = Text(2, b"a" * 50, 7, 0), Text(2, b"b" * 50, 7, 1), Text(2, b"", 7, 2)
     state = _after(ROVER, begin, middle)
     assert state.texts == ()
-    assert [told.content.text for told in _after(end, state=state).texts] == ["a" * 50 + "b" * 50]
+    assert [report.content.text for report in _after(end, state=state).texts] == ["a" * 50 + "b" * 50]
     # Another one begins before it has ended.
     other = _after(Text(2, b"c" * 50, 8, 0), Text(2, b"d", 8, 1), state=state)
-    assert [told.content.text for told in other.texts] == ["c" * 50 + "d"]
-    assert [told.content.text for told in _after(*[Text(2, b"e", 0, 0)] * 20, state=state).texts] == ["e"] * 8
+    assert [report.content.text for report in other.texts] == ["c" * 50 + "d"]
+    assert [report.content.text for report in _after(*[Text(2, b"e", 0, 0)] * 20, state=state).texts] == ["e"] * 8
 
 
 def test_endless_texts_have_an_end() -> None:
@@ -85,10 +85,10 @@ def test_a_clock_that_goes_back_is_a_restart_and_an_overtaken_packet_is_none() -
 def test_an_estimate_is_as_old_as_its_older_part() -> None:
     state = _after(ROVER, Attitude(1.0, math.pi / 2, 0.3))
     assert estimate(state) is None
-    told = estimate(_after(LocalPosition(1.0, 2.0, 3.0, 0.1, 0.4), state=state))
-    assert told is not None
-    assert told.time_s == 0.0
-    assert (told.content.linear_m_s, told.content.angular_rad_s) == pytest.approx((0.4, 0.3))
+    report = estimate(_after(LocalPosition(1.0, 2.0, 3.0, 0.1, 0.4), state=state))
+    assert report is not None
+    assert report.time_s == 0.0
+    assert (report.content.linear_m_s, report.content.angular_rad_s) == pytest.approx((0.4, 0.3))
     motion = MotionEstimate(1.0, 2.0, 0.0, 0.0, 0.0)
     place = LocalPosition(1.0, 2.0, 3.0, 0.1, 0.4)
     both = _after(None, motion, place, state=state)
@@ -159,13 +159,13 @@ def test_no_time_is_used_twice(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) 
 
 
 @pytest.mark.parametrize("key", [b"", b"x" * 31, b"zz" * 32, b"00" * 31])
-def test_a_key_of_another_length_is_told(tmp_path: Path, key: bytes) -> None:
+def test_a_key_of_another_length_is_reported(tmp_path: Path, key: bytes) -> None:
     (tmp_path / "key").write_bytes(key)
     with pytest.raises(SigningError, match="is 32 bytes, or 64 hexadecimal digits, not "):
         Signing(tmp_path / "key").begin()
 
 
-def test_a_missing_key_and_a_time_that_cannot_be_kept_are_told(tmp_path: Path) -> None:
+def test_a_missing_key_and_a_time_that_cannot_be_kept_are_reported(tmp_path: Path) -> None:
     with pytest.raises(SigningError, match="cannot be read: No such file"):
         Signing(tmp_path / "none").begin()
     (tmp_path / "key").write_text("00" * 32 + "\n")

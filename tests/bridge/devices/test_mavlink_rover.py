@@ -2,23 +2,14 @@
 
 import pytest
 
-from robosc_bridge.devices.interface import (
-    STANDSTILL,
-    DriveBase,
-    Velocity,
-)
+from robosc_bridge.devices.interface import STANDSTILL, DriveBase, Velocity
 from robosc_bridge.devices.mavlink_odometry import estimate
 from robosc_bridge.driver_registry import make_drive_base, make_range_scanner
-from robosc_bridge.errors import (
-    DeviceError,
-    DeviceSilentError,
-    LineMissingError,
-    WrongDeviceError,
-)
+from robosc_bridge.errors import DeviceError, DeviceSilentError, LineMissingError, WrongDeviceError
 from support.rovers import BODY, FORWARD, POSE, Bench, rig
 
 
-def test_a_missing_port_is_told() -> None:
+def test_a_missing_port_is_reported() -> None:
     base: DriveBase = make_drive_base("mavlink-rover", path="/dev/none", robot=BODY)
     with pytest.raises(LineMissingError, match="/dev/none: there is no such port"):
         base.open()
@@ -27,7 +18,7 @@ def test_a_missing_port_is_told() -> None:
         base.exchange(FORWARD)
 
 
-def test_it_goes_where_it_is_told_in_the_worked_packets_fields(bench: Bench) -> None:
+def test_it_goes_where_the_fields_of_the_worked_packets_send_it(bench: Bench) -> None:
     bench.start()
     bench.drive(Velocity(0.1, -0.5), 0.05)
     values = bench.rover.targets[-1]
@@ -90,7 +81,7 @@ def test_a_velocity_counts_as_written_when_the_rover_was_sent_it(bench: Bench) -
     assert [round(target["vx"], 2) for target in bench.rover.targets[-3:]] == [0.1, 0.11, 0.12]
 
 
-def test_a_vehicle_that_does_not_tell_its_motion_is_stopped_and_told_after_1_s(bench: Bench) -> None:
+def test_a_vehicle_that_does_not_report_its_motion_is_stopped_and_reported_after_1_s(bench: Bench) -> None:
     bench.start()
     last_s = bench.drive(FORWARD, 0.2).time_s
     bench.rover.is_silent = True
@@ -114,7 +105,7 @@ def test_a_driver_that_dies_stops_the_vehicle(bench: Bench) -> None:
 
 def test_our_heartbeat_goes_on_while_it_is_driven_and_never_without(bench: Bench) -> None:
     bench.base.open()
-    # It was told when the vehicle was looked for; the next ones come once a second.
+    # It was sent when the vehicle was looked for; the next ones come once a second.
     assert bench.rover.heartbeats == [(254, 191)]
     bench.drive(FORWARD, 60.0)
     assert bench.rover.heartbeats == [(254, 191)] * 60
@@ -151,7 +142,7 @@ def test_numbers_that_cannot_be_are_refused_before_anything_is_opened(
             make_drive_base("mavlink-rover", path="/dev/none", robot=BODY, **arguments)
 
 
-def test_a_rover_that_has_the_bridge_s_numbers_is_refused_before_it_is_told_anything() -> None:
+def test_a_rover_that_has_the_bridge_s_numbers_is_refused_before_anything_is_sent() -> None:
     with rig(own_system=1, own_component=1) as bench:
         with pytest.raises(
             WrongDeviceError, match=r"numbers 1 \(system\) and 1 \(component\), as the bridge; set own_"
@@ -161,16 +152,16 @@ def test_a_rover_that_has_the_bridge_s_numbers_is_refused_before_it_is_told_anyt
         assert not bench.rover.is_armed
 
 
-def test_silence_stops_it_and_is_told_when_its_last_estimate_has_grown_old(bench: Bench) -> None:
+def test_silence_stops_it_and_is_reported_when_its_last_estimate_has_grown_old(bench: Bench) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)
-    told = bench.base._link and estimate(bench.base._link.state)
-    assert told
+    motion = bench.base._link and estimate(bench.base._link.state)
+    assert motion
     bench.rover.is_silent = True
     with pytest.raises(DeviceSilentError, match="has not reported its motion for 1 s"):
         bench.drive(FORWARD, 3.0)
     # It is looked at every 10 ms.
-    assert bench.host.monotonic() - told.time_s == pytest.approx(1.01, abs=1e-6)
+    assert bench.host.monotonic() - motion.time_s == pytest.approx(1.01, abs=1e-6)
     bench.host.sleep(0.0)
     assert bench.rover.targets[-1]["vx"] == 0.0
     assert bench.speed_m_s == 0.0

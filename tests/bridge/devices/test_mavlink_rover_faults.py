@@ -8,13 +8,7 @@ import pytest
 from robosc_bridge.devices import mavlink_rover
 from robosc_bridge.devices.robots import Body
 from robosc_bridge.driver_registry import make_drive_base, make_range_scanner
-from robosc_bridge.errors import (
-    DeviceError,
-    DeviceSilentError,
-    LineBusyError,
-    LineLostError,
-    LineMissingError,
-)
+from robosc_bridge.errors import DeviceError, DeviceSilentError, LineBusyError, LineLostError, LineMissingError
 from robosc_bridge.protocol.mavlink_signing import Signing
 from robosc_simulated import SimulatedLine, VirtualHost
 from support.rovers import BODY, FORWARD, KEY, Bench, rig
@@ -26,7 +20,7 @@ def test_a_body_needs_numbers(values: tuple[float, float, float]) -> None:
         Body(*values)
 
 
-def test_lost_heartbeats_are_told_though_telemetry_goes_on(bench: Bench) -> None:
+def test_lost_heartbeats_are_reported_though_telemetry_goes_on(bench: Bench) -> None:
     bench.start()
     bench.rover._due_s[0] = math.inf
     begin_s = bench.host.monotonic()
@@ -40,7 +34,7 @@ def test_a_vehicle_that_starts_anew_must_be_opened_again(bench: Bench) -> None:
     bench.drive(FORWARD, 2.5)
     with bench.time.lock:
         bench.rover.restart()
-        # A fast one, which goes on telling what it was asked for.
+        # A fast one, which goes on sending what it was asked for.
         bench.rover._after_interval(30, 0.05)
     with pytest.raises(DeviceError, match="has restarted"):
         bench.drive(FORWARD, 2.0)
@@ -48,7 +42,7 @@ def test_a_vehicle_that_starts_anew_must_be_opened_again(bench: Bench) -> None:
     assert bench.drive(FORWARD, 0.2).is_torque_on
 
 
-def test_an_unplugged_line_is_told_at_once_and_can_be_plugged_in_again(bench: Bench) -> None:
+def test_an_unplugged_line_is_reported_at_once_and_can_be_plugged_in_again(bench: Bench) -> None:
     assert isinstance(bench.line, SimulatedLine)
     bench.start()
     bench.drive(FORWARD, 0.2)
@@ -93,7 +87,7 @@ def test_noise_before_every_packet_is_dropped(bench: Bench) -> None:
     assert bench.drive(FORWARD, 0.3).velocity.linear_m_s == pytest.approx(0.2, abs=0.001)
 
 
-def test_a_busy_port_is_told(bench: Bench) -> None:
+def test_a_busy_port_is_reported(bench: Bench) -> None:
     bench.base.open()
     other = make_drive_base("mavlink-rover", path=bench.path, robot=BODY)
     with pytest.raises(LineBusyError, match="another drive base of this program uses this port"):

@@ -4,16 +4,9 @@ import math
 
 import pytest
 
-from robosc_bridge.devices.interface import (
-    RangeScanner,
-    Scan,
-    Velocity,
-)
+from robosc_bridge.devices.interface import RangeScanner, Scan, Velocity
 from robosc_bridge.driver_registry import make_range_scanner
-from robosc_bridge.errors import (
-    LineError,
-    LineLostError,
-)
+from robosc_bridge.errors import LineError, LineLostError
 from robosc_simulated import SimulatedLine, Walls
 from support import rovers
 from support.pausing_host import PausingHost
@@ -129,7 +122,7 @@ def test_drive_base_and_scanner_share_a_line_and_outlive_each_other(bench: Bench
     assert not bench.drive(FORWARD, 0.1).is_torque_on
 
 
-def test_a_scanner_that_waits_is_woken_and_told_of_a_lost_line(bench: Bench) -> None:
+def test_a_scanner_that_waits_is_woken_by_a_lost_line(bench: Bench) -> None:
     assert isinstance(bench.line, SimulatedLine)
     bench.rover.is_silent = True
     scanner = make_range_scanner("mavlink-rover", path=bench.path, host=bench.host)
@@ -146,7 +139,7 @@ def test_a_scanner_that_waits_is_woken_and_told_of_a_lost_line(bench: Bench) -> 
     scanner.close()
 
 
-def test_a_scanner_asks_again_when_told_to(bench: Bench) -> None:
+def test_a_scanner_asks_again_when_asked_to(bench: Bench) -> None:
     scanner = make_range_scanner("mavlink-rover", path=bench.path, host=bench.host)
     scanner.open()
     _next(scanner)

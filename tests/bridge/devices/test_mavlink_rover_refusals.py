@@ -1,20 +1,16 @@
 """Tests of the refusals of a MAVLink rover, and of the actions of others on it."""
 
+from typing import Any
+
 import pytest
 
-from robosc_bridge.devices.interface import (
-    MotorFault,
-)
-from robosc_bridge.errors import (
-    DeviceFaultError,
-    DeviceSilentError,
-    WrongDeviceError,
-)
+from robosc_bridge.devices.interface import MotorFault
+from robosc_bridge.errors import DeviceFaultError, DeviceSilentError, WrongDeviceError
 from robosc_simulated.rover import AUTO, GUIDED, HOLD, MANUAL
 from support.rovers import FORWARD, Bench, rig
 
 
-def test_a_refusal_to_arm_tells_the_vehicles_reason(bench: Bench) -> None:
+def test_a_refusal_to_arm_reports_the_vehicles_reason(bench: Bench) -> None:
     bench.rover.refusal = (
         "GPS 1: Bad fix, and the compass is not calibrated either, so that nothing at all can be known"
     )
@@ -29,7 +25,7 @@ def test_a_refusal_to_arm_tells_the_vehicles_reason(bench: Bench) -> None:
     assert bench.drive(FORWARD, 0.1).is_torque_on
 
 
-def test_a_refused_mode_is_told(bench: Bench) -> None:
+def test_a_refused_mode_is_reported(bench: Bench) -> None:
     bench.rover.refused_modes = (GUIDED,)
     bench.base.open()
     with pytest.raises(DeviceFaultError, match=r"does not go to mode GUIDED \(failed\): it gives no reason"):
@@ -46,7 +42,7 @@ def test_an_accepted_command_is_not_a_done_one(bench: Bench) -> None:
 
 
 @pytest.mark.usefixtures("hasty")
-def test_commands_are_repeated_and_their_silence_is_told(bench: Bench) -> None:
+def test_commands_are_repeated_and_their_silence_is_reported(bench: Bench) -> None:
     bench.base.open()
     bench.rover.answers_commands = False
     with pytest.raises(DeviceSilentError, match="does not answer the command to go to mode GUIDED"):
@@ -63,7 +59,7 @@ def test_disarming_that_is_refused_is_forced(bench: Bench) -> None:
 
 
 @pytest.mark.parametrize("how", ["mode", "disarmed"])
-def test_a_vehicle_that_is_taken_away_is_told_and_left_alone(bench: Bench, how: str) -> None:
+def test_a_vehicle_that_is_taken_away_is_reported_and_left_alone(bench: Bench, how: str) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)
     if how == "mode":
@@ -99,7 +95,7 @@ def test_closing_leaves_a_vehicle_that_a_person_drives_to_them(bench: Bench) -> 
     assert bench.speed_m_s == pytest.approx(-0.1)
 
 
-def test_a_vehicle_that_is_held_is_told(bench: Bench) -> None:
+def test_a_vehicle_that_is_held_is_reported(bench: Bench) -> None:
     bench.start()
     bench.drive(FORWARD, 0.3)
     bench.world.left.is_blocked = bench.world.right.is_blocked = True
@@ -110,24 +106,18 @@ def test_a_vehicle_that_is_held_is_told(bench: Bench) -> None:
 
 
 @pytest.mark.usefixtures("hasty")
-@pytest.mark.parametrize("vehicle", [(2, 3), (10, 12)])
-def test_another_vehicle_is_told(vehicle: tuple[int, int]) -> None:
-    with (
-        rig(vehicle=vehicle) as bench,
-        pytest.raises(WrongDeviceError, match="of type {} with autopilot {}, not ArduPilot Rover".format(*vehicle)),
-    ):
-        bench.base.open()
-
-
-@pytest.mark.usefixtures("hasty")
-def test_a_ground_station_is_no_vehicle() -> None:
-    with rig(vehicle=(6, 8)) as bench, pytest.raises(DeviceSilentError, match="no heartbeat of a rover within 1 s"):
-        bench.base.open()
-
-
-@pytest.mark.usefixtures("hasty")
-def test_another_system_than_was_asked_for_is_told() -> None:
-    with rig(system=2) as bench, pytest.raises(WrongDeviceError, match="or has another system number"):
+@pytest.mark.parametrize(
+    ("found", "error", "words"),
+    [
+        ({"vehicle": (2, 3)}, WrongDeviceError, "of type 2 with autopilot 3, not ArduPilot Rover"),
+        ({"vehicle": (10, 12)}, WrongDeviceError, "of type 10 with autopilot 12, not ArduPilot Rover"),
+        ({"vehicle": (6, 8)}, DeviceSilentError, "no heartbeat of a rover within 1 s"),
+        ({"system": 2}, WrongDeviceError, "or has another system number"),
+    ],
+    ids=["copter", "other autopilot", "ground station", "other system"],
+)
+def test_another_device_than_the_rover_is_reported(found: dict[str, Any], error: type[Exception], words: str) -> None:
+    with rig(**found) as bench, pytest.raises(error, match=words):
         bench.base.open()
 
 
@@ -140,9 +130,7 @@ def test_a_vehicle_that_does_not_know_where_it_is_cannot_be_driven(bench: Bench)
 
 def test_modes_of_others_have_names(bench: Bench) -> None:
     bench.rover.is_armed = True
-    bench.rover.take_over(AUTO)
-    with pytest.raises(DeviceFaultError, match="armed in mode AUTO"):
-        bench.base.open()
-    bench.rover.take_over(HOLD)
-    with pytest.raises(DeviceFaultError, match="armed in mode HOLD"):
-        bench.base.open()
+    for mode, name in ((AUTO, "AUTO"), (HOLD, "HOLD")):
+        bench.rover.take_over(mode)
+        with pytest.raises(DeviceFaultError, match=f"armed in mode {name}"):
+            bench.base.open()

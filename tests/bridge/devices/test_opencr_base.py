@@ -1,4 +1,4 @@
-"""A stock TurtleBot3 through its OpenCR: what it is told byte for byte, and what can be wrong with it."""
+"""A stock TurtleBot3 through its OpenCR: what it is sent byte for byte, and what can be wrong with it."""
 
 import contextlib
 import itertools
@@ -126,7 +126,7 @@ def test_a_burger_obeys_at_any_speed(bench: Rig, velocity: Velocity) -> None:
     assert max(abs(speed) for speed in reading.wheels_m_s) <= 265 * BURGER.raw_m_s + 1e-6
 
 
-def test_buttons_bumpers_battery_and_sensors_are_told(bench: Rig) -> None:
+def test_buttons_bumpers_battery_and_sensors_are_reported(bench: Rig) -> None:
     bench.base.open()
     _board(bench).press(button_2=True, bumper_1=True)
     _board(bench).set_battery(11.4)
@@ -138,7 +138,7 @@ def test_buttons_bumpers_battery_and_sensors_are_told(bench: Rig) -> None:
     assert reading.imu["orientation_w"] == pytest.approx(1.0)
 
 
-def test_a_battery_below_what_the_share_is_told_of_is_empty(bench: Rig) -> None:
+def test_a_battery_below_the_voltages_with_a_share_is_empty(bench: Rig) -> None:
     bench.base.open()
     _board(bench).set_battery(10.4)
     assert bench.drive_until(lambda reading: reading.battery_v == 10.4).battery_share == 0.0
@@ -232,7 +232,7 @@ def test_what_is_no_sound_turtlebot_is_refused(
         assert all(request[7] in (1, 2) for request in peer.requests)
 
 
-def test_an_acceleration_that_the_board_keeps_is_told() -> None:
+def test_an_acceleration_that_the_board_keeps_is_reported() -> None:
     registers = {2: b"\1", 18: b"\0", 148: b"\1", 174: b"\5"}
     with VirtualPeer(_answers(0x5000, 5, registers)) as peer:  # type: ignore[arg-type]
         base = OpenCrBase(peer.path, BURGER, answer_limit_s=PATIENT_S, host=peer.time)
@@ -318,7 +318,7 @@ def test_motors_that_were_without_power_can_be_used_again_and_have_not_jumped() 
 
 
 def _slowness(bench: Rig) -> str:
-    """Exchange until the board is told to be slow, as the bridge does; what is told then."""
+    """Exchange until the board is reported slow, as the bridge does; what is reported then."""
     for _ in range(100):
         silent = 0
         while True:
@@ -338,7 +338,7 @@ def _slowness(bench: Rig) -> str:
 # At whatever time of a cycle the cable comes off, also between two packets of one.
 @pytest.mark.parametrize("side", ["left", "right"])
 @pytest.mark.parametrize("after_s", [0.0, 0.004, 0.009, 0.013, 0.017])
-def test_a_servo_that_does_not_answer_is_told_and_the_other_wheel_stops(side: str, after_s: float) -> None:
+def test_a_servo_that_does_not_answer_is_reported_and_the_other_wheel_stops(side: str, after_s: float) -> None:
     with rig("opencr", answer_limit_s=ANSWER_LIMIT_S) as bench:
         board = OpenCr(bench.robot.world, bench.robot.left, bench.robot.right, pass_s=0.0015, refresh_s=0.008)
         bench.tap.device = board
@@ -380,7 +380,7 @@ def test_a_servo_that_does_not_answer_is_told_and_the_other_wheel_stops(side: st
         assert bench.drive(Velocity(0.1), 0.3).velocity.linear_m_s == pytest.approx(0.1, abs=0.002)
 
 
-def test_a_board_that_is_slow_from_the_start_is_told_so() -> None:
+def test_a_board_that_is_slow_from_the_start_is_reported_as_slow() -> None:
     with rig("opencr", answer_limit_s=ANSWER_LIMIT_S) as bench:
         _mute(bench, "left")
         bench.host.sleep(0.1)
@@ -480,7 +480,7 @@ def test_torque_that_is_gone_is_a_fault_that_stays_until_torque_is_switched_on_a
         bench.base.reset()
 
 
-def test_a_reading_tells_what_the_wheels_were_told(bench: Rig) -> None:
+def test_a_reading_has_the_velocity_that_the_wheels_were_commanded(bench: Rig) -> None:
     bench.start()
     reading = bench.base.exchange(Velocity(0.1, 0.5))
     # As the firmware casts them: 75 and 176.
@@ -626,7 +626,7 @@ def test_a_command_is_not_repeated_after_a_newer_one(lost: int) -> None:
         bench.hurry()
         _Source(bench, STANDSTILL)
         bench.robot.base_line.faults.drop_next = lost
-        # Without any answer, it is told to stop.
+        # Without any answer, it is sent a stop.
         with pytest.raises(DeviceSilentError) if lost == 2 else contextlib.nullcontext():
             bench.base.exchange(Velocity(0.1, 0.5))
         bench.host.sleep(0.02)

@@ -206,7 +206,9 @@ def test_a_wrong_mounting_is_seen_in_the_world() -> None:
         (BURGER, {"wheel_radius_m": None}, "those of a burger are known"),
     ],
 )
-def test_what_cannot_be_is_told_before_anything_is_opened(body: Body, options: dict[str, object], problem: str) -> None:
+def test_what_cannot_be_is_reported_before_anything_is_opened(
+    body: Body, options: dict[str, object], problem: str
+) -> None:
     with pytest.raises(ValueError, match=problem):
         DynamixelBase("/nowhere", body, **{**CART_OPTIONS, **options})  # type: ignore[arg-type]
 
@@ -214,10 +216,7 @@ def test_what_cannot_be_is_told_before_anything_is_opened(body: Body, options: d
 def test_wheels_that_are_too_slow_for_the_robot_are_refused() -> None:
     simulated, _, options = ROBOTS["cart"]
     for body, needed in ((Body(0.4, 1.0, 0.42), "0.400"), (Body(0.25, 2.0, 0.42), "0.420")):
-        with (
-            VirtualHost() as host,
-            SimulatedTurtleBot3(simulated, "dynamixel", clock=host) as robot,
-        ):
+        with VirtualHost() as host, SimulatedTurtleBot3(simulated, "dynamixel", clock=host) as robot:
             base = DynamixelBase(robot.base_path, body, host=host, **options)  # type: ignore[arg-type]
             with pytest.raises(WrongDeviceError, match=rf"0\.317 m/s at most \(velocity limit 330 .*need {needed} m/s"):
                 base.open()

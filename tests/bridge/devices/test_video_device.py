@@ -34,12 +34,12 @@ def test_pictures_of_a_film_show_its_line_until_it_ends(tmp_path: Path) -> None:
         source.read()
 
 
-def test_a_missing_camera_is_told(tmp_path: Path) -> None:
+def test_a_missing_camera_is_reported(tmp_path: Path) -> None:
     with pytest.raises(LineMissingError, match="video7: there is no such camera"):
         VideoDevice(str(tmp_path / "video7"))
 
 
-def test_what_is_no_camera_is_told(tmp_path: Path) -> None:
+def test_what_is_no_camera_is_reported(tmp_path: Path) -> None:
     path = tmp_path / "text"
     path.write_text("no film")
     with pytest.raises(LineError, match="it is not a camera"):
@@ -47,12 +47,12 @@ def test_what_is_no_camera_is_told(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("device", ["/dev/null", "/dev/zero"])
-def test_a_device_of_another_kind_is_told(device: str) -> None:
+def test_a_device_of_another_kind_is_reported(device: str) -> None:
     with pytest.raises(LineError, match=f"{device}: no pictures can be read"):
         VideoDevice(device)
 
 
-def test_a_camera_that_one_may_not_open_is_told(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_camera_that_one_may_not_open_is_reported(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     def refuse(*_: object) -> int:
         raise PermissionError(13, "Permission denied")
 

@@ -1,4 +1,6 @@
-"""Wheels that do not turn as they are told."""
+"""Wheels that do not turn as commanded."""
+
+import pytest
 
 from robosc_bridge.devices.wheel_following import FollowingMonitor
 
@@ -20,20 +22,14 @@ def test_after_a_pause_it_begins_anew() -> None:
     assert not watch.is_blocked((100, 100), (0, 0), 1.3)
 
 
-def test_a_wheel_that_catches_up_in_time_is_none() -> None:
+@pytest.mark.parametrize(
+    ("goal", "speeds"),
+    [(200, [(0, 0), (50, 50), (120, 120), (30, 30), (180, 180)]), (100, [(0, 100), (0, 100), (100, 0), (100, 0)])],
+    ids=["both catch up in time", "neither is away for so long"],
+)
+def test_a_wheel_that_catches_up_in_time_is_none(goal: int, speeds: list[tuple[int, int]]) -> None:
     watch = FollowingMonitor(0.7)
-    assert not any(
-        watch.is_blocked((200, 200), (speed, speed), time)
-        for time, speed in ((0.0, 0), (0.3, 50), (0.6, 120), (0.9, 30), (1.2, 180))
-    )
-
-
-def test_it_is_each_wheel_that_must_be_away_for_so_long() -> None:
-    watch = FollowingMonitor(0.7)
-    assert not any(
-        watch.is_blocked((100, 100), speeds, time)
-        for time, speeds in ((0.0, (0, 100)), (0.3, (0, 100)), (0.6, (100, 0)), (0.9, (100, 0)))
-    )
+    assert not any(watch.is_blocked((goal, goal), each, 0.3 * step) for step, each in enumerate(speeds))
 
 
 def test_what_was_before_can_be_forgotten() -> None:

@@ -1,4 +1,4 @@
-"""Programs of a scenario: what they tell, how they are stopped, and that nothing of them is left."""
+"""Programs of a scenario: what they print, how they are stopped, and that nothing of them is left."""
 
 import os
 import signal
@@ -41,13 +41,13 @@ def test_a_program_answers_and_ends_politely(tmp_path: Path) -> None:
     assert program.status == -signal.SIGTERM
 
 
-def test_what_a_program_tells_is_waited_for(tmp_path: Path) -> None:
-    with Program("teller", script(tmp_path, "print('port', 17)"), tmp_path) as program:
+def test_what_a_program_reports_is_waited_for(tmp_path: Path) -> None:
+    with Program("speaker", script(tmp_path, "print('port', 17)"), tmp_path) as program:
         assert program.wait_for(r"^port (\d+)$")[1] == "17"
         wait_until(lambda: program.status == 0)
         with pytest.raises(ScenarioError) as raised:
             finish(program)
-    assert str(raised.value) == "teller ended by itself with status 0:\nport 17"
+    assert str(raised.value) == "speaker ended by itself with status 0:\nport 17"
 
 
 def test_half_a_line_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -62,22 +62,22 @@ def test_half_a_line_is_none(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) ->
     sleep = time.sleep
 
     def look(duration_s: float) -> None:
-        if (tmp_path / "teller.log").read_text() == "port 1":
+        if (tmp_path / "speaker.log").read_text() == "port 1":
             # For writing and reading, so that it does not wait for a reader.
             os.close(os.open(tmp_path / "seen", os.O_RDWR))
         sleep(duration_s)
 
-    with Program("teller", script(tmp_path, text), tmp_path) as program:
+    with Program("speaker", script(tmp_path, text), tmp_path) as program:
         # The first look is at half a line.
-        wait_until(lambda: (tmp_path / "teller.log").read_text() == "port 1")
+        wait_until(lambda: (tmp_path / "speaker.log").read_text() == "port 1")
         monkeypatch.setattr(time, "sleep", look)
         assert program.wait_for(r"^port (\d+)$")[1] == "17"
 
 
-def test_a_program_that_dies_is_told_with_its_last_words(tmp_path: Path) -> None:
+def test_a_program_that_dies_is_reported_with_its_last_words(tmp_path: Path) -> None:
     text = "raise SystemExit('no such device')"
     with Program("dying", script(tmp_path, text), tmp_path) as program, pytest.raises(ScenarioError) as raised:
-        program.wait_for("never told")
+        program.wait_for("never printed")
     assert str(raised.value) == "dying ended by itself with status 1:\nno such device"
 
 
@@ -103,15 +103,15 @@ def test_what_a_program_has_started_ends_with_it(tmp_path: Path) -> None:
     wait_until(lambda: has_ended(child))
 
 
-def test_a_program_that_is_not_there_is_told(tmp_path: Path) -> None:
+def test_a_program_that_is_not_there_is_reported(tmp_path: Path) -> None:
     with Program("none", (), tmp_path, interpreter="/no/python") as program, pytest.raises(ScenarioError) as raised:
-        program.wait_for("never told")
+        program.wait_for("never printed")
     assert str(raised.value) == (
         "none ended by itself with status 127:\n/no/python cannot be run: No such file or directory"
     )
 
 
-@pytest.mark.skipif(sys.platform != "linux", reason="no other kernel tells a program that its parent has died")
+@pytest.mark.skipif(sys.platform != "linux", reason="no other kernel notifies a program that its parent has died")
 def test_a_program_ends_politely_when_who_runs_it_is_killed(tmp_path: Path) -> None:
     ending = """
         import signal, sys, time

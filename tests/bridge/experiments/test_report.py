@@ -68,7 +68,7 @@ def test_a_report_of_a_recorded_run_is_complete(tmp_path: Path) -> None:
     ]  # fmt: skip
 
 
-def test_what_was_wrong_is_told_and_is_no_markup(tmp_path: Path) -> None:
+def test_what_was_wrong_is_reported_and_is_no_markup(tmp_path: Path) -> None:
     outcome = recorded(tmp_path / "maze-serial-1", faults=("it came to a <wall> | twice",))
     text = outcome.event_log.read_text(encoding="utf-8")
     outcome.event_log.write_text(text.replace('"rotate_left.request"', '"move.request"', 1), encoding="utf-8")

@@ -1,5 +1,6 @@
 """Tests of a scenario's refusals before anything is started, and of its reports while it runs."""
 
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
@@ -40,14 +41,10 @@ def test_the_configuration_is_one_that_the_bridge_takes(name: str, speed: float,
     check_settings(loaded.configuration, mapping, deployment)
 
 
-def test_a_scene_without_a_goal_is_no_maze(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="the scene room has no goal"):
-        run_maze(tmp_path / "run", "room", speed=5, say=quiet)
-
-
-def test_a_scene_without_a_line_is_none_to_follow(tmp_path: Path) -> None:
-    with pytest.raises(ScenarioError, match="the scene room needs a line"):
-        line.run_line(tmp_path / "run", "room", speed=5, say=quiet)
+@pytest.mark.parametrize(("run", "lacks"), [(run_maze, "has no goal"), (line.run_line, "needs a line")])
+def test_a_scene_lacks_what_a_scenario_needs(run: Callable[..., object], lacks: str, tmp_path: Path) -> None:
+    with pytest.raises(ScenarioError, match=f"the scene room {lacks}"):
+        run(tmp_path / "run", "room", speed=5, say=quiet)
 
 
 @pytest.mark.parametrize("speed", [0.0, -1.0, 1000.0, float("nan")])

@@ -27,7 +27,7 @@ def findings(out: str) -> dict[str, dict[str, str]]:
     return {item["part"]: item for item in json.loads(out)["findings"]}
 
 
-def test_a_port_that_is_not_there_is_told_with_where_to_look(
+def test_a_port_that_is_not_there_is_reported_with_where_to_look(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["doctor", "--config", str(configured(tmp_path, "/dev/none")), "--json"]) == 1
@@ -39,7 +39,7 @@ def test_a_port_that_is_not_there_is_told_with_where_to_look(
     assert "robosc-bridge probe" in found["drive.port"]["fix"]
 
 
-def test_a_configuration_that_cannot_be_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_configuration_that_cannot_be_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doctor", "--config", str(configured(tmp_path, "/dev/none", "hoover")), "--json"]) == 1
     assert "hoover" in findings(capsys.readouterr().out)["configuration"]["message"]
     assert main(["doctor", "--config", str(tmp_path / "none.yaml")]) == 1
@@ -63,7 +63,7 @@ def test_a_name_that_depends_on_the_order_of_plugging_in_is_noted(
     assert f"{link} can be read and written" in capsys.readouterr().out
 
 
-def test_a_port_without_permission_is_told(
+def test_a_port_without_permission_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     port = tmp_path / "ttyACM0"

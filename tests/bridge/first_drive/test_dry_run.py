@@ -20,7 +20,7 @@ BASES = ("opencr", "dynamixel", "mavlink-rover")
 
 
 @pytest.mark.parametrize("base", BASES)
-def test_a_dry_run_drives_nowhere_and_tells_what_it_would_do(base: str, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_dry_run_drives_nowhere_and_prints_what_it_would_do(base: str, caplog: pytest.LogCaptureFixture) -> None:
     supervisor = supervisor_of(MODEL.replace("LINEAR", "0.1").replace("ANGULAR", "0.5"))
     with (
         caplog.at_level(logging.INFO, "robosc_bridge"),
@@ -64,19 +64,19 @@ class Base:
     limits = None
 
     def __init__(self) -> None:
-        self.told: list[str] = []
+        self.calls: list[str] = []
         self.now_s = 0.0
 
     def open(self) -> None:
-        self.told.append("open")
+        self.calls.append("open")
 
     def exchange(self, velocity: Velocity) -> DriveReading:
-        self.told.append("read")
+        self.calls.append("read")
         assert velocity == STANDSTILL
         return DriveReading(self.now_s, Pose(5.0, 5.0, 1.0), STANDSTILL, (0.0, 0.0), False, battery_v=11.9)
 
     def close(self) -> None:
-        self.told.append("close")
+        self.calls.append("close")
 
 
 def test_its_readings_are_those_of_a_robot_that_moves() -> None:
@@ -100,4 +100,4 @@ def test_its_readings_are_those_of_a_robot_that_moves() -> None:
     dry.set_torque(False)
     dry.reset()
     dry.close()
-    assert set(base.told) == {"open", "read", "close"}
+    assert set(base.calls) == {"open", "read", "close"}

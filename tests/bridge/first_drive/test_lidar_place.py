@@ -76,12 +76,7 @@ class Turner:
 
 
 def calibrated(
-    folder: Path,
-    host: VirtualHost,
-    robot: SimulatedTurtleBot3,
-    base: str,
-    lidar: str,
-    person: Turner,
+    folder: Path, host: VirtualHost, robot: SimulatedTurtleBot3, base: str, lidar: str, person: Turner
 ) -> int:
     file = folder / "bridge.yaml"
     file.write_text(
@@ -135,7 +130,7 @@ def test_the_place_is_found_by_turning_on_the_spot(
         (7.0, 4.0, 0.0, LONG_WALL, "turn the robot more slowly"),
     ],
 )
-def test_what_tells_nothing_is_refused(
+def test_scans_without_information_are_refused(
     turned_rad: float,
     seconds: float,
     aside_m: float,
@@ -201,7 +196,7 @@ def test_any_place_is_found_with_the_noise_of_a_typical_day(
 
 
 def test_a_way_of_the_middle_is_taken_out() -> None:
-    """The wheels tell how far the robot was pushed while it turned: the same place without that is wrong."""
+    """The wheels measure how far the robot was pushed while it turned: the same place without that is wrong."""
     sightings, ignorant = [], []
     for step in range(90):
         heading = math.radians(4.5 * step)

@@ -1,4 +1,4 @@
-"""Probe of ports: every device is found on every kind of line, and what is wrong with it is told."""
+"""Probe of ports: every device is found on every kind of line, and what is wrong with it is reported."""
 
 import json
 from argparse import Namespace
@@ -35,7 +35,7 @@ def test_a_sound_opencr_is_found(host: VirtualHost) -> None:
     assert probed.is_well
 
 
-def test_what_is_wrong_with_a_board_is_told(host: VirtualHost) -> None:
+def test_what_is_wrong_with_a_board_is_reported(host: VirtualHost) -> None:
     with SimulatedTurtleBot3("burger", "opencr", clock=host, has_motors=False) as robot:
         assert robot.opencr is not None
         robot.opencr.set_battery(10.8)
@@ -62,7 +62,7 @@ def test_servos_are_found_at_whatever_speed_with_what_keeps_them_from_driving(ho
 
 
 @pytest.mark.parametrize("lidar", ["lds01", "lds02", "lds03"])
-def test_a_lidar_is_told_from_the_others_and_left_as_it_was(lidar: str, host: VirtualHost) -> None:
+def test_a_lidar_is_distinguished_from_the_others_and_left_as_it_was(lidar: str, host: VirtualHost) -> None:
     with SimulatedTurtleBot3("burger", "opencr", lidar, clock=host) as robot:
         probed = probe(robot.scanner_path, host)
         assert probed.is_well, probed
@@ -114,7 +114,7 @@ def test_a_probe_moves_nothing_and_writes_nothing(host: VirtualHost) -> None:
     assert any("its torque is on" in problem for problem in probed.devices[0].problems)
 
 
-def test_the_command_tells_people_and_programs(host: VirtualHost, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_prints_for_people_and_for_programs(host: VirtualHost, capsys: pytest.CaptureFixture[str]) -> None:
     with SimulatedTurtleBot3("burger", "opencr", "lds02", clock=host) as robot:
         ports = [robot.base_path, robot.scanner_path]
         assert commands._probe(Namespace(port=ports, json=False), host) == 0
@@ -127,7 +127,7 @@ def test_the_command_tells_people_and_programs(host: VirtualHost, capsys: pytest
     assert document["ports"][0]["devices"][0]["facts"]["firmware"] == 5
 
 
-def test_no_port_is_told(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_no_port_is_reported(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(commands, "serial_ports", list)
     assert main(["probe"]) == 1
     assert "there is no serial port" in capsys.readouterr().out

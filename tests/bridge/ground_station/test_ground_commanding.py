@@ -28,7 +28,7 @@ def test_a_refusal_comes_after_its_reason(talk: Talk) -> None:
     ]
     assert joined_texts(found) == ["Not armed: the robot is starting: no scanner"]
     assert of_type("COMMAND_ACK", found)[0].result == 1
-    # Whoever asks again is told again.
+    # Whoever asks again is answered again.
     assert joined_texts(talk.ask(400, 1.0)) == ["Not armed: the robot is starting: no scanner"]
 
 
@@ -217,7 +217,7 @@ def test_going_on_right_after_a_stop_is_ordered_though_it_does_not_show_yet(talk
     assert [ack.result for ack in of_type("COMMAND_ACK", talk.say())] == [1]
 
 
-def test_a_stop_that_must_hold_is_told(talk: Talk) -> None:
+def test_a_stop_that_must_hold_is_answered_with_its_reason(talk: Talk) -> None:
     talk.daemon.show(state=State.RUNNING, reasons=(Reason.OPERATOR_STOP,))
     talk.daemon.answers[OperatorCommand.RESUME] = "the stop button is held"
     talk.say()

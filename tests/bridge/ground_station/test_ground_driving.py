@@ -85,7 +85,7 @@ def test_a_stick_at_rest_ends_in_silence() -> None:
         (True, {"state": State.RUNNING, "reasons": (Reason.OPERATOR_STOP,)}, "An operator has stopped the robot"),
     ],
 )
-def test_set_points_that_are_not_heeded_are_told_once(is_layer: bool, values: dict[str, Any], why: str) -> None:
+def test_set_points_that_are_not_heeded_are_reported_once(is_layer: bool, values: dict[str, Any], why: str) -> None:
     talk = Talk(PlayedDaemon(is_layer=is_layer))
     talk.daemon.show(**values)
     talk.live(1.0)
@@ -104,7 +104,7 @@ def test_a_layer_whose_drive_is_not_tied_is_not_driven() -> None:
     assert talk.daemon.told == []
 
 
-def test_what_a_layer_refuses_is_told() -> None:
+def test_what_a_layer_refuses_is_reported() -> None:
     talk = layer_talk()
     talk.say(_target(talk.station, 0.1))
     attached = talk.daemon.told[0]

@@ -241,7 +241,7 @@ def test_a_server_that_goes_and_comes_again_is_found(host: VirtualHost) -> None:
             connection.close()
 
 
-def test_nobody_there_is_told_once_and_tried_ever_more_seldom(
+def test_nobody_there_is_reported_once_and_tried_ever_more_seldom(
     host: VirtualHost, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     tries_s: list[float] = []
@@ -260,7 +260,7 @@ def test_nobody_there_is_told_once_and_tried_ever_more_seldom(
     assert caplog.text.count("no program listens there") == 1
 
 
-def test_a_problem_is_told_again_after_a_line_that_has_lasted(
+def test_a_problem_is_reported_again_after_a_line_that_has_lasted(
     host: VirtualHost, caplog: pytest.LogCaptureFixture
 ) -> None:
     server = host.serve(5760)

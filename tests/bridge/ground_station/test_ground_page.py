@@ -58,7 +58,7 @@ def test_times_and_limits() -> None:
     assert commands.LONGEST_INTERVAL_S == 3600.0
 
 
-def test_what_is_told_stands_there() -> None:
+def test_the_page_lists_what_is_sent() -> None:
     made = stream.Stream(PlayedDaemon().operations, settings.GroundSettings("/dev/x", STANDSTILL), 0.0)
     names = {"LOCAL_POSITION": "LOCAL_POSITION_NED"}
     for message in made.schedule._defaults:

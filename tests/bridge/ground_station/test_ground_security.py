@@ -57,7 +57,7 @@ def test_stopping_is_obeyed_whoever_asks(key_file: Path, number: int, parameters
 
 
 @pytest.mark.parametrize("is_datagram", [True, False])
-def test_a_station_that_speaks_mavlink_1_stops_the_robot_and_is_told(
+def test_a_station_that_speaks_mavlink_1_stops_the_robot_and_is_answered(
     key_file: Path, is_datagram: bool, caplog: pytest.LogCaptureFixture
 ) -> None:
     text = "This station speaks MAVLink 1: set it to MAVLink 2."
@@ -246,7 +246,7 @@ def test_only_a_station_claims_the_line(key_file: Path) -> None:
     assert daemon.commands == [OperatorCommand.STANDBY]
 
 
-def test_a_key_that_cannot_be_used_is_told_before_anything_starts(tmp_path: Path) -> None:
+def test_a_key_that_cannot_be_used_is_reported_before_anything_starts(tmp_path: Path) -> None:
     with pytest.raises(SigningError, match="cannot be read"):
         _session(_signed(tmp_path / "none"))
     short = tmp_path / "short"
@@ -271,14 +271,14 @@ def test_keys(tmp_path: Path, data: bytes) -> None:
 
 
 @pytest.mark.parametrize(
-    ("mode", "is_told"), [(0o600, False), (0o400, False), (0o640, True), (0o604, True), (0o620, True)]
+    ("mode", "is_reported"), [(0o600, False), (0o400, False), (0o640, True), (0o604, True), (0o620, True)]
 )
-def test_a_key_that_others_can_read_is_told(
-    key_file: Path, mode: int, is_told: bool, caplog: pytest.LogCaptureFixture
+def test_a_key_that_others_can_read_is_reported(
+    key_file: Path, mode: int, is_reported: bool, caplog: pytest.LogCaptureFixture
 ) -> None:
     key_file.chmod(mode)
     Signing(key_file).begin()
-    assert ("others than its owner can read or change the key" in caplog.text) == is_told
+    assert ("others than its owner can read or change the key" in caplog.text) == is_reported
 
 
 def test_the_command_of_the_page_makes_a_key(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:

@@ -25,7 +25,7 @@ def test_a_heartbeat_comes_each_second(talk: Talk) -> None:
     assert (beats[0].type, beats[0].autopilot, beats[0].get_srcSystem(), beats[0].get_srcComponent()) == (10, 0, 1, 1)
 
 
-def test_a_loop_that_hangs_is_told_and_then_the_heartbeat_ends(talk: Talk) -> None:
+def test_a_loop_that_hangs_is_reported_and_then_the_heartbeat_ends(talk: Talk) -> None:
     talk.daemon.show(state=State.RUNNING, reading=reading_of(), scan=scan_of({}))
     found = talk.live(2.0, is_fresh=False)
     assert {beat.system_status for beat in of_type("HEARTBEAT", found)} == {4}
@@ -40,7 +40,7 @@ def test_a_loop_that_hangs_is_told_and_then_the_heartbeat_ends(talk: Talk) -> No
     assert {beat.system_status for beat in of_type("HEARTBEAT", talk.live(2.0))} == {4}
 
 
-def test_the_end_is_told(talk: Talk) -> None:
+def test_the_end_is_reported(talk: Talk) -> None:
     talk.daemon.show(state=State.OVER)
     found = talk.station.hear(talk.session.end(talk.now_s))
     assert of_type("HEARTBEAT", found)[-1].system_status == 7
@@ -64,7 +64,7 @@ def test_telemetry_comes_as_often_as_it_should(talk: Talk) -> None:
     assert counts["BATTERY_STATUS"] == pytest.approx(5, abs=1)
 
 
-def test_what_is_old_is_not_told(talk: Talk) -> None:
+def test_what_is_old_is_not_sent(talk: Talk) -> None:
     talk.daemon.show(reading=reading_of(BEGIN_S), scan=scan_of({0: 1.0}, BEGIN_S))
     assert len(of_type("OBSTACLE_DISTANCE", talk.live(0.6))) in (4, 5, 6)
     assert of_type("OBSTACLE_DISTANCE", talk.live(0.6)) == []
@@ -150,7 +150,7 @@ def test_a_message_can_be_asked_for(talk: Talk) -> None:
 # Texts.
 
 
-def test_what_happens_is_told_in_words(talk: Talk) -> None:
+def test_what_happens_is_sent_in_words(talk: Talk) -> None:
     talk.live(0.2)
     talk.daemon.show(state=State.RUNNING)
     assert joined_texts(talk.live(0.2)) == ["Running: armed"]
@@ -167,7 +167,7 @@ def test_what_happens_is_told_in_words(talk: Talk) -> None:
     assert joined_texts(talk.live(2.0)) == ["a motor is hot", "A motor reports a fault."]
 
 
-def test_a_safe_stop_is_told_and_its_end_and_no_ordinary_end(talk: Talk) -> None:
+def test_a_safe_stop_is_reported_and_its_end_and_no_ordinary_end(talk: Talk) -> None:
     talk.daemon.show(state=State.RUNNING)
     talk.live(0.2)
     talk.daemon.show(stops=("/scan is stale",))
@@ -181,7 +181,7 @@ def test_a_safe_stop_is_told_and_its_end_and_no_ordinary_end(talk: Talk) -> None
 
 
 @pytest.mark.parametrize("accepts_unsigned", [True, False])
-def test_a_fault_is_told_while_somebody_sends_nonsense(accepts_unsigned: bool) -> None:
+def test_a_fault_is_reported_while_somebody_sends_nonsense(accepts_unsigned: bool) -> None:
     talk = Talk(settings=GroundSettings("udpin:0.0.0.0:0", FASTEST, accepts_unsigned=accepts_unsigned))
     for tick in range(100):
         talk.daemon.show()
@@ -195,14 +195,14 @@ def test_a_fault_is_told_while_somebody_sends_nonsense(accepts_unsigned: bool) -
             assert {"Fault: it burns", "Stopped by a fault", "no drive"} <= set(joined_texts(talk.station.heard))
 
 
-def test_a_station_that_comes_later_is_told_what_holds(talk: Talk) -> None:
+def test_a_station_that_comes_later_receives_what_holds(talk: Talk) -> None:
     talk.daemon.show(state=State.FAULT, problem="a motor is hot")
     assert "a motor is hot" in joined_texts(talk.live(1.0))
     found = talk.say(talk.station.heartbeat())
     assert "a motor is hot" in joined_texts(found + talk.live(1.0))
 
 
-def test_blocked_requests_are_counted_and_told_once(talk: Talk) -> None:
+def test_blocked_requests_are_counted_and_reported_once(talk: Talk) -> None:
     texts = []
     for _ in range(100):
         talk.daemon.write(kind="blocked", identifier="/cmd_vel", why="no")

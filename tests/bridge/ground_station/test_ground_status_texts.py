@@ -1,4 +1,4 @@
-"""Texts in chunks, against a receiver that puts them together; how often they are told."""
+"""Texts in chunks, against a receiver that puts them together; how often they are sent."""
 
 import pytest
 from hypothesis import given
@@ -64,31 +64,31 @@ def test_a_long_text_is_cut() -> None:
     assert plain_text("a\nb\0c") == "a b c"
 
 
-def _told(texts: StatusTexts, now_s: float) -> list[str]:
+def _sent(texts: StatusTexts, now_s: float) -> list[str]:
     codec = Codec(1, 1)
     return joined_texts(Station().hear(b"".join(codec.encode(make) for make in texts.take(now_s))))
 
 
-def test_the_same_is_not_told_again_and_again() -> None:
+def test_the_same_is_not_sent_again_and_again() -> None:
     texts = StatusTexts()
     found = []
     for tick in range(300):
         texts.say(tick / 10, Severity.ERROR, "warm")
-        found += _told(texts, tick / 10)
+        found += _sent(texts, tick / 10)
     assert found == ["warm"] * 2
     texts.say(30.0, Severity.ERROR, "warm", again_s=0.0)
-    assert _told(texts, 30.0) == ["warm"]
+    assert _sent(texts, 30.0) == ["warm"]
 
 
-def test_what_holds_is_told_every_twenty_seconds_and_when_it_comes_again() -> None:
+def test_what_holds_is_sent_every_twenty_seconds_and_when_it_comes_again() -> None:
     texts = StatusTexts()
-    told = {}
+    sent = {}
     for tick in range(450):
         holds = tick < 410 or 415 <= tick < 420 or tick >= 435
         texts.repeat(tick / 10, [(Severity.ERROR, "cold")] if holds else [])
-        if found := _told(texts, tick / 10):
-            told[tick / 10] = found
-    assert list(told) == [0.0, 20.0, 40.0, 43.5]
+        if found := _sent(texts, tick / 10):
+            sent[tick / 10] = found
+    assert list(sent) == [0.0, 20.0, 40.0, 43.5]
 
 
 def test_there_are_never_too_many_a_second() -> None:
@@ -103,63 +103,63 @@ def test_there_are_never_too_many_a_second() -> None:
     assert count <= BURST + 10.0 * RATE_PER_S + 1
 
 
-def test_who_listens_anew_is_told_again() -> None:
+def test_who_listens_anew_receives_all_again() -> None:
     texts = StatusTexts()
     texts.repeat(0.0, [(Severity.ERROR, "cold")])
-    assert _told(texts, 0.0) == ["cold"]
+    assert _sent(texts, 0.0) == ["cold"]
     texts.forget()
     texts.repeat(1.0, [(Severity.ERROR, "cold")])
-    assert _told(texts, 1.0) == ["cold"]
+    assert _sent(texts, 1.0) == ["cold"]
 
 
-def test_nonsense_keeps_no_news_from_being_told() -> None:
+def test_nonsense_keeps_no_news_from_being_sent() -> None:
     texts = StatusTexts()
     for number in range(500):
         texts.say(0.0, Severity.WARNING, f"A parameter cannot be {number}.", again_s=0.0, asked_by=(255, number % 250))
     texts.say(0.0, Severity.ERROR, "Fault: hot", again_s=0.0)
     texts.repeat(0.0, [(Severity.CRITICAL, "empty")])
     texts.say(0.0, Severity.NOTICE, "Standby")
-    assert _told(texts, 0.0)[:3] == ["empty", "Fault: hot", "Standby"]
+    assert _sent(texts, 0.0)[:3] == ["empty", "Fault: hot", "Standby"]
     assert sum(len(item.pieces) for item in texts._waiting) <= MOST_WAITING
 
 
-def test_the_grave_makes_others_wait_and_what_was_dropped_is_told_later() -> None:
+def test_the_grave_makes_others_wait_and_what_was_dropped_is_reported_later() -> None:
     texts = StatusTexts()
     for number in range(60):
         texts.say(0.0, Severity.NOTICE, f"notice {number}")
     for number in range(25):
         texts.say(0.0, Severity.CRITICAL, f"critical {number}")
-    # Nothing makes room for what is not graver, and what was never told is told when it is said again.
+    # Nothing makes room for what is not graver, and what was never sent is sent when it is said again.
     texts.say(0.0, Severity.NOTICE, "too much")
     texts.say(0.0, Severity.NOTICE, "notice 25")
     found = []
     for tick in range(80):
-        found += _told(texts, tick / 10)
+        found += _sent(texts, tick / 10)
     assert found == [f"critical {number}" for number in range(25)] + [f"notice {number}" for number in range(5)]
     texts.say(8.0, Severity.NOTICE, "notice 25")
-    assert _told(texts, 8.0) == ["notice 25"]
+    assert _sent(texts, 8.0) == ["notice 25"]
 
 
-def test_what_one_sender_is_told_has_one_place() -> None:
+def test_answers_to_one_sender_have_one_place() -> None:
     texts = StatusTexts()
     for text in ("first", "second", "third"):
         texts.say(0.0, Severity.WARNING, text, again_s=0.0, asked_by=(255, 190))
     texts.say(0.0, Severity.WARNING, "other", again_s=0.0, asked_by=(254, 190))
-    assert _told(texts, 0.0) == ["third", "other"]
+    assert _sent(texts, 0.0) == ["third", "other"]
     for _ in range(3):
         texts.say(0.0, Severity.WARNING, "the same", again_s=0.0)
-    assert _told(texts, 0.0) == ["the same"]
+    assert _sent(texts, 0.0) == ["the same"]
 
 
-def test_a_text_that_has_begun_is_told_to_its_end() -> None:
+def test_a_text_that_has_begun_is_sent_to_its_end() -> None:
     texts = StatusTexts()
     texts.say(0.0, Severity.INFO, "x" * 49)
     for number in range(10):
         texts.say(0.0, Severity.INFO, f"{number}")
     texts.say(0.0, Severity.INFO, "y" * 120)
-    told = [texts.take(0.0)]
+    sent = [texts.take(0.0)]
     texts.say(0.0, Severity.CRITICAL, "grave")
-    told += [texts.take(tick / 10) for tick in range(1, 20)]
+    sent += [texts.take(tick / 10) for tick in range(1, 20)]
     codec = Codec(1, 1)
-    found = joined_texts(Station().hear(b"".join(codec.encode(make) for makes in told for make in makes)))
+    found = joined_texts(Station().hear(b"".join(codec.encode(make) for makes in sent for make in makes)))
     assert found[-2:] == ["y" * 120, "grave"]

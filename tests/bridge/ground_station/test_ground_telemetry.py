@@ -35,7 +35,7 @@ def _bytes(make: Make, sequence: int) -> str:
     return codec.encode(make).hex(" ")
 
 
-def _told(make: Make | None) -> Any:
+def _message(make: Make | None) -> Any:
     assert make is not None
     (message,) = Station().hear(Codec(1, 1).encode(make))
     return message
@@ -74,13 +74,13 @@ def test_the_worked_packets() -> None:
         ({"state": State.OVER}, False, (False, Mode.AUTO, 5, 7)),
     ],
 )
-def test_the_heartbeat_tells_how_it_is(values: dict[str, Any], is_layer: bool, expected: tuple[int, ...]) -> None:
+def test_the_heartbeat_reports_the_state(values: dict[str, Any], is_layer: bool, expected: tuple[int, ...]) -> None:
     status = status_of(replace(STANDBY, **values), is_layer=is_layer, is_stale=False)
     assert (status.is_armed, status.mode, status.base_mode, status.system_status) == expected
-    told = _told(telemetry.heartbeat(status))
+    message = _message(telemetry.heartbeat(status))
     _, mode, base_mode, system_status = expected
-    assert (told.type, told.autopilot) == (10, 0)
-    assert (told.base_mode, told.custom_mode, told.system_status) == (base_mode, mode, system_status)
+    assert (message.type, message.autopilot) == (10, 0)
+    assert (message.base_mode, message.custom_mode, message.system_status) == (base_mode, mode, system_status)
 
 
 def test_a_loop_that_hangs_is_an_emergency() -> None:
@@ -92,35 +92,40 @@ def test_a_loop_that_hangs_is_an_emergency() -> None:
 
 def test_turning_left_is_negative_there() -> None:
     reading = reading_of(12.5, pose=Pose(1.0, 2.0, math.pi / 2), velocity=Velocity(0.1, 0.5))
-    told = _told(telemetry.odometry(reading))
-    assert (told.frame_id, told.child_frame_id, told.estimator_type) == (20, 12, 1)
-    assert (told.x, told.y, told.z) == (1.0, -2.0, 0.0)
-    assert told.q == pytest.approx([math.sqrt(0.5), 0.0, 0.0, -math.sqrt(0.5)])
-    assert (told.vx, told.vy, told.yawspeed) == pytest.approx((0.1, 0.0, -0.5))
-    assert math.isnan(told.pose_covariance[0])
-    assert math.isnan(told.velocity_covariance[0])
-    assert told.time_usec == 12_500_000
-    told = _told(telemetry.attitude(reading, 7))
-    assert (told.time_boot_ms, told.yaw, told.yawspeed) == pytest.approx((7, -math.pi / 2, -0.5))
-    told = _told(telemetry.local_position(reading, 7))
-    assert (told.x, told.y, told.vx, told.vy) == pytest.approx((1.0, -2.0, 0.0, -0.1))
+    message = _message(telemetry.odometry(reading))
+    assert (message.frame_id, message.child_frame_id, message.estimator_type) == (20, 12, 1)
+    assert (message.x, message.y, message.z) == (1.0, -2.0, 0.0)
+    assert message.q == pytest.approx([math.sqrt(0.5), 0.0, 0.0, -math.sqrt(0.5)])
+    assert (message.vx, message.vy, message.yawspeed) == pytest.approx((0.1, 0.0, -0.5))
+    assert math.isnan(message.pose_covariance[0])
+    assert math.isnan(message.velocity_covariance[0])
+    assert message.time_usec == 12_500_000
+    message = _message(telemetry.attitude(reading, 7))
+    assert (message.time_boot_ms, message.yaw, message.yawspeed) == pytest.approx((7, -math.pi / 2, -0.5))
+    message = _message(telemetry.local_position(reading, 7))
+    assert (message.x, message.y, message.vx, message.vy) == pytest.approx((1.0, -2.0, 0.0, -0.1))
 
 
 def test_the_battery() -> None:
     full = replace(STANDBY, reading=reading_of(battery_v=12.1, battery_share=0.774), overruns=3)
-    told = _told(telemetry.sys_status(full, 70_000))
-    assert (told.voltage_battery, told.battery_remaining, told.current_battery) == (12100, 77, -1)
-    assert (told.errors_comm, told.errors_count1) == (65535, 3)
-    told = _told(telemetry.battery_status(full))
-    assert (told.voltages, told.battery_remaining, told.charge_state) == ([12100] + [65535] * 9, 77, 1)
-    assert (told.current_battery, told.current_consumed, told.energy_consumed, told.temperature) == (-1, -1, -1, 32767)
+    message = _message(telemetry.sys_status(full, 70_000))
+    assert (message.voltage_battery, message.battery_remaining, message.current_battery) == (12100, 77, -1)
+    assert (message.errors_comm, message.errors_count1) == (65535, 3)
+    message = _message(telemetry.battery_status(full))
+    assert (message.voltages, message.battery_remaining, message.charge_state) == ([12100] + [65535] * 9, 77, 1)
+    assert (message.current_battery, message.current_consumed, message.energy_consumed, message.temperature) == (
+        -1,
+        -1,
+        -1,
+        32767,
+    )
     low = replace(full, warnings=(Caution.BATTERY,))
-    assert _told(telemetry.battery_status(low)).charge_state == 2
+    assert _message(telemetry.battery_status(low)).charge_state == 2
     empty = replace(low, reasons=(Reason.BATTERY_LOW,))
-    assert _told(telemetry.battery_status(empty)).charge_state == 3
+    assert _message(telemetry.battery_status(empty)).charge_state == 3
     assert telemetry.battery_status(STANDBY) is None
-    told = _told(telemetry.sys_status(STANDBY, 0))
-    assert (told.voltage_battery, told.battery_remaining) == (65535, -1)
+    message = _message(telemetry.sys_status(STANDBY, 0))
+    assert (message.voltage_battery, message.battery_remaining) == (65535, -1)
     for volts in (math.nan, -1.0, 1e9):
         assert telemetry.battery_status(replace(STANDBY, reading=reading_of(battery_v=volts))) is None
 
@@ -138,24 +143,26 @@ def test_the_battery() -> None:
     ],
 )
 def test_the_health_of_the_devices(values: dict[str, Any], health: int) -> None:
-    told = _told(telemetry.sys_status(replace(STANDBY, **values), 0))
-    assert told.onboard_control_sensors_health == health | dialect.MAV_SYS_STATUS_GEOFENCE
-    assert told.onboard_control_sensors_present == told.onboard_control_sensors_enabled
-    assert told.onboard_control_sensors_present & health == health
-    assert told.onboard_control_sensors_present & 0x4008000 == 0x4008000
+    message = _message(telemetry.sys_status(replace(STANDBY, **values), 0))
+    assert message.onboard_control_sensors_health == health | dialect.MAV_SYS_STATUS_GEOFENCE
+    assert message.onboard_control_sensors_present == message.onboard_control_sensors_enabled
+    assert message.onboard_control_sensors_present & health == health
+    assert message.onboard_control_sensors_present & 0x4008000 == 0x4008000
 
 
-def test_a_robot_without_a_scanner_tells_of_none() -> None:
-    told = _told(telemetry.sys_status(replace(STANDBY, devices={Device.DRIVE: True}), 0))
-    assert told.onboard_control_sensors_present == 0x8000
+def test_a_robot_without_a_scanner_reports_none() -> None:
+    message = _message(telemetry.sys_status(replace(STANDBY, devices={Device.DRIVE: True}), 0))
+    assert message.onboard_control_sensors_present == 0x8000
 
 
 def test_obstacles_go_clockwise_from_the_front() -> None:
     # Ahead, to the left and to the right; too near, too far.
-    told = _told(telemetry.obstacle_distance(scan_of({0: 1.0, 90: 2.0, 268: 0.299, 180: 0.05, 135: 9.0}), 0.12, 3.5))
-    assert (told.frame, told.increment, told.increment_f, told.angle_offset) == (12, 5, 5.0, 0.0)
-    assert (told.min_distance, told.max_distance, told.time_usec) == (12, 350, 100_000_000)
-    near = {place: value for place, value in enumerate(told.distances) if value != 65535}
+    message = _message(
+        telemetry.obstacle_distance(scan_of({0: 1.0, 90: 2.0, 268: 0.299, 180: 0.05, 135: 9.0}), 0.12, 3.5)
+    )
+    assert (message.frame, message.increment, message.increment_f, message.angle_offset) == (12, 5, 5.0, 0.0)
+    assert (message.min_distance, message.max_distance, message.time_usec) == (12, 350, 100_000_000)
+    near = {place: value for place, value in enumerate(message.distances) if value != 65535}
     assert near == {0: 100, 54: 200, 18: 29, 36: 12, 45: 351}
 
 

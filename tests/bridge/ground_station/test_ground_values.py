@@ -52,7 +52,7 @@ def test_names_that_would_be_the_same_are_not() -> None:
         ("Lift.weight_of_all", {"state": "up", "variables": {"weight_of_all": -1e300}}, -math.inf),
     ],
 )
-def test_what_is_told(meaning: str, component: dict[str, Any], expected: float | None) -> None:
+def test_named_values_of_the_status(meaning: str, component: dict[str, Any], expected: float | None) -> None:
     value = _values()[meaning]
     found = value.number({"Lift": component})
     assert found == expected

@@ -89,7 +89,7 @@ def test_an_empty_answer_has_no_data(answer: str, number: int, is_alert: bool) -
     assert _received(bytes.fromhex(answer)) == StatusPacket(1, number, is_alert, b"")
 
 
-def test_refusals_are_told_in_words() -> None:
+def test_refusals_are_reported_in_words() -> None:
     assert StatusPacket(1, 7, False, b"").refusal == "no access to this address"
     assert StatusPacket(1, 99, False, b"").refusal == "error 99"
 

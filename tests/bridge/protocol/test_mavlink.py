@@ -65,14 +65,14 @@ def test_standing_still_has_no_negative_zero() -> None:
 
 def test_modes_and_forced_disarming_are_asked_for_with_their_numbers() -> None:
     codec = dialect.MAVLink(None)
-    told = codec.decode(
+    message = codec.decode(
         bytearray(Codec(255, 190).encode(command(1, 1, MavCommand.SET_MODE, 2, *entering(Mode.GUIDED))))
     )
-    assert (told.command, told.confirmation, told.param1, told.param2) == (176, 2, 1.0, 15.0)
-    told = codec.decode(
+    assert (message.command, message.confirmation, message.param1, message.param2) == (176, 2, 1.0, 15.0)
+    message = codec.decode(
         bytearray(Codec(255, 190).encode(command(1, 1, MavCommand.ARM_DISARM, 0, *arming(False, True))))
     )
-    assert (told.command, told.param1, told.param2) == (400, 0.0, 21196.0)
+    assert (message.command, message.param1, message.param2) == (400, 0.0, 21196.0)
 
 
 def test_the_sequence_goes_around() -> None:
@@ -102,9 +102,9 @@ def test_axes_are_those_of_the_robot() -> None:
             0, frame, child, 1, 2, 0, [half, 0, 0, half], *speeds, [math.nan] * 21, [math.nan] * 21, 7
         )
 
-    told = _said(odometry)
-    assert told.heading_rad == pytest.approx(-math.pi / 2)
-    assert told == MotionEstimate(1, -2, told.heading_rad, 0.5, -0.25, 7)
+    message = _said(odometry)
+    assert message.heading_rad == pytest.approx(-math.pi / 2)
+    assert message == MotionEstimate(1, -2, message.heading_rad, 0.5, -0.25, 7)
     assert _said(lambda codec: odometry(codec, 1)) is not None
     assert _said(lambda codec: odometry(codec, 21)) is None
     assert _said(lambda codec: odometry(codec, 20, 8)) is None
@@ -151,8 +151,8 @@ def test_obstacles() -> None:
         distances = [*range(10, 80), 801, 65535]
         return lambda codec: codec.obstacle_distance_encode(0, 0, distances, 5, 5, 800, fine_deg, 2.5, frame)
 
-    told = _said(ring(0.0))
-    assert told == ObstacleRing((*range(10, 80), 801, 65535), 5.0, 2.5, 5, 800, True)
+    message = _said(ring(0.0))
+    assert message == ObstacleRing((*range(10, 80), 801, 65535), 5.0, 2.5, 5, 800, True)
     assert _said(ring(-2.5, 0)).increment_deg == -2.5
     assert not _said(ring(1.0, 0)).is_body_fixed
     sensor = _said(lambda codec: codec.distance_sensor_encode(0, 5, 800, 123, 0, 1, 2, 255))
@@ -322,8 +322,8 @@ def test_every_byte_of_a_datagram_is_counted(data: bytes) -> None:
 def test_what_may_come_unsigned_does_and_says_so() -> None:
     read: list[bool] = []
 
-    def note(told: Any) -> bool:
-        read.append(is_signed(told))
+    def note(message: Any) -> bool:
+        read.append(is_signed(message))
         return True
 
     codec = Codec(1, 1, KEY, timestamp=1000, unsigned=frozenset({76}))

@@ -35,8 +35,8 @@ def _twin(found: list[Sector]) -> tuple[float, ...]:
 
 @given(st.lists(sectors, max_size=6))
 def test_every_bin_has_the_nearest_of_what_reaches_into_it(found: list[Sector]) -> None:
-    told = nearest_in_sectors(found)
-    assert [str(range_m) for range_m in told] == [str(range_m) for range_m in _twin(found)]
+    result = nearest_in_sectors(found)
+    assert [str(range_m) for range_m in result] == [str(range_m) for range_m in _twin(found)]
 
 
 def _ring(distances_cm: tuple[int, ...], increment_deg: float = 5.0, offset_deg: float = 0.0,

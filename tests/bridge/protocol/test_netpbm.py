@@ -58,7 +58,7 @@ def test_however_a_stream_is_split_every_picture_is_found(
         encoded(SMALL) + bytes(60),
     ],
 )
-def test_what_is_no_stream_of_pictures_is_told(data: bytes) -> None:
+def test_what_is_no_stream_of_pictures_is_reported(data: bytes) -> None:
     with pytest.raises(NotPicturesError):
         Decoder().feed(data)
 

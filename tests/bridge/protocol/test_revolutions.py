@@ -126,7 +126,7 @@ def test_an_angle_that_trembles_ends_no_turn() -> None:
     assert len(revolution.angles_deg) == 101 + 103 + 161
 
 
-def test_the_speed_is_the_last_one_told() -> None:
+def test_the_speed_is_the_last_one_reported() -> None:
     parts = [_points(0, 359, 1), _points(0, 99, 2, 10.0), _points(100, 359, 2), _points(0, 9, 3)]
     first, second = _turns(RevolutionBuilder(), parts)
     assert first.revolutions_per_s == second.revolutions_per_s == 10.0
@@ -151,7 +151,7 @@ def test_a_device_that_stays_where_it_is_fills_no_memory() -> None:
 def test_turns_hold_points_of_one_turn_in_order_and_every_complete_turn_is_there(
     widths: list[int], lost: set[int], begin: int
 ) -> None:
-    """A device that measures its own count of points: which turn a point is from can be told from its range."""
+    """A device that measures its own count of points: which turn a point is from can be read from its range."""
     builder = RevolutionBuilder()
     revolutions: list[Revolution] = []
     came: dict[int, set[int]] = {}

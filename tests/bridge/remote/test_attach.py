@@ -38,12 +38,6 @@ def endpoint(daemon: FakeDaemon) -> Any:
         yield made
 
 
-@pytest.fixture
-def stub(endpoint: RemoteEndpoint) -> Any:
-    with connected(endpoint.address) as made:
-        yield made
-
-
 def attached(stub: Any, **hello: Any) -> Attachment:
     """A program that has been welcomed."""
     made = Attachment(stub, **{"name": "arm", **hello})
@@ -358,7 +352,7 @@ class TestHostilePrograms:
             daemon.program()
         # Its connection is closed, without a word.
         assert wait_until(lambda: daemon.of(programs.Detached))[0].program is daemon.program()
-        # What the loop still tells it goes nowhere.
+        # What the loop still sends it goes nowhere.
         daemon.program().send(programs.CallMade("open", 1, None))
 
     def test_a_program_that_hangs_with_its_whole_machine_is_taken_for_gone(
@@ -459,7 +453,7 @@ class TestHostilePrograms:
         wait_until(lambda: len(daemon.of(programs.MessageReceived)) == 12)
         program.end()
 
-    def test_the_end_of_the_bridge_is_told(self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_the_end_of_the_bridge_is_reported(self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch) -> None:
         # However long a busy machine takes for it.
         monkeypatch.setattr(endpoint_module, "_GRACE_S", PATIENCE_S)
         with served(daemon) as endpoint, connected(endpoint.address) as stub:

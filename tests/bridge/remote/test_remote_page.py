@@ -1,4 +1,4 @@
-"""The page of the documentation tells the limits that hold, and every call."""
+"""The page of the documentation states the limits that hold, and every call."""
 
 import re
 from pathlib import Path

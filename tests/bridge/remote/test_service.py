@@ -37,24 +37,6 @@ from support.remote import READING, FakeDaemon, connected, model, scan, served
 from support.waiting import PATIENCE_S, wait_until
 
 
-@pytest.fixture
-def daemon() -> Any:
-    with FakeDaemon() as made:
-        yield made
-
-
-@pytest.fixture
-def endpoint(daemon: FakeDaemon) -> Any:
-    with served(daemon) as made:
-        yield made
-
-
-@pytest.fixture
-def stub(endpoint: RemoteEndpoint) -> Any:
-    with connected(endpoint.address) as made:
-        yield made
-
-
 def status(stub: Any) -> Any:
     return stub.GetStatus(pb.GetStatusRequest(), timeout=PATIENCE_S)
 
@@ -96,28 +78,28 @@ class TestDefinition:
         assert [list(item.fields) for item in found.communications] == [["linear", "angular"], [], [], [], []]
 
     @pytest.mark.parametrize("is_layer", [True, False])
-    def test_the_deployment_is_told(self, is_layer: bool) -> None:
+    def test_the_deployment_is_reported(self, is_layer: bool) -> None:
         with FakeDaemon(is_layer=is_layer) as daemon, served(daemon) as endpoint, connected(endpoint.address) as stub:
             assert stub.GetDefinition(pb.GetDefinitionRequest(), timeout=PATIENCE_S).is_layer is is_layer
 
     @pytest.mark.parametrize("name", ["", "waffle_pi"])
-    def test_the_turtlebot_is_told(self, name: str, daemon: FakeDaemon) -> None:
+    def test_the_turtlebot_is_reported(self, name: str, daemon: FakeDaemon) -> None:
         daemon.operations.turtlebot = name
         with served(daemon) as endpoint, connected(endpoint.address) as stub:
             assert stub.GetDefinition(pb.GetDefinitionRequest(), timeout=PATIENCE_S).turtlebot == name
 
     @pytest.mark.parametrize("place", [None, (0.0, -0.06)])
-    def test_the_place_of_the_lidar_is_told(self, place: tuple[float, float] | None, daemon: FakeDaemon) -> None:
+    def test_the_place_of_the_lidar_is_reported(self, place: tuple[float, float] | None, daemon: FakeDaemon) -> None:
         daemon.operations.scanner_place = place
         with served(daemon) as endpoint, connected(endpoint.address) as stub:
-            told = stub.GetDefinition(pb.GetDefinitionRequest(), timeout=PATIENCE_S)
-        assert {told.HasField("scanner_x_m"), told.HasField("scanner_y_m")} == {place is not None}
+            definition = stub.GetDefinition(pb.GetDefinitionRequest(), timeout=PATIENCE_S)
+        assert {definition.HasField("scanner_x_m"), definition.HasField("scanner_y_m")} == {place is not None}
         if place is not None:
-            assert (told.scanner_x_m, told.scanner_y_m) == place
+            assert (definition.scanner_x_m, definition.scanner_y_m) == place
 
 
 class TestStatus:
-    def test_everything_is_told(self, daemon: FakeDaemon, stub: Any) -> None:
+    def test_everything_is_reported(self, daemon: FakeDaemon, stub: Any) -> None:
         shown = daemon.show(reading=READING, scan=scan(1.0), problem="the drive base is lost", state=State.FAULT)
         found = status(stub).snapshot
         assert found.number == shown.number
@@ -140,7 +122,7 @@ class TestStatus:
         assert found.has_scan
         assert found.overruns == 4
 
-    def test_the_drive_is_told_with_what_is_not_known_left_out(self, daemon: FakeDaemon, stub: Any) -> None:
+    def test_the_drive_is_reported_with_what_is_not_known_left_out(self, daemon: FakeDaemon, stub: Any) -> None:
         daemon.show(reading=READING)
         drive = status(stub).snapshot.drive
         assert (drive.pose.x_m, drive.pose.y_m, drive.pose.heading_rad) == (1.0, 2.0, 0.5)
@@ -153,7 +135,9 @@ class TestStatus:
         assert dict(drive.buttons) == {"button_1": True}
         assert drive.age_s == pytest.approx(monotonic(), abs=PATIENCE_S)
 
-    def test_what_the_drive_measures_of_its_wheels_and_its_motion_is_told(self, daemon: FakeDaemon, stub: Any) -> None:
+    def test_what_the_drive_measures_of_its_wheels_and_its_motion_is_reported(
+        self, daemon: FakeDaemon, stub: Any
+    ) -> None:
         daemon.show(reading=READING)
         drive = status(stub).snapshot.drive
         assert not any(drive.HasField(name) for name in ("left_wheel_m", "right_wheel_m", "wheel_radius_m"))
@@ -165,8 +149,8 @@ class TestStatus:
         assert (drive.time_s, dict(drive.imu)) == (12.5, imu)
         assert (drive.left_wheel_m, drive.right_wheel_m, drive.wheel_radius_m) == (0.0, 0.75, 0.033)
         assert drive.HasField("left_wheel_m")
-        told = replace(READING, pose_covariance=tuple(map(float, range(9))), velocity_variances=(0.0, 0.5))
-        daemon.show(reading=told)
+        reading = replace(READING, pose_covariance=tuple(map(float, range(9))), velocity_variances=(0.0, 0.5))
+        daemon.show(reading=reading)
         drive = status(stub).snapshot.drive
         assert list(drive.pose_covariance) == list(range(9))
         assert (drive.HasField("linear_variance"), drive.linear_variance, drive.angular_variance) == (True, 0.0, 0.5)
@@ -187,9 +171,9 @@ class TestStatus:
         monkeypatch.setattr(time, "clock_gettime", lambda clock: time.monotonic() + 86_400.0)
         daemon.show(reading=replace(READING, time_s=SYSTEM_HOST.monotonic() - 100.0))
         assert status(stub).snapshot.drive.age_s == pytest.approx(100.0, abs=PATIENCE_S)
-        told = pb.Scan()
-        convert.put_scan(told, replace(scan(1.0), time_s=SYSTEM_HOST.monotonic() - 100.0))
-        assert told.age_s == pytest.approx(100.0, abs=PATIENCE_S)
+        message = pb.Scan()
+        convert.put_scan(message, replace(scan(1.0), time_s=SYSTEM_HOST.monotonic() - 100.0))
+        assert message.age_s == pytest.approx(100.0, abs=PATIENCE_S)
 
     def test_a_loop_that_hangs_is_seen_by_the_age(self, daemon: FakeDaemon, stub: Any) -> None:
         daemon.show(time_s=time.time() - 100.0)
@@ -266,7 +250,7 @@ class TestCommands:
         wait_until(is_taken_back)
         assert daemon.commands()[0] is OperatorCommand.START
 
-    def test_a_loop_that_does_not_answer_is_told(
+    def test_a_loop_that_does_not_answer_is_reported(
         self, daemon: FakeDaemon, stub: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         monkeypatch.setattr(service, "COMMAND_LIMIT_S", 0.05)
@@ -458,7 +442,7 @@ class TestWatch:
         assert code is grpc.StatusCode.INVALID_ARGUMENT
         assert details == "maximum_rate_hz may be from 0.1 to 100"
 
-    def test_who_reads_too_slowly_is_told_how_many_events_it_lost(self, daemon: FakeDaemon, stub: Any) -> None:
+    def test_who_reads_too_slowly_learns_how_many_events_it_lost(self, daemon: FakeDaemon, stub: Any) -> None:
         call = stub.Watch(pb.WatchRequest(maximum_rate_hz=100), timeout=PATIENCE_S)
         next(call)
         count = 3000
@@ -479,7 +463,7 @@ class TestWatch:
         assert last == count - 1.0
         call.cancel()
 
-    def test_the_end_of_the_bridge_is_told_with_the_last_state(
+    def test_the_end_of_the_bridge_is_reported_with_the_last_state(
         self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch
     ) -> None:
         # However long a busy machine takes for the last word.
@@ -541,7 +525,7 @@ class TestEndpoint:
                 answer = health_pb2_grpc.HealthStub(channel).Check(request, timeout=PATIENCE_S)
                 assert answer.status == health_pb2.HealthCheckResponse.SERVING
 
-    def test_an_address_in_use_is_told(self, daemon: FakeDaemon, endpoint: RemoteEndpoint) -> None:
+    def test_an_address_in_use_is_reported(self, daemon: FakeDaemon, endpoint: RemoteEndpoint) -> None:
         with pytest.raises(RemoteError, match="cannot listen on 127"):
             serve(daemon.operations, RemoteSettings(endpoint.address))
 

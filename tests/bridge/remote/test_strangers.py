@@ -27,19 +27,7 @@ from support.strangers import SETTINGS, Stranger, strangers
 from support.waiting import PATIENCE_S, wait_until
 
 
-@pytest.fixture
-def daemon() -> Any:
-    with FakeDaemon() as made:
-        yield made
-
-
-@pytest.fixture
-def endpoint(daemon: FakeDaemon) -> Any:
-    with served(daemon) as made:
-        yield made
-
-
-def test_connections_that_take_all_places_are_told_of(
+def test_connections_that_take_all_places_are_reported(
     daemon: FakeDaemon, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(endpoint_module, "IDLE_S", 3600.0)
@@ -63,7 +51,7 @@ def test_idle_connections_are_ended_so_that_a_stop_comes_through(
     assert daemon.commands() == [OperatorCommand.STOP]
 
 
-def test_that_all_places_are_taken_is_told_once(caplog: pytest.LogCaptureFixture) -> None:
+def test_that_all_places_are_taken_is_reported_once(caplog: pytest.LogCaptureFixture) -> None:
     with socket.create_server(("127.0.0.1", 0)) as listener:
         port = listener.getsockname()[1]
         slots = ConnectionSlots(port, 2)
@@ -129,8 +117,8 @@ def test_health_follows_the_loop(daemon: FakeDaemon, endpoint: RemoteEndpoint) -
 def test_calls_of_a_connection_are_bounded(endpoint: RemoteEndpoint) -> None:
     with strangers(endpoint.address, 1) as (stranger,):
         wait_until(lambda: any(kind == SETTINGS and not flags for kind, flags, _ in stranger.frames))
-        told = next(content for kind, flags, content in stranger.frames if kind == SETTINGS and not flags)
-        settings = {struct.unpack_from(">HI", told, at) for at in range(0, len(told), 6)}
+        payload = next(content for kind, flags, content in stranger.frames if kind == SETTINGS and not flags)
+        settings = {struct.unpack_from(">HI", payload, at) for at in range(0, len(payload), 6)}
         assert (3, MAXIMUM_CALLS) in settings
 
 

@@ -23,7 +23,7 @@ def test_it_is_the_least_difference_of_the_window(notes: list[tuple[float, float
 
 
 @given(st.lists(st.tuples(PASSED_S, DELAY_S), min_size=1, max_size=30), st.floats(-1e6, 1e6))
-def test_no_time_is_told_as_before_it_was(notes: list[tuple[float, float]], ahead_s: float) -> None:
+def test_no_time_is_converted_to_one_before_it(notes: list[tuple[float, float]], ahead_s: float) -> None:
     offset, now_s = ClockOffset(), 100.0
     for passed_s, delay_s in notes:
         now_s += passed_s + delay_s

@@ -101,7 +101,7 @@ def test_the_whole_program_knows_it(capsys: pytest.CaptureFixture[str]) -> None:
     )
 
 
-def test_files_that_cannot_be_used_are_told_at_once(
+def test_files_that_cannot_be_used_are_reported_at_once(
     outlet: type[Outlet], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     empty = tmp_path / "empty"
@@ -148,8 +148,8 @@ def test_an_earlier_bridge_ends_it(
         daemon.operations.turtlebot = "burger"
         with served(daemon) as bridge:
             assert status("--address", bridge.address, *arguments) == 2
-    told, error = capsys.readouterr().err.splitlines()
-    assert told.startswith("robosc-bridge: publishes what the bridge of Porter at 127.0.0.1:")
+    opening, error = capsys.readouterr().err.splitlines()
+    assert opening.startswith("robosc-bridge: publishes what the bridge of Porter at 127.0.0.1:")
     assert "is of an earlier version" in error
     assert (outlet.made[-1]["sends_odom_tf"], outlet.made[-1]["sends_static_tf"]) == sends
 
@@ -171,7 +171,7 @@ def test_a_failure_of_ros_ends_it(
     )
 
 
-def test_a_bridge_that_goes_is_told_once_and_found_again(
+def test_a_bridge_that_goes_is_reported_once_and_found_again(
     outlet: type[Outlet], monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(command, "RETRY_S", 0.01)

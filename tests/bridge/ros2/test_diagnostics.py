@@ -14,14 +14,14 @@ def snapshot(**changes: object) -> pb.Snapshot:
     return pb.Snapshot(**{"state": pb.BRIDGE_STATE_RUNNING, "devices": devices, **changes})  # type: ignore[arg-type]
 
 
-def told(shown: pb.Snapshot | None, age_s: float = 0.1, link: Link = LINK) -> dict[str, Entry]:
+def entries_of(shown: pb.Snapshot | None, age_s: float = 0.1, link: Link = LINK) -> dict[str, Entry]:
     found = entries(link, shown, age_s)
     assert len({entry.name for entry in found}) == len(found)
     return {entry.name: entry for entry in found}
 
 
 def test_a_robot_that_is_well() -> None:
-    found = told(snapshot(components=[pb.ComponentState(name="Desk", state="idle")], enabled=["drive", "show"]))
+    found = entries_of(snapshot(components=[pb.ComponentState(name="Desk", state="idle")], enabled=["drive", "show"]))
     assert {name: entry.level for name, entry in found.items()} == dict.fromkeys(
         ("bridge", "safety", "supervisor", "warnings", "drive", "scanner"), Level.OK
     )
@@ -63,13 +63,13 @@ def test_a_robot_that_is_well() -> None:
     ],
 )
 def test_what_is_not_as_it_should_be(changes: dict[str, object], name: str, level: Level, words: str) -> None:
-    entry = told(snapshot(**changes))[name]
+    entry = entries_of(snapshot(**changes))[name]
     assert (entry.level, entry.message) == (level, words)
 
 
-def test_the_drive_tells_what_it_knows() -> None:
+def test_the_drive_reports_what_it_knows() -> None:
     drive = pb.DriveState(is_torque_on=True, battery_v=11.84, buttons={"button_1": True, "button_2": False})
-    assert told(snapshot(drive=drive))["drive"].values == {
+    assert entries_of(snapshot(drive=drive))["drive"].values == {
         "torque": "on",
         "battery": "11.8 V",
         "button_1": "pressed",
@@ -77,7 +77,7 @@ def test_the_drive_tells_what_it_knows() -> None:
 
 
 def test_a_loop_that_hangs_is_an_error_whatever_it_said_last() -> None:
-    found = told(snapshot(), age_s=2.5)
+    found = entries_of(snapshot(), age_s=2.5)
     assert (found["bridge"].level, found["bridge"].message) == (Level.ERROR, "The bridge's loop hangs, for 2.5 s.")
     assert {entry.level for name, entry in found.items() if name != "bridge"} == {Level.STALE}
     assert "scanner" in found
@@ -85,7 +85,7 @@ def test_a_loop_that_hangs_is_an_error_whatever_it_said_last() -> None:
 
 @pytest.mark.parametrize("shown", [None, snapshot()])
 def test_a_bridge_that_is_gone_is_an_error_and_the_rest_is_stale(shown: pb.Snapshot | None) -> None:
-    found = told(shown, link=GONE)
+    found = entries_of(shown, link=GONE)
     assert (found["bridge"].level, found["bridge"].message) == (Level.ERROR, GONE.problem)
     assert {entry.level for name, entry in found.items() if name != "bridge"} == {Level.STALE}
     assert ("scanner" in found) is (shown is not None)

@@ -31,7 +31,7 @@ def test_no_frame_is_in_itself() -> None:
     assert [(item.parent, item.child) for item in found] == [("base_link", "laser"), ("base_link", "imu_link")]
 
 
-def test_another_robot_needs_to_tell_where_its_laser_is() -> None:
+def test_another_robot_needs_the_place_of_its_laser() -> None:
     place = Place(0.1, 0.0, 0.2)
     assert places_of("", None) is None
     assert places_of("tracked", None) is None
@@ -46,5 +46,5 @@ def test_a_place_of_the_configuration_takes_the_turtlebots_place_and_keeps_its_h
         burger.base, Place(0.05, -0.02, burger.scan.z_m), burger.imu
     )
     assert places_of("", None, (0.05, -0.02)) == Places(Place(), Place(0.05, -0.02, 0.0))
-    told = Place(0.1, 0.0, 0.2)
-    assert places_of("burger", told, (0.05, -0.02)) == Places(burger.base, told, burger.imu)
+    place = Place(0.1, 0.0, 0.2)
+    assert places_of("burger", place, (0.05, -0.02)) == Places(burger.base, place, burger.imu)

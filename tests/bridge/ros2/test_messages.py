@@ -72,7 +72,7 @@ class TestOdometry:
         assert list(found.pose.covariance) == covariance
         assert list(found.twist.covariance) == list(uncertainty.twist())
 
-    def test_variances_that_the_bridge_tells(self) -> None:
+    def test_variances_that_the_bridge_reports(self) -> None:
         drive = pb.DriveState(linear_variance=0.25, angular_variance=0.5)
         assert list(messages.odometry(drive, 0, FRAMES, [0.0] * 36).twist.covariance) == list(
             uncertainty.twist(0.25, 0.5)
@@ -216,8 +216,8 @@ class TestScan:
 
 
 def test_diagnostics() -> None:
-    told = [Entry("bridge", Level.OK, "running", {"state": "running"}), Entry("safety", Level.ERROR, "Stopped.")]
-    found = sent(messages.diagnostics(told, STAMP_NS, "Porter"))
+    entries = [Entry("bridge", Level.OK, "running", {"state": "running"}), Entry("safety", Level.ERROR, "Stopped.")]
+    found = sent(messages.diagnostics(entries, STAMP_NS, "Porter"))
     assert stamp_ns(found.header) == STAMP_NS
     assert [(item.name, item.level, item.message, item.hardware_id) for item in found.status] == [
         ("robosc_bridge: bridge", b"\x00", "running", "Porter"),

@@ -43,8 +43,8 @@ class Bench:
     def put_scan(self, scan: Any, stamp_ns: int) -> None:
         self.scans.append(stamp_ns)
 
-    def put_diagnostics(self, told: tuple[Entry, ...], stamp_ns: int, robot: str) -> None:
-        self.reports.append(({entry.name: entry for entry in told}, stamp_ns, robot))
+    def put_diagnostics(self, entries: tuple[Entry, ...], stamp_ns: int, robot: str) -> None:
+        self.reports.append(({entry.name: entry for entry in entries}, stamp_ns, robot))
 
     def report(self) -> dict[str, Entry]:
         self.relay.report()
@@ -63,7 +63,7 @@ class Bench:
         x_m: float = 0.0,
         age_s: float = 0.0,
     ) -> None:
-        """A response comes; times are by this computer's clock, and were told by the bridge's."""
+        """A response comes; times are by this computer's clock, and were measured by the bridge's."""
         response = pb.WatchResponse(
             sent_s=self.now_s + AHEAD_S - delay_s, snapshot=pb.Snapshot(age_s=age_s, state=pb.BRIDGE_STATE_RUNNING)
         )
@@ -124,7 +124,7 @@ def test_a_reading_that_a_better_offset_dates_later_does_not_go_on_again(bench: 
     bench.pass_s(29.9)
     bench.take(read_s=129.8, turned_s=129.8, delay_s=0.2)
     assert bench.stamps_s() == [129.8]
-    # What told the offset best is too old to count.
+    # What measured the offset best is too old to count.
     bench.pass_s(0.2)
     bench.take(read_s=129.8, turned_s=129.8, delay_s=0.2)
     assert (len(bench.drives), len(bench.scans)) == (1, 1)
@@ -154,7 +154,7 @@ def test_a_clock_that_is_set_back_stops_nothing(bench: Bench) -> None:
     assert bench.stamps_s() == [99.95, -3500.0]
 
 
-def test_the_battery_is_told_once_a_second(bench: Bench) -> None:
+def test_the_battery_is_reported_once_a_second(bench: Bench) -> None:
     for _ in range(50):
         bench.take(read_s=bench.now_s - 0.01)
         bench.pass_s(0.05)
@@ -182,14 +182,14 @@ def test_the_covariance_grows_with_the_way_also_while_nothing_is_published(bench
     assert bench.drives[1][2][0] == pytest.approx(1e-6 + 1e-4)
 
 
-def test_a_covariance_that_the_bridge_tells_goes_before_an_assumed_one(bench: Bench) -> None:
+def test_a_covariance_that_the_bridge_reports_goes_before_an_assumed_one(bench: Bench) -> None:
     drive = pb.DriveState(time_s=99.9 + AHEAD_S, pose_covariance=[0.5, 0, 0, 0, 0.25, 0, 0, 0, 0.125])
     bench.relay.take(pb.WatchResponse(sent_s=bench.now_s + AHEAD_S, snapshot=pb.Snapshot(drive=drive)))
     covariance = bench.drives[0][2]
     assert (covariance[0], covariance[7], covariance[35]) == (0.5 + 1e-6, 0.25 + 1e-6, 0.125 + 1e-6)
 
 
-def test_a_bridge_that_does_not_tell_its_times_is_refused(bench: Bench) -> None:
+def test_a_bridge_that_does_not_send_its_times_is_refused(bench: Bench) -> None:
     with pytest.raises(EarlierBridgeError, match=r"robot:1 is of an earlier version \(1.2\)"):
         bench.relay.take(pb.WatchResponse(snapshot=pb.Snapshot()))
 
@@ -224,7 +224,7 @@ class TestReports:
         bench.take()
         assert bench.report()["bridge"].level is Level.OK
 
-    def test_a_loop_that_hangs_is_told_though_the_endpoint_answers(self, bench: Bench) -> None:
+    def test_a_loop_that_hangs_is_reported_though_the_endpoint_answers(self, bench: Bench) -> None:
         bench.take(age_s=1.9)
         assert bench.report()["bridge"].level is Level.OK
         bench.pass_s(0.2)

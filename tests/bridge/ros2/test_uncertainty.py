@@ -15,7 +15,7 @@ STEPS = st.lists(st.tuples(st.floats(-0.2, 0.2), st.floats(-0.5, 0.5)), max_size
 
 
 def poses(steps: list[tuple[float, float]], heading_rad: float = 0.0) -> list[PlanarPose]:
-    """Poses along arcs, each told by its way and its rotation."""
+    """Poses along arcs, each given by its way and its rotation."""
     found = [PlanarPose(0.0, 0.0, heading_rad)]
     for way_m, rotation_rad in steps:
         before = found[-1]
@@ -80,19 +80,19 @@ def test_a_robot_at_rest_keeps_what_it_has() -> None:
     assert np.array_equal(after(way), after(way + [way[-1]] * 100))
 
 
-def test_a_velocity_is_told_by_what_wheels_measure() -> None:
+def test_a_velocity_has_the_variances_of_wheel_measurements() -> None:
     found = np.array(uncertainty.twist()).reshape(6, 6)
     assert np.array_equal(found, np.diag(np.diag(found)))
     assert np.diag(found).tolist() == [1e-4, 1e-4, 1e6, 1e6, 1e6, 1e-3]
-    told = np.array(uncertainty.twist(0.25, 0.0)).reshape(6, 6)
-    assert np.diag(told).tolist() == [0.25, 1e-4, 1e6, 1e6, 1e6, 1e-6]
+    covariance = np.array(uncertainty.twist(0.25, 0.0)).reshape(6, 6)
+    assert np.diag(covariance).tolist() == [0.25, 1e-4, 1e6, 1e6, 1e6, 1e-6]
 
 
-def test_a_covariance_that_is_told() -> None:
+def test_a_covariance_that_is_reported() -> None:
     planar = [0.1, 0.01, 0.02, 0.01, 0.2, 0.03, 0.02, 0.03, 0.3]
-    told = uncertainty.reported_pose(planar)
-    assert told is not None
-    found = np.array(told).reshape(6, 6)
+    covariance = uncertainty.reported_pose(planar)
+    assert covariance is not None
+    found = np.array(covariance).reshape(6, 6)
     assert np.array_equal(found, found.T)
     assert np.diag(found).tolist() == [0.1 + 1e-6, 0.2 + 1e-6, 1e6, 1e6, 1e6, 0.3 + 1e-6]
     assert (found[0, 1], found[0, 5], found[1, 5]) == (0.01, 0.02, 0.03)

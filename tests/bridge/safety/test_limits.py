@@ -129,7 +129,7 @@ def test_only_scanner_operator_and_battery_may_be_missing() -> None:
         SafetyLimits(linear_m_s=1, angular_rad_s=1, wheel_m_s=1, separation_m=1)  # type: ignore[call-arg]
 
 
-def test_all_problems_are_told_at_once() -> None:
+def test_all_problems_are_reported_at_once() -> None:
     wrong: dict[str, Any] = {"linear_m_s": 0, "torque_off_s": 300, "battery_warn_v": 11, "min_valid_share": 5}
     with pytest.raises(ValueError, match=r"^linear_m_s .*; torque_off_s .*; min_valid_share .*; battery_warn_v .*$"):
         replace(LIMITS, **wrong)

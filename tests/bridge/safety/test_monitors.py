@@ -177,7 +177,7 @@ def test_when_the_clock_goes_back_the_mean_begins_anew() -> None:
     ("voltage_v", "time_s"),
     [(None, 11.0), (math.nan, 11.0), (math.inf, 11.0), (-math.inf, 11.0), (0.0, math.nan), (0.0, math.inf)],
 )
-def test_what_is_no_voltage_tells_nothing(voltage_v: float | None, time_s: float) -> None:
+def test_what_is_no_voltage_reports_nothing(voltage_v: float | None, time_s: float) -> None:
     assert battery((12.0, 10.0), (voltage_v, time_s), (12.0, 12.0)) == (False, False)
     assert battery((voltage_v, time_s), (voltage_v, time_s), (11.0, 10.0), (11.0, 12.0)) == (True, True)
 
@@ -199,7 +199,7 @@ GOOD, BAD = ((0.0, 0.0), (0.0, 0.0)), ((0.0, 0.0), (0.1, 0.0))
         (0.125, 0.06249, False),
         (0.125, 0.1875, True),
         (0.125, math.nextafter(0.1875, 1), False),
-        (0.015625, 0.0, True),  # too slow to tell
+        (0.015625, 0.0, True),  # too slow to judge
         (0.125, -0.125, False),
         (0.0, math.nan, False),
         (0.125, math.nan, False),
@@ -255,7 +255,7 @@ def test_a_wheel_is_compared_with_the_goal_as_its_motor_goes_there() -> None:
     held: list[Read] = [(goals, (0.0, 0.0), 10.0 + step / 8) for step in range(33)]
     # 0.03125 m/s are reached after 0.25 s, and exceeded after 0.375 s.
     assert astray(*held, acceleration_m_s2=0.125).index(True) == 3 + 5
-    # What brakes is slower than told as well, and one that does not brake is found.
+    # What brakes is slower than commanded as well, and one that does not brake is found.
     braked: list[Read] = [((0.0, 0.0), (0.5 - step / 64, 0.5 - step / 64), 10.0 + step / 8) for step in range(33)]
     assert not any(astray(*braked, acceleration_m_s2=0.125))
     assert any(astray(*[(goals, (0.5, 0.5), time_s) for goals, _, time_s in braked], acceleration_m_s2=0.125))
@@ -285,8 +285,8 @@ def test_wheels_that_stood_still_may_not_rotate_by_themselves(speeds: tuple[floa
 def test_wheels_that_have_not_stood_still_yet_are_none_that_begin_to_rotate() -> None:
     moves: list[Read] = [(ZERO, (0.5, 0.5), 10.0 + step) for step in range(3)]
     assert unbidden(*moves) == [False] * 3
-    told: Read = ((0.5, 0.5), (0.5, 0.5), 9.5)
-    assert unbidden((ZERO, ZERO, 9.0), told, *moves) == [False] * 5
+    commanded: Read = ((0.5, 0.5), (0.5, 0.5), 9.5)
+    assert unbidden((ZERO, ZERO, 9.0), commanded, *moves) == [False] * 5
 
 
 def test_slow_ones_do_not_count() -> None:

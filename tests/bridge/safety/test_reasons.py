@@ -52,10 +52,10 @@ def restart(bench: Bench) -> None:
 
 
 def test_every_reason_is_a_sentence_and_either_latches_or_not() -> None:
-    told = {*LATCHED, Reason.WHEEL_ASTRAY, Reason.UNBIDDEN_MOTION, Reason.BATTERY_LOW}
-    assert set(LATCHING) == told
+    expected = {*LATCHED, Reason.WHEEL_ASTRAY, Reason.UNBIDDEN_MOTION, Reason.BATTERY_LOW}
+    assert set(LATCHING) == expected
     others = {reason for reason, _ in END_BY_THEMSELVES.values()}
-    assert told | others | {Reason.STANDBY, Reason.CLOCK, Reason.TORQUE_AWAITED, Reason.SCAN_BLIND} == set(Reason)
+    assert expected | others | {Reason.STANDBY, Reason.CLOCK, Reason.TORQUE_AWAITED, Reason.SCAN_BLIND} == set(Reason)
     assert all(text.endswith(".") and text[0].isupper() for text in [*Reason, *Caution])
 
 
@@ -168,7 +168,7 @@ def test_a_fault_without_torque_wanted_latches_and_leaves_torque_off() -> None:
 
 
 @pytest.mark.parametrize("wheels_m_s", [(0.0, 0.0), (0.1, 0.0), (0.0, 0.1), (-0.1, -0.1), (0.1, math.nan)])
-def test_a_wheel_that_does_not_turn_as_told_stops_everything(wheels_m_s: tuple[float, float]) -> None:
+def test_a_wheel_that_does_not_turn_as_commanded_stops_everything(wheels_m_s: tuple[float, float]) -> None:
     bench = Bench()
     bench.drive()
     bench.wheels_m_s = wheels_m_s
@@ -206,9 +206,7 @@ def idle(bench: Bench) -> tuple[Reason, ...]:
 
 
 @pytest.mark.parametrize("stands", [stopped, idle])
-def test_wheels_that_nobody_commands_lose_their_torque_at_once(
-    stands: Callable[[Bench], tuple[Reason, ...]],
-) -> None:
+def test_wheels_that_nobody_commands_lose_their_torque_at_once(stands: Callable[[Bench], tuple[Reason, ...]]) -> None:
     """A button of the board, or an RC-100, that acts while torque is on."""
     bench = Bench()
     bench.drive()
@@ -242,12 +240,12 @@ def test_motors_with_a_slow_ramp_are_not_astray() -> None:
         assert bench.cycle().reasons == ()
     bench.wanted = Velocity(0.2)
     bench.wheels_m_s = (0.0, 0.0)
-    # It must be told 0.02 m/s first, and then be off for its time.
+    # It must be commanded 0.02 m/s first, and then be off for its time.
     assert bench.until_still(0.02 / 0.033 + 0.8 + 3 * STEP_S)[1] is Reason.WHEEL_ASTRAY
 
 
 @pytest.mark.parametrize(("has_own_controls", "is_off"), [(True, False), (True, True), (False, False)])
-def test_whoever_stops_a_board_with_own_controls_is_told_that_it_holds(has_own_controls: bool, is_off: bool) -> None:
+def test_whoever_stops_a_board_with_own_controls_learns_that_it_holds(has_own_controls: bool, is_off: bool) -> None:
     bench = Bench(has_own_controls=has_own_controls, is_torque_off_on_operator_stop=is_off)
     bench.drive()
     assert bench.last.warnings == ()
@@ -297,7 +295,7 @@ def test_torque_is_late_only_beyond_its_time() -> None:
     assert layer.output(math.nextafter(64.5, 65)).reasons == (Reason.TORQUE_LOST, Reason.TORQUE_AWAITED)
 
 
-def test_a_reading_from_before_tells_nothing_about_torque() -> None:
+def test_a_reading_from_before_says_nothing_about_torque() -> None:
     bench = Bench()
     bench.layer.enable()
     bench.report()
@@ -308,7 +306,7 @@ def test_a_reading_from_before_tells_nothing_about_torque() -> None:
         assert Reason.TORQUE_AWAITED in bench.layer.output(now_s).reasons
     bench.layer.on_drive_reading(reading(math.nextafter(now_s, math.inf), is_torque_on=True))
     assert bench.layer.output(now_s).reasons == ()
-    # It was on then; a late reading from before does not tell that it is off.
+    # It was on then; a late reading from before does not show that it is off.
     bench.layer.on_drive_reading(reading(now_s, is_torque_on=False))
     assert bench.layer.output(now_s).reasons == ()
 
@@ -405,7 +403,7 @@ def test_when_the_clock_goes_back_torque_still_comes_and_goes_in_time() -> None:
     assert not bench.cycles(0.06).is_torque_wanted
 
 
-def test_several_reasons_are_told_together_in_their_order() -> None:
+def test_several_reasons_are_reported_together_in_their_order() -> None:
     bench = Bench()
     assert bench.layer.output(1000.0).reasons == (
         Reason.STANDBY,
@@ -428,7 +426,7 @@ AHEAD, BEHIND, NOWHERE = (
 
 
 @pytest.mark.parametrize(("blind", "speed_m_s"), [(BEHIND, 0.1), (AHEAD, -0.1), (NOWHERE, 0.1), (NOWHERE, -0.1)])
-def test_where_the_scanner_sees_nothing_a_person_is_told(blind: tuple[float, ...], speed_m_s: float) -> None:
+def test_a_scanner_that_sees_nothing_is_reported_to_a_person(blind: tuple[float, ...], speed_m_s: float) -> None:
     bench = Bench(is_stopped_when_blind=False)
     bench.ranges_m = blind
     bench.drive(speed_m_s)
@@ -486,7 +484,7 @@ def test_a_reset_forgets_where_it_was_to_go() -> None:
     assert bench.cycle().reasons == (Reason.STANDBY,)
 
 
-def test_damaged_frames_are_told() -> None:
+def test_damaged_frames_are_reported() -> None:
     bench = Bench()
     bench.drive()
     bench.layer.on_noise(True)

@@ -1,4 +1,4 @@
-"""The page about the safety layer tells of every reason, as it is."""
+"""The page about the safety layer lists every reason, as it is."""
 
 import re
 from pathlib import Path
@@ -34,7 +34,7 @@ def test_how_each_ends_and_whether_torque_goes() -> None:
 
 
 def test_its_numbers_are_those_that_ship() -> None:
-    told = {
+    times = {
         Reason.COMMAND_SILENT: LIMITS.command_timeout_s,
         Reason.MOTOR_SILENT: LIMITS.motor_timeout_s,
         Reason.LOOP_OVERRUN: LIMITS.loop_timeout_s,
@@ -42,14 +42,14 @@ def test_its_numbers_are_those_that_ship() -> None:
         Reason.PAUSED: LIMITS.pause_s,
         Reason.UNBIDDEN_MOTION: LIMITS.unbidden_s,
     }
-    for reason, time_s in told.items():
+    for reason, time_s in times.items():
         assert f"more than {time_s} s" in ROWS[reason.name][0]
     for scanner, time_s in SCAN_TIMEOUTS_S.items():
         assert f"{time_s} s ({scanner[:3].upper()}-{scanner[3:]})" in ROWS["SCAN_STALE"][0]
     rover = features_of("mavlink-rover")
     assert rover is not None
-    told_s = f"within {LIMITS.torque_on_s:g} s ({rover.torque_on_s:g} s for a MAVLink rover)"
-    assert told_s in ROWS["TORQUE_LOST"][0]
+    text = f"within {LIMITS.torque_on_s:g} s ({rover.torque_on_s:g} s for a MAVLink rover)"
+    assert text in ROWS["TORQUE_LOST"][0]
     assert f"the mean over {LIMITS.battery_mean_s:g} s is at or below the voltage" in ROWS["BATTERY_LOW"][0]
     assert f"{2 * LIMITS.battery_mean_s:g} s and two readings" in ROWS["BATTERY_LOW"][1]
     for driver, robot, name in (

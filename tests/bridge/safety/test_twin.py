@@ -18,7 +18,7 @@ SPEEDS = st.sampled_from([0.0, -0.0, 0.005, 0.1, 0.2, -0.2, 0.5, 3.0, -3.0, math
 # Behind the clock or ahead of it, and no time at all; most reports come just in time.
 SHIFTS = st.sampled_from([0.0] * 6 + [0.01, 0.1, 50.0, -0.1, -0.4, -1.0, math.nan, math.inf])
 SEEN, NOT_SEEN = (1.0,) * 180, (math.nan,) * 180
-# Front and left, back and right, all and nothing; or not told.
+# Front and left, back and right, all and nothing; or unknown.
 SCANS = st.sampled_from(
     [(), SEEN + SEEN, SEEN + NOT_SEEN, NOT_SEEN + SEEN, (*SEEN[90:], *NOT_SEEN, *SEEN[90:]), NOT_SEEN * 2]
 )
@@ -76,11 +76,11 @@ class Sequence(RuleBasedStateMachine):
 
     @rule(name=st.sampled_from(["scan", "loop", "operator"]), shift_s=SHIFTS)
     def fact(self, name: str, shift_s: float) -> None:
-        self._tell(name, self.now_s + shift_s)
+        self._report(name, self.now_s + shift_s)
 
-    def _tell(self, name: str, time_s: float) -> None:
-        tell = {"scan": self.layer.on_scan, "loop": self.layer.loop_cycled, "operator": self.layer.operator_seen}
-        tell[name](time_s)
+    def _report(self, name: str, time_s: float) -> None:
+        report = {"scan": self.layer.on_scan, "loop": self.layer.loop_cycled, "operator": self.layer.operator_seen}
+        report[name](time_s)
         if name == "loop":
             self.twin.loop_cycled(time_s)
         else:
@@ -119,10 +119,10 @@ class Sequence(RuleBasedStateMachine):
         level: BatteryLevel | None = None,
     ) -> None:
         turn = self.last.velocity.angular_rad_s * self.limits.separation_m / 2
-        told = (self.last.velocity.linear_m_s - turn, self.last.velocity.linear_m_s + turn)
+        commanded = (self.last.velocity.linear_m_s - turn, self.last.velocity.linear_m_s + turn)
         found = reading(
             time_s,
-            wheels_m_s=wheels or told,
+            wheels_m_s=wheels or commanded,
             is_torque_on=is_torque_on,
             faults=faults,
             battery_v=battery_v,
@@ -171,12 +171,12 @@ class Sequence(RuleBasedStateMachine):
         acceleration_m_s2=st.sampled_from([None, 0.05, 0.5]),
     )
     def rotate(self, cycles: int, speed: float, acceleration_m_s2: float | None) -> None:
-        """The wheels rotate so, whatever they are told, and all else goes on."""
+        """The wheels rotate so, whatever is commanded, and all else goes on."""
         for _ in range(cycles):
             self._read(self.now_s + STEP_S / 2, (speed, 0.0), acceleration_m_s2=acceleration_m_s2)
             self.now_s += STEP_S
             for name in ("scan", "loop", "operator"):
-                self._tell(name, self.now_s)
+                self._report(name, self.now_s)
             self._judge(self.now_s)
 
     @rule(cycles=st.integers(1, 8))
@@ -184,7 +184,7 @@ class Sequence(RuleBasedStateMachine):
         """The loop turns alone, while the drive base takes its time."""
         for _ in range(cycles):
             self.now_s += 0.4
-            self._tell("loop", self.now_s)
+            self._report("loop", self.now_s)
 
     @rule(step_s=STEPS)
     def output(self, step_s: float) -> None:
@@ -204,7 +204,7 @@ class Sequence(RuleBasedStateMachine):
             self._read(self.now_s + STEP_S / 2, is_torque_on=self.last.is_torque_wanted)
             self.now_s += STEP_S
             for name in ("scan", "loop", "operator"):
-                self._tell(name, self.now_s)
+                self._report(name, self.now_s)
             self.command(linear, angular, 0.0)
             self._judge(self.now_s)
 

@@ -1,4 +1,4 @@
-"""The simulator as a program of its own, and what can be told to it."""
+"""The simulator as a program of its own, and its commands."""
 
 import signal
 from collections.abc import Iterator
@@ -34,7 +34,7 @@ def test_scenes_are_listed(capsys: pytest.CaptureFixture[str]) -> None:
         (["--camera-link", "/dev/null"], "something at /dev/null already"),
     ],
 )
-def test_what_cannot_be_simulated_is_told(
+def test_what_cannot_be_simulated_is_reported(
     arguments: list[str], text: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(signal, "signal", lambda number, handler: None)
@@ -72,7 +72,7 @@ def test_a_line_needs_two_points_and_files_are_bounded(
         ("--seed", "1000000000000000", "a whole number from 0 to 2147483647"),
     ],
 )
-def test_wrong_arguments_are_told(option: str, value: str, text: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_wrong_arguments_are_reported(option: str, value: str, text: str, capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit) as caught:
         main([option, value])
     assert caught.value.code == 2
@@ -95,7 +95,7 @@ def robot() -> Iterator[SimulatedTurtleBot3]:
         yield found
 
 
-def test_every_fault_of_a_wire_can_be_told(robot: SimulatedTurtleBot3) -> None:
+def test_every_fault_of_a_wire_can_be_reported(robot: SimulatedTurtleBot3) -> None:
     values = {
         "delay_s": ("0.1", 0.1),
         "drop_next": ("3", 3),
@@ -129,7 +129,7 @@ def test_every_fault_of_a_wire_can_be_told(robot: SimulatedTurtleBot3) -> None:
     assert robot.base_faults == Faults()
 
 
-def test_devices_are_told(robot: SimulatedTurtleBot3) -> None:
+def test_devices_are_reported(robot: SimulatedTurtleBot3) -> None:
     assert robot.opencr is not None
     execute(robot, "left overheat")
     assert robot.left.table["hardware error status"] == 0x04
@@ -177,7 +177,7 @@ def test_devices_are_told(robot: SimulatedTurtleBot3) -> None:
     ["jump", "left", "left jump", "left trip it", "base jump 1", "base delay_s", "base delay_s x", "base echo 1",
      "press battery_v", "scanner turn 0", "pose 1", "base garbage xx", "base answers_as x", "battery"],
 )  # fmt: skip
-def test_what_is_not_known_is_told(robot: SimulatedTurtleBot3, line: str) -> None:
+def test_what_is_not_known_is_reported(robot: SimulatedTurtleBot3, line: str) -> None:
     with pytest.raises(UnknownCommandError):
         execute(robot, line)
 
@@ -211,7 +211,7 @@ def test_a_remote_control_steers(robot: SimulatedTurtleBot3) -> None:
     assert robot.world.pose[0] == way_m
 
 
-def test_a_port_whose_place_was_taken_is_told(tmp_path: Path) -> None:
+def test_a_port_whose_place_was_taken_is_reported(tmp_path: Path) -> None:
     link = tmp_path / "base"
     with SimulatedTurtleBot3(clock=ManualClock(), base_link=link) as robot:
         execute(robot, "base disconnect")
@@ -230,7 +230,7 @@ def test_servos_have_no_buttons() -> None:
                 execute(robot, line)
 
 
-def test_a_rover_is_told() -> None:
+def test_a_rover_is_reported() -> None:
     with SimulatedTurtleBot3(base="mavlink-rover", clock=ManualClock()) as robot:
         rover = robot.rover
         assert rover is not None

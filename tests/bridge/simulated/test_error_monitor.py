@@ -16,21 +16,21 @@ from robosc_simulated.output import Output
 FULL = Path("/dev/full")
 
 
-def test_a_file_on_a_full_disk_is_told_of_once_also_if_it_is_noticed_at_the_end() -> None:
-    told: list[str] = []
-    output = Output(FULL, told.append)
+def test_a_file_on_a_full_disk_is_reported_once_also_if_it_is_noticed_at_the_end() -> None:
+    reported: list[str] = []
+    output = Output(FULL, reported.append)
     output.write("a few letters")
-    assert told == []
+    assert reported == []
     output.close()
     output.close()
-    assert len(told) == 1
-    output = Output(FULL, told.append)
+    assert len(reported) == 1
+    output = Output(FULL, reported.append)
     output.write("x")
     output.flush()
     output.write("y" * 100_000)
     output.flush()
     output.close()
-    assert len(told) == 2
+    assert len(reported) == 2
 
 
 def test_what_was_written_is_there(tmp_path: Path) -> None:
@@ -55,10 +55,10 @@ def test_a_thread_that_fails_ends_the_program(
 
     monkeypatch.setattr(OpenCr, "_cycle", fail)
     assert main([]) == 1
-    told = capsys.readouterr().err
-    assert "in fail" in told
-    assert told.splitlines()[-1].startswith("the simulation ends, because the thread 'simulated line ")
-    assert told.endswith("has failed: ZeroDivisionError: a battery of no cells\n")
+    reported = capsys.readouterr().err
+    assert "in fail" in reported
+    assert reported.splitlines()[-1].startswith("the simulation ends, because the thread 'simulated line ")
+    assert reported.endswith("has failed: ZeroDivisionError: a battery of no cells\n")
     assert threading.excepthook is before
 
 

@@ -89,7 +89,7 @@ def test_the_oval_is_closed_and_goes_through_the_start() -> None:
         ([(0.0, 0.0), (26.0, 26.0)], 0.05, "too far"),
     ],
 )
-def test_what_is_no_track_is_told(points: list[tuple[float, float]], width_m: float, text: str) -> None:
+def test_what_is_no_track_is_reported(points: list[tuple[float, float]], width_m: float, text: str) -> None:
     with pytest.raises(ValueError, match=text):
         Track(points, width_m)
 

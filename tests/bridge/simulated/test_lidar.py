@@ -170,7 +170,7 @@ def test_frames_are_paced_in_time(lidar: str, rate: float) -> None:
 
 
 @pytest.mark.parametrize("lidar", DECODERS)
-def test_a_slow_motor_takes_longer_for_a_turn_and_tells_it(lidar: str) -> None:
+def test_a_slow_motor_takes_longer_for_a_turn_and_reports_it(lidar: str) -> None:
     with scene(lidar) as seen:
         seen.robot.scanner.set_speed(0.5)
         seen.start()
@@ -203,7 +203,7 @@ def test_a_stalled_one_is_silent(lidar: str) -> None:
         assert seen.heard(0.2)
 
 
-def test_lds01_stops_and_starts_as_told() -> None:
+def test_lds01_stops_and_starts_as_commanded() -> None:
     with scene("lds01") as seen:
         assert seen.heard(0.1)
         seen.host.send(b"e")
@@ -218,7 +218,7 @@ def test_lds01_stops_and_starts_as_told() -> None:
         assert len(list(decode_lds01(data))) >= 6 * 88
 
 
-def test_lds03_is_idle_until_started_and_tells_what_it_is() -> None:
+def test_lds03_is_idle_until_started_and_reports_what_it_is() -> None:
     with scene("lds03") as seen:
         assert not seen.heard(0.5)
         seen.host.send("00 aa aa 55 f0")

@@ -69,10 +69,7 @@ def test_answers_can_be_lost(robot: SimulatedTurtleBot3, host: Host) -> None:
 
 def test_a_share_of_answers_is_lost_by_a_seeded_chance() -> None:
     def fate() -> list[int]:
-        with (
-            SimulatedTurtleBot3(base="dynamixel", clock=ManualClock(), seed=5) as robot,
-            Host(robot.base_path) as host,
-        ):
+        with SimulatedTurtleBot3(base="dynamixel", clock=ManualClock(), seed=5) as robot, Host(robot.base_path) as host:
             robot.base_faults.drop_share = 0.5
             line, found = robot.base_line, []
             for _ in range(20):
@@ -105,16 +102,13 @@ def test_answers_can_be_cut(robot: SimulatedTurtleBot3, host: Host) -> None:
     assert host.ask(PING) == PONG
 
 
-def test_garbage_comes_before_answers(robot: SimulatedTurtleBot3, host: Host) -> None:
-    robot.base_faults.garbage = b"\xff\xff\x00"
+@pytest.mark.parametrize(("fault", "value", "before"), [("garbage", b"\xff\xff\x00", "ff ff 00"), ("echo", True, PING)])
+def test_other_bytes_come_before_answers(
+    robot: SimulatedTurtleBot3, host: Host, fault: str, value: object, before: str
+) -> None:
+    setattr(robot.base_faults, fault, value)
     host.send(PING)
-    assert host.receive(3 + LENGTH).hex(" ") == "ff ff 00 " + PONG
-
-
-def test_an_adapter_can_echo(robot: SimulatedTurtleBot3, host: Host) -> None:
-    robot.base_faults.echo = True
-    host.send(PING)
-    assert host.receive(10 + LENGTH).hex(" ") == f"{PING} {PONG}"
+    assert host.receive(len(before.split()) + LENGTH).hex(" ") == f"{before} {PONG}"
 
 
 def test_bytes_can_come_one_by_one(robot: SimulatedTurtleBot3, host: Host) -> None:

@@ -35,8 +35,8 @@ def test_worked_packets(packet: str) -> None:
     assert encoder.encode(name, **values) == data
     (found,) = Parser().feed(data)
     assert (found.system, found.component, found.name) == (1, 191, name)
-    told = {key: value.rstrip(b"\0") if isinstance(value, bytes) else value for key, value in found.values.items()}
-    assert {key: told[key] for key in values} == values
+    decoded = {key: value.rstrip(b"\0") if isinstance(value, bytes) else value for key, value in found.values.items()}
+    assert {key: decoded[key] for key in values} == values
 
 
 @pytest.mark.parametrize("layout", LAYOUTS, ids=lambda layout: layout.name)
@@ -50,11 +50,11 @@ def test_numbers_and_checksums_are_those_of_the_definition(layout: Layout) -> No
 def test_any_payload_is_read_as_pymavlink_reads_it(payload: bytes, layout: Layout) -> None:
     values = layout.unpack(payload)
     data = Encoder(1, 1).encode(layout.name, **values)
-    told = dialect.MAVLink(None).decode(bytearray(data))
-    assert told.get_type() == layout.name
+    decoded = dialect.MAVLink(None).decode(bytearray(data))
+    assert decoded.get_type() == layout.name
     flat: list[Any] = []
-    for field in told.ordered_fieldnames:
-        value = getattr(told, field)
+    for field in decoded.ordered_fieldnames:
+        value = getattr(decoded, field)
         flat += value if isinstance(value, list) else [value]
     ours: list[Any] = []
     for value in values.values():
@@ -89,8 +89,8 @@ def test_signatures_are_those_of_pymavlink() -> None:
     assert parser.rejected == 3
     ours = Encoder(1, 1, KEY)
     ours.timestamp = 600
-    told = theirs.decode(bytearray(ours.encode("HEARTBEAT", type=10, autopilot=3)))
-    assert told.get_signed()
+    decoded = theirs.decode(bytearray(ours.encode("HEARTBEAT", type=10, autopilot=3)))
+    assert decoded.get_signed()
 
 
 def test_what_a_later_version_adds_is_not_looked_at() -> None:

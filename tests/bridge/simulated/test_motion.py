@@ -153,7 +153,7 @@ GOOD = '{"time":1,"world_s":1,"x_m":0,"y_m":0,"heading_rad":0,"linear_m_s":0,"an
         (GOOD + "\xff\n", r":2: is not an entry"),
     ],
 )
-def test_what_is_no_record_is_told_with_its_line(text: str, problem: str, path: Path) -> None:
+def test_what_is_no_record_is_reported_with_its_line(text: str, problem: str, path: Path) -> None:
     path.write_text(text, encoding="latin-1")
     with pytest.raises(MotionError, match=problem) as caught:
         read_motion(path)
@@ -165,7 +165,7 @@ def test_a_record_that_was_cut_off_is_read_so_far(path: Path) -> None:
     assert len(read_motion(path).samples) == 1
 
 
-def test_no_file_is_told(path: Path) -> None:
+def test_no_file_is_reported(path: Path) -> None:
     with pytest.raises(MotionError, match="there is no such file"):
         read_motion(path)
     with pytest.raises(MotionError, match="is not a regular file"):
@@ -176,13 +176,13 @@ def test_who_comes_to_the_goal_without_touching_is_right(path: Path) -> None:
     assert check_maze(YARD, recorded(YARD, there, path)) == ()
 
 
-def test_who_is_not_at_the_goal_is_told(path: Path) -> None:
+def test_who_is_not_at_the_goal_is_reported(path: Path) -> None:
     motion = recorded(YARD, lambda world: drive(world, 6.0, 6.0, 3.0), path)
     (fault,) = check_maze(YARD, motion)
     assert fault.startswith("it was never at the goal; at the end, 3.00 s, it is 0.4")
 
 
-def test_who_touches_a_wall_on_the_way_is_told(path: Path) -> None:
+def test_who_touches_a_wall_on_the_way_is_reported(path: Path) -> None:
     def act(world: World) -> None:
         drive(world, -6.0, -6.0, 10.0)
         drive(world, 6.0, 6.0, 15.0)
@@ -215,7 +215,7 @@ def test_obstacles_count_from_when_they_are_there(path: Path) -> None:
     assert check_maze(YARD, recorded(YARD, act, path)) == ()
 
 
-def test_a_robot_that_was_carried_is_told(path: Path) -> None:
+def test_a_robot_that_was_carried_is_reported(path: Path) -> None:
     def act(world: World) -> None:
         drive(world, 6.0, 6.0, 1.0)
         world.place(0.9, 0.0, 0.0)
@@ -262,14 +262,14 @@ def follow(world: World) -> None:
     drive(world, 6.0, 6.0, 2.0)
 
 
-def test_who_keeps_to_the_line_and_stands_when_told_is_right(path: Path) -> None:
+def test_who_keeps_to_the_line_and_stands_when_commanded_is_right(path: Path) -> None:
     motion = recorded(YARD, follow, path)
     assert check_line(YARD, motion, (Halt(2.0, 5.0, "the stop button"),), least_m=0.7) == ()
     assert max(lateral_errors_m(YARD, motion)) < 1e-6
     assert way_m(motion) == pytest.approx(0.79, abs=0.02)
 
 
-def test_who_does_not_stand_when_told_is_told(path: Path) -> None:
+def test_not_standing_when_commanded_is_reported(path: Path) -> None:
     motion = recorded(YARD, follow, path)
     (fault,) = check_line(YARD, motion, (Halt(1.5, 7.0, "an obstacle"),))
     assert fault.startswith("at 5.05 s it moves at")
@@ -279,7 +279,7 @@ def test_who_does_not_stand_when_told_is_told(path: Path) -> None:
     assert fault.startswith("at 1.70 s it moves at 0.198 m/s")
 
 
-def test_a_halt_that_was_not_recorded_is_told(path: Path) -> None:
+def test_a_halt_that_was_not_recorded_is_reported(path: Path) -> None:
     motion = recorded(YARD, follow, path)
     (fault,) = check_line(YARD, motion, (Halt(20.0, 25.0, "an obstacle"),))
     assert "there is no sample of that" in fault
@@ -291,7 +291,7 @@ def test_who_turns_on_the_spot_does_not_stand(path: Path) -> None:
     assert "rad/s" in fault
 
 
-def test_who_leaves_the_line_is_told(path: Path) -> None:
+def test_who_leaves_the_line_is_reported(path: Path) -> None:
     motion = recorded(YARD, lambda world: drive(world, 5.0, 6.0, 4.0), path)
     (fault,) = check_line(YARD, motion)
     assert fault.startswith("at 4.00 s it is 0.")
@@ -299,7 +299,7 @@ def test_who_leaves_the_line_is_told(path: Path) -> None:
     assert check_line(YARD, motion, lateral_m=2.0) == ()
 
 
-def test_who_never_drives_is_told(path: Path) -> None:
+def test_who_never_drives_is_reported(path: Path) -> None:
     motion = recorded(YARD, lambda world: drive(world, 0.0, 0.0, 4.0), path)
     assert check_line(YARD, motion) == ()
     (fault,) = check_line(YARD, motion, least_m=0.5)
@@ -343,7 +343,7 @@ def test_maps_of_all_scenes_of_the_package_can_be_drawn(tmp_path: Path) -> None:
         assert (tmp_path / f"{name}.svg").stat().st_size > 5000
 
 
-def test_a_sample_has_the_keys_that_its_page_tells() -> None:
+def test_a_sample_has_the_keys_of_its_page() -> None:
     sample = Sample(1.0, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8)
     keys = ["time", "world_s", "x_m", "y_m", "heading_rad", "linear_m_s", "angular_rad_s", "collisions"]
     assert list(msgspec.to_builtins(sample)) == keys

@@ -322,7 +322,7 @@ def test_an_empty_battery_keeps_its_last_percentage(station: Station) -> None:
     assert station.read(46, "I") == last > 0
 
 
-def test_buttons_and_bumpers_are_told(station: Station) -> None:
+def test_buttons_and_bumpers_are_reported(station: Station) -> None:
     station.opencr.press(button_2=True, bumper_1=True)
     station.robot.advance(0.025)
     assert [station.read(address, "B") for address in (26, 27, 28, 29)] == [0, 1, 1, 0]
@@ -333,7 +333,7 @@ def test_buttons_and_bumpers_are_told(station: Station) -> None:
         station.opencr.press(battery_v=True)
 
 
-def test_the_imu_tells_the_heading(station: Station) -> None:
+def test_the_imu_reports_the_heading(station: Station) -> None:
     station.update(0.2)
     station.command(0, 50)
     station.update(1.0)

@@ -88,36 +88,30 @@ def test_a_servo_that_does_not_answer_holds_each_pass_up_for_half_a_second(board
     assert board.took_s(PING) == 0.0
 
 
-def test_the_other_wheel_rotates_on_until_the_next_pass(board: Bench) -> None:
-    board.beat(0.3)
-    board.port.ask(SLOW)
-    board.beat(0.3)
-    board.port.ask(BEATS[next_beat(board)])
-    board.robot.left.brown_out(0.0)
-    begin_s = board.time.monotonic()
-    # Whatever is sent now is handled at the end of the pass.
-    board.port.send(ZERO)
-    while board.goals_rad_s() != (0.0, 0.0):
-        board.time.sleep(0.005)
-    assert board.time.monotonic() - begin_s == pytest.approx(0.5, abs=0.03)
-
-
 def next_beat(board: Bench) -> int:
     board.count += 1
     return board.count % 2
 
 
-def test_a_heartbeat_that_it_has_not_handled_yet_keeps_it_going_for_another_pass(board: Bench) -> None:
+@pytest.mark.parametrize(("is_beat_handled", "seconds"), [(True, 0.5), (False, 1.0)])
+def test_the_other_wheel_rotates_on_until_the_pass_after_the_last_heartbeat(
+    board: Bench, is_beat_handled: bool, seconds: float
+) -> None:
     board.beat(0.3)
     board.port.ask(SLOW)
     board.beat(0.3)
+    beat = BEATS[next_beat(board)]
+    if is_beat_handled:
+        board.port.ask(beat)
     board.robot.left.brown_out(0.0)
     begin_s = board.time.monotonic()
-    board.port.send(BEATS[next_beat(board)])
+    # Whatever is sent now is handled at the end of the pass.
+    if not is_beat_handled:
+        board.port.send(beat)
     board.port.send(ZERO)
     while board.goals_rad_s() != (0.0, 0.0):
         board.time.sleep(0.005)
-    assert board.time.monotonic() - begin_s == pytest.approx(1.0, abs=0.03)
+    assert board.time.monotonic() - begin_s == pytest.approx(seconds, abs=0.03)
 
 
 def test_without_motors_nothing_holds_it_up() -> None:

@@ -48,11 +48,11 @@ def test_a_fast_world_that_does_not_hear_its_host_says_so() -> None:
     # One that has not begun is not silent.
     clock.advance(5.0)
     time.host_sent()
-    for pause_s, told_s in [(0.09, None), (0.15, 1.5), (0.2, None), (0.31, 3.1), (0.31, None), (2.0, None)]:
+    for pause_s, reported_s in [(0.09, None), (0.15, 1.5), (0.2, None), (0.31, 3.1), (0.31, None), (2.0, None)]:
         clock.advance(pause_s)
         assert time.new_silence_s() is None
         time.host_sent()
-        assert time.new_silence_s() == (None if told_s is None else pytest.approx(told_s))
+        assert time.new_silence_s() == (None if reported_s is None else pytest.approx(reported_s))
 
 
 @pytest.mark.parametrize(("factor", "patience_s"), [(1.0, None), (10.0, 0.5)])

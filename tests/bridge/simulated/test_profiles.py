@@ -41,7 +41,7 @@ OPEN_SPACE = Walls(())
 
 
 class Talker:
-    """A device that sends what it is told to, and keeps what it hears.
+    """A device that sends what it is given, and keeps what it hears.
 
     Args:
         baud: Its speed; None: any.

@@ -30,7 +30,7 @@ def in_room(**options: object) -> RosRobot:
 
 
 def lived(robot: RosRobot, seconds: float, velocity: tuple[float, float] | None = None) -> list[Reading]:
-    """All that is told while time passes, with a velocity that is repeated."""
+    """All messages while time passes, with a velocity that is repeated."""
     found: list[Reading] = []
     for _ in range(round(seconds / STEP_S)):
         if velocity is not None:
@@ -44,7 +44,7 @@ def last[Kind](kind: type[Kind], readings: list[Reading]) -> Kind:
     return [reading for reading in readings if isinstance(reading, kind)][-1]
 
 
-def test_everything_comes_as_often_as_a_turtlebot_tells_it() -> None:
+def test_everything_comes_as_often_as_from_a_turtlebot() -> None:
     robot = robot_in(Scene("oval", Walls(()), line=oval()), lidar="lds01")
     counts = Counter(type(reading) for reading in lived(robot, 10.0))
     assert counts[Clock] == pytest.approx(1000, abs=2)
@@ -54,7 +54,7 @@ def test_everything_comes_as_often_as_a_turtlebot_tells_it() -> None:
     assert counts[Battery] == pytest.approx(10, abs=1)
 
 
-def test_a_fast_world_tells_its_time_a_hundred_times_a_second_of_the_clock() -> None:
+def test_a_fast_world_reports_its_time_a_hundred_times_a_second_of_the_clock() -> None:
     robot = robot_in(Scene("open", Walls(())), factor=20.0)
     counts = Counter(type(reading) for reading in lived(robot, 2.0))
     assert counts[Clock] == pytest.approx(200, abs=2)
@@ -119,7 +119,7 @@ def test_noise_of_the_scene_is_in_the_scan() -> None:
     assert found == again
 
 
-def test_odometry_tells_where_velocities_have_led() -> None:
+def test_odometry_reports_where_velocities_have_led() -> None:
     robot = in_room()
     lived(robot, 2.0, (0.1, 0.0))
     lived(robot, 2.0, (0.0, math.pi / 4))
@@ -214,7 +214,7 @@ def test_a_covered_camera_sees_nothing() -> None:
     assert set(last(Picture, lived(robot, 0.2)).data) == {0}
 
 
-def test_the_world_is_told_what_to_do_as_behind_serial_lines() -> None:
+def test_the_world_takes_the_commands_of_serial_lines() -> None:
     scene = Scene("box", room(4.0, 3.0), obstacles=(Obstacle("box", 1.0, 0.0, 0.1, is_there=False),))
     robot = robot_in(scene)
     free_m = last(Scan, lived(robot, 0.3)).ranges_m[0]
@@ -232,7 +232,7 @@ def test_the_world_is_told_what_to_do_as_behind_serial_lines() -> None:
     "wrong",
     ["dance", "battery", "battery nan", "battery 1e300", "pose nan 0 0", "battery full", "obstacle box back", "goal"],
 )
-def test_what_it_cannot_do_is_told(wrong: str) -> None:
+def test_what_it_cannot_do_is_reported(wrong: str) -> None:
     with pytest.raises(UnknownCommandError):
         execute(in_room(), wrong)
 

@@ -31,13 +31,13 @@ class Station:
             found += self.said(self.rover.update())
         return found
 
-    def tell(self, name: str, **values: Any) -> list[Packet]:
+    def send(self, name: str, **values: Any) -> list[Packet]:
         packet = self.encoder.encode(name, **{"target_system": 1, "target_component": 1, **values})
         return self.said(self.rover.receive(packet, 0))
 
     def command(self, number: int, *parameters: float, **values: Any) -> list[Packet]:
         filled = (*parameters, *(0.0,) * (7 - len(parameters)))
-        return self.tell("COMMAND_LONG", command=number, parameters=filled, **values)
+        return self.send("COMMAND_LONG", command=number, parameters=filled, **values)
 
     def result(self, number: int, *parameters: float) -> int:
         answer = self.command(number, *parameters)[-1]
@@ -51,7 +51,7 @@ class Station:
         return self
 
     def target(self, speed_m_s: float, right_rad_s: float = 0.0, **values: Any) -> None:
-        self.tell(
+        self.send(
             "SET_POSITION_TARGET_LOCAL_NED", **{"type_mask": 0x05E7, "frame": 8, "vx": speed_m_s,
                                                 "yaw_rate": right_rad_s, **values}
         )  # fmt: skip
@@ -59,13 +59,13 @@ class Station:
 
 def test_heartbeats_come_once_a_second_and_show_mode_and_arming() -> None:
     station = Station()
-    told = [packet for packet in station.passing(3.05) if packet.name == "HEARTBEAT"]
-    assert len(told) == 4
-    assert {(packet.values["base_mode"], packet.values["custom_mode"]) for packet in told} == {(1, MANUAL)}
+    heard = [packet for packet in station.passing(3.05) if packet.name == "HEARTBEAT"]
+    assert len(heard) == 4
+    assert {(packet.values["base_mode"], packet.values["custom_mode"]) for packet in heard} == {(1, MANUAL)}
     station.ready()
-    (told_now,) = [packet for packet in station.passing(1.0) if packet.name == "HEARTBEAT"]
-    assert (told_now.values["base_mode"], told_now.values["custom_mode"]) == (129, GUIDED)
-    assert (told_now.values["type"], told_now.values["autopilot"], told_now.values["system_status"]) == (10, 3, 4)
+    (later,) = [packet for packet in station.passing(1.0) if packet.name == "HEARTBEAT"]
+    assert (later.values["base_mode"], later.values["custom_mode"]) == (129, GUIDED)
+    assert (later.values["type"], later.values["autopilot"], later.values["system_status"]) == (10, 3, 4)
 
 
 def test_a_target_is_followed_for_three_seconds() -> None:
@@ -75,9 +75,9 @@ def test_a_target_is_followed_for_three_seconds() -> None:
     assert station.world.speed_m_s == pytest.approx(0.2)
     # Turning right.
     assert station.world.yaw_rate_rad_s == pytest.approx(-0.5)
-    told = station.passing(0.3)
+    heard = station.passing(0.3)
     assert station.world.speed_m_s == 0.0
-    assert any(b"target not received" in packet.values["text"] for packet in told if packet.name == "STATUSTEXT")
+    assert any(b"target not received" in packet.values["text"] for packet in heard if packet.name == "STATUSTEXT")
 
 
 @pytest.mark.parametrize(
@@ -121,21 +121,21 @@ def test_commands_are_answered_by_what_became_of_them() -> None:
     assert station.result(511, 331, 0.0) == UNSUPPORTED
     assert station.command(400, 1, target_system=9) == []
     station.rover.refusal = "x" * 92
-    told = station.command(400, 1)
-    assert [packet.name for packet in told] == ["STATUSTEXT"] * 3 + ["COMMAND_ACK"]
+    heard = station.command(400, 1)
+    assert [packet.name for packet in heard] == ["STATUSTEXT"] * 3 + ["COMMAND_ACK"]
     # A text of exactly two pieces has a third, empty one.
-    assert [len(packet.values["text"].rstrip(b"\0")) for packet in told[:3]] == [50, 50, 0]
-    assert [packet.values["chunk"] for packet in told[:3]] == [0, 1, 2]
-    assert told[-1].values["result"] == FAILED
+    assert [len(packet.values["text"].rstrip(b"\0")) for packet in heard[:3]] == [50, 50, 0]
+    assert [packet.values["chunk"] for packet in heard[:3]] == [0, 1, 2]
+    assert heard[-1].values["result"] == FAILED
     assert not station.rover.is_armed
 
 
 def test_messages_come_as_often_as_they_are_asked_for() -> None:
     station = Station()
     assert station.result(511, 331, 100_000) == ACCEPTED
-    told = [packet for packet in station.passing(1.0) if packet.name == "ODOMETRY"]
-    assert 9 <= len(told) <= 11
-    assert math.isnan(told[0].values["pose_covariance"][0])
+    heard = [packet for packet in station.passing(1.0) if packet.name == "ODOMETRY"]
+    assert 9 <= len(heard) <= 11
+    assert math.isnan(heard[0].values["pose_covariance"][0])
     station.rover.has_origin = False
     assert "ODOMETRY" not in [packet.name for packet in station.passing(0.5)]
     station.rover.reports_motion = False
@@ -155,7 +155,7 @@ def test_the_remote_control_wins() -> None:
     assert station.world.speed_m_s == 0.0
 
 
-def test_a_silent_one_tells_nothing_and_a_restarted_one_begins_anew() -> None:
+def test_a_silent_one_reports_nothing_and_a_restarted_one_begins_anew() -> None:
     station = Station().ready()
     station.result(511, 30, 100_000)
     assert "ATTITUDE" in [packet.name for packet in station.passing(1.0)]

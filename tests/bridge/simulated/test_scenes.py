@@ -1,4 +1,4 @@
-"""Scenes from files: what they say is what is there, and whatever is wrong is told in one sentence with its place."""
+"""Scenes from files: what they say is what is there; mistakes are reported in one sentence with their place."""
 
 import math
 import re
@@ -9,17 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc_simulated import (
-    Goal,
-    Noise,
-    Obstacle,
-    Scene,
-    SceneError,
-    load_scene,
-    maze_scene,
-    scene_names,
-    spline,
-)
+from robosc_simulated import Goal, Noise, Obstacle, Scene, SceneError, load_scene, maze_scene, scene_names, spline
 from robosc_simulated.scene import parse_scene
 from robosc_simulated.scene_file import (
     FloorPart,
@@ -157,14 +147,14 @@ def test_a_maze_has_one_exit_and_its_goal_is_outside(columns: int, rows: int, se
         ("x: " + "[" * 40 + "]" * 40, "nested deeper"),
     ],
 )
-def test_what_is_wrong_is_told_in_one_sentence_with_its_place(text: str, problem: str) -> None:
+def test_what_is_wrong_is_reported_in_one_sentence_with_its_place(text: str, problem: str) -> None:
     with pytest.raises(SceneError) as caught:
         parsed(text)
     assert problem in str(caught.value)
     assert "\n" not in str(caught.value)
 
 
-def test_what_is_no_file_is_told(tmp_path: Path) -> None:
+def test_what_is_no_file_is_reported(tmp_path: Path) -> None:
     with pytest.raises(SceneError, match="there is no scene and no file 'maze-spirral'; there are line-curves"):
         load_scene("maze-spirral")
     with pytest.raises(SceneError, match="is not a regular file"):
@@ -254,15 +244,15 @@ def test_the_scene_on_the_page_can_be_read() -> None:
     assert [obstacle.name for obstacle in scene.obstacles] == ["box"]
 
 
-def test_the_page_tells_every_key() -> None:
-    told = PAGE.read_text()
+def test_the_page_lists_every_key() -> None:
+    page = PAGE.read_text()
     for name, section in (
         ("walls", WallsPart), ("maze", MazePart), ("start", PosePart), ("goal", GoalPart), ("line", LinePart),
         ("floor", FloorPart), ("noise", NoisePart),
     ):  # fmt: skip
         for key in section.__struct_fields__:
-            assert f"`{name}.{key}`" in told
+            assert f"`{name}.{key}`" in page
     for key in ObstaclePart.__struct_fields__:
-        assert f".{key}`" in told
+        assert f".{key}`" in page
     for name in scene_names():
-        assert f"`{name}`" in told
+        assert f"`{name}`" in page

@@ -375,7 +375,7 @@ def test_status_return_levels(station: Station) -> None:
     assert station.ping() == (1060, 0, 0)
 
 
-def test_a_factory_reset_keeps_what_it_is_told_to(station: Station) -> None:
+def test_a_factory_reset_keeps_what_it_is_asked_to(station: Station) -> None:
     station.write(44, 4, 100)
     assert station.handler.factoryReset(station.port, 254, 0xFF)[1] == 0
     assert station.read(44, 4) == 100
@@ -435,7 +435,7 @@ def test_pwm_mode_turns_too(station: Station) -> None:
     assert station.read(128, 4, signed=True) == pytest.approx(133, abs=2)
 
 
-def test_turned_as_far_as_told(station: Station) -> None:
+def test_turned_as_far_as_commanded(station: Station) -> None:
     start = [station.read(132, 4, device_id, signed=True) for device_id in (1, 2)]
     station.go(100)
     station.robot.advance(2.0)

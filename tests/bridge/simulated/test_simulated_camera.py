@@ -10,17 +10,7 @@ import numpy as np
 import pytest
 
 from robosc.execution.runtime.clock import ManualClock
-from robosc_simulated import (
-    BODIES,
-    Scene,
-    SimulatedCamera,
-    SimulatedTurtleBot3,
-    Timebase,
-    Track,
-    Walls,
-    World,
-    oval,
-)
+from robosc_simulated import BODIES, Scene, SimulatedCamera, SimulatedTurtleBot3, Timebase, Track, Walls, World, oval
 from robosc_simulated.commands import UnknownCommandError, execute
 from robosc_simulated.floor import SHADE as LINE
 from support.descriptors import open_descriptors
@@ -169,7 +159,7 @@ def test_what_is_there_already_is_left_alone(tmp_path: Path) -> None:
     assert open_descriptors() <= before
 
 
-def test_it_is_told_what_to_do() -> None:
+def test_it_obeys_commands() -> None:
     with SimulatedTurtleBot3(line=oval(), clock=ManualClock()) as robot:
         camera = robot.camera
         assert camera is not None

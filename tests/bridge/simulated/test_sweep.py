@@ -40,8 +40,8 @@ def require_agreement(walls: Walls, discs: Discs, x_m: float, y_m: float, headin
     slants = [apart / seen for apart, seen in _seen(walls, x_m, y_m) if seen > _NEARLY]
     seen_m = np.where(np.isinf(found), 0.0, found)
     slack_m = 1e-9 + (1e-9 + 2 * _TURN_RAD * max(slants, default=0.0) * seen_m) * seen_m
-    is_told = (found >= shortest - slack_m) & (found <= longest + slack_m)
-    assert is_told.all(), [(int(ray), found[ray], shortest[ray], longest[ray]) for ray in np.flatnonzero(~is_told)]
+    is_right = (found >= shortest - slack_m) & (found <= longest + slack_m)
+    assert is_right.all(), [(int(ray), found[ray], shortest[ray], longest[ray]) for ray in np.flatnonzero(~is_right)]
     return found
 
 
@@ -120,7 +120,7 @@ def test_who_is_on_a_wall_sees_nothing_else() -> None:
 
 @pytest.mark.parametrize("heading_rad", [0.0, 1.0, -2.0, math.pi])
 def test_who_is_in_line_with_a_wall_sees_its_near_end(heading_rad: float) -> None:
-    """And not through it, whichever of its ends is told first."""
+    """And not through it, whichever of its ends is named first."""
     cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
     turned = [
         (cosine * x1 - sine * y1, sine * x1 + cosine * y1, cosine * x2 - sine * y2, sine * x2 + cosine * y2)
@@ -170,7 +170,9 @@ def exact_ray(segments: list[tuple[int, int, int, int]], place: tuple[int, int],
 
 @settings(max_examples=examples(60))
 @given(st.lists(st.tuples(WHOLE, WHOLE, WHOLE, WHOLE), max_size=8), WHOLE, WHOLE)
-def test_rays_on_a_grid_are_as_fractions_tell(segments: list[tuple[int, int, int, int]], x: int, y: int) -> None:
+def test_rays_on_a_grid_are_as_computed_with_fractions(
+    segments: list[tuple[int, int, int, int]], x: int, y: int
+) -> None:
     walls = Walls(segments)
     expected = pytest.approx([exact_ray(segments, (x, y), way) for way in _WAYS])
     ways = np.array(_WAYS, dtype=np.float64)

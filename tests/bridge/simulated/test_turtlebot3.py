@@ -30,7 +30,7 @@ def test_every_robot_can_be_put_together(robot: str, base: str, lidar: str) -> N
 
 @pytest.mark.parametrize(("robot", "base", "lidar"), [("mule", "opencr", "lds01"), ("burger", "ros", "lds01"),
                                                       ("burger", "opencr", "lds04")])  # fmt: skip
-def test_unknown_parts_are_told(robot: str, base: str, lidar: str) -> None:
+def test_unknown_parts_are_reported(robot: str, base: str, lidar: str) -> None:
     before = set(threading.enumerate())
     with pytest.raises(ValueError, match=r"there is no .*; there are"):
         SimulatedTurtleBot3(robot, base, lidar)

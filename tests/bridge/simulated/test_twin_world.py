@@ -66,7 +66,7 @@ def test_fast_rays_agree_with_slow_ones(
     found = walls.cast_from(x_m, y_m, _directions(angles))
     origins = np.tile((x_m, y_m), (len(angles), 1))
     is_same = np.zeros(len(angles), dtype=np.bool_)
-    # At a wall's very end, and along it, rounding decides: there a ray that is turned by a hair tells the other.
+    # At a wall's very end, and along it, rounding decides: there a ray that is turned by a hair measures the other.
     for turn in (0.0, 1e-6, -1e-6):
         slow = walls.cast(origins, _directions(np.asarray(angles) + turn))
         is_same |= np.isclose(found, slow, rtol=1e-3, atol=1e-3)
@@ -147,8 +147,8 @@ def test_a_world_that_measures_seldom_goes_where_one_goes_that_always_does(
 def test_obstacles_are_seen_and_met() -> None:
     world = world_of(YARD)
     assert world.ranges((0.0,))[0] == pytest.approx(2.032)
-    told: list[tuple[float, WorldEvent]] = []
-    world.watch(lambda world_s: None, lambda world_s, happening: told.append((world_s, happening)))
+    seen: list[tuple[float, WorldEvent]] = []
+    world.watch(lambda world_s: None, lambda world_s, happening: seen.append((world_s, happening)))
     world.move_obstacle("box", 0.6, 0.0)
     assert world.ranges((0.0, math.pi)) == pytest.approx((0.6 - 0.1 + 0.032, 2.0 - 0.032))
     drive(world, 6.0, 6.0, 4.0)
@@ -159,7 +159,7 @@ def test_obstacles_are_seen_and_met() -> None:
     drive(world, 6.0, 6.0, 3.0)
     assert world.collisions == 1
     assert world.pose[0] > 0.9
-    assert [(happening.kind, happening.name) for _, happening in told] == [
+    assert [(happening.kind, happening.name) for _, happening in seen] == [
         ("obstacle", "box"), ("collision", "box"), ("obstacle", "box"), ("goal", ""),
     ]  # fmt: skip
     world.put_obstacle("box", True)
@@ -243,7 +243,7 @@ def test_a_textured_floor_without_a_line_shows_none(kind: str) -> None:
     assert line_offset(picture, LineSettings()) is None
 
 
-def test_noise_of_the_camera_is_as_large_as_told_and_seeded() -> None:
+def test_noise_of_the_camera_is_as_large_as_set_and_seeded() -> None:
     scene = Scene("noisy", Walls(()), noise=Noise(camera_shades=6.0))
     first, same, other = (PinholeCamera(Mount(), scene, seed).picture((0.0, 0.0, 0.0)) for seed in (1, 1, 2))
     assert (first == same).all()
@@ -251,7 +251,7 @@ def test_noise_of_the_camera_is_as_large_as_told_and_seeded() -> None:
     assert float(first.std()) == pytest.approx(6.0, rel=0.05)
 
 
-def test_a_robot_in_a_scene_is_told_of_goal_and_obstacles() -> None:
+def test_a_robot_in_a_scene_learns_of_goal_and_obstacles() -> None:
     scene = load_scene("room")
     with SimulatedTurtleBot3(scene=scene, clock=ManualClock()) as robot:
         assert execute(robot, "obstacle box 0.5 0") == ""
@@ -294,7 +294,7 @@ def test_the_noise_of_the_lidar_comes_from_the_scene() -> None:
     assert spread(YARD, None) == 0.0
 
 
-def test_a_scan_of_the_world_is_what_its_rays_tell() -> None:
+def test_a_scan_of_the_world_is_what_its_rays_measure() -> None:
     world = world_of(load_scene("maze-rooms"))
     scan = world.scan()
     assert scan.shape == (360,)

@@ -29,7 +29,7 @@ def test_a_whole_number_is_within_its_bounds(value: int) -> None:
 
 
 @pytest.mark.parametrize("text", ["", "x", "1.5", "1e3", "nan", "9" * 10_000, "--1", "²", "0x10"])
-def test_what_is_no_whole_number_is_told(text: str) -> None:
+def test_what_is_no_whole_number_is_reported(text: str) -> None:
     with pytest.raises(ValueError, match="a whole number from 0 to 10000 is needed"):
         whole_number(text, 0, 10_000)
 

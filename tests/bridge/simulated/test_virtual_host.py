@@ -85,13 +85,13 @@ def test_a_queue_is_waited_at() -> None:
         assert host.monotonic() == 2.5
 
 
-def test_what_will_never_happen_is_told() -> None:
+def test_what_will_never_happen_is_reported() -> None:
     with VirtualHost() as host, pytest.raises(VirtualTimeError, match="everybody waits for ever"):
         host.wait(lambda: False, math.inf)
 
 
 @pytest.mark.parametrize("rest_s", [math.inf, 1.0], ids=["waits", "ends"])
-def test_it_is_told_to_whoever_made_the_host_though_another_thread_comes_to_it(rest_s: float) -> None:
+def test_it_is_reported_to_whoever_made_the_host_though_another_thread_comes_to_it(rest_s: float) -> None:
     with VirtualHost() as host:
         host.thread(partial(host.sleep, rest_s), "other").start()
         with pytest.raises(VirtualTimeError, match="everybody waits for ever"):
@@ -102,7 +102,7 @@ def test_it_is_told_to_whoever_made_the_host_though_another_thread_comes_to_it(r
         host.sleep(1.0)
 
 
-def test_whoever_waits_in_vain_while_others_live_on_is_told() -> None:
+def test_waiting_in_vain_while_others_live_on_is_reported() -> None:
     with VirtualHost(0.0) as host:
 
         def live() -> None:
@@ -116,7 +116,7 @@ def test_whoever_waits_in_vain_while_others_live_on_is_told() -> None:
         assert host.monotonic() == pytest.approx(86_400.0 + 3600.0, abs=60.0)
 
 
-def test_it_is_told_to_whoever_made_the_host_whoever_was_the_last_to_wait() -> None:
+def test_it_is_reported_to_whoever_made_the_host_whoever_was_the_last_to_wait() -> None:
     with VirtualHost(0.0) as host:
 
         def wait() -> None:
@@ -216,7 +216,7 @@ def test_bytes_go_both_ways_and_wait_for_their_reader() -> None:
         assert host.open_port(end.path, 1).baud == 1
 
 
-def test_a_port_that_is_pulled_is_told_to_whoever_reads() -> None:
+def test_a_port_that_is_pulled_is_reported_to_whoever_reads() -> None:
     with VirtualHost(0.0) as host:
         end = host.new_end(None)
         port = host.open_port(end.path, 9600)

@@ -43,7 +43,7 @@ def test_opencr_answers_as_written(board: tuple[SimulatedTurtleBot3, Host], requ
     assert board[1].ask(request_) == answer
 
 
-def test_opencr_tells_of_its_battery(board: tuple[SimulatedTurtleBot3, Host]) -> None:
+def test_opencr_reports_its_battery(board: tuple[SimulatedTurtleBot3, Host]) -> None:
     robot, host = board
     assert robot.opencr is not None
     robot.opencr.set_battery(11.85)
@@ -52,15 +52,12 @@ def test_opencr_tells_of_its_battery(board: tuple[SimulatedTurtleBot3, Host]) ->
     assert host.ask("ff ff fd 00 c8 07 00 02 2a 00 08 00 b3 f7") == answer
 
 
-def test_opencr_tells_that_it_has_no_motors() -> None:
-    with (
-        SimulatedTurtleBot3(has_motors=False, clock=ManualClock()) as robot,
-        Host(robot.base_path) as host,
-    ):
+def test_opencr_reports_that_it_has_no_motors() -> None:
+    with SimulatedTurtleBot3(has_motors=False, clock=ManualClock()) as robot, Host(robot.base_path) as host:
         assert host.ask("ff ff fd 00 c8 07 00 02 12 00 01 00 ba 21") == "ff ff fd 00 c8 05 00 55 00 ff 97 9b"
 
 
-def test_opencr_tells_all_at_once(board: tuple[SimulatedTurtleBot3, Host]) -> None:
+def test_opencr_sends_all_at_once(board: tuple[SimulatedTurtleBot3, Host]) -> None:
     answer = bytes.fromhex(board[1].ask("ff ff fd 00 c8 07 00 02 0a 00 ac 00 b6 2f"))
     assert len(answer) == 183
     assert answer[5:9] == bytes.fromhex("b0 00 55 00")
@@ -93,11 +90,8 @@ def test_servos_answer_as_written(bus: tuple[SimulatedTurtleBot3, Host], request
     assert bus[1].ask(request_) == answer
 
 
-def test_the_waffles_servos_tell_what_they_are() -> None:
-    with (
-        SimulatedTurtleBot3("waffle", "dynamixel", clock=ManualClock()) as robot,
-        Host(robot.base_path) as host,
-    ):
+def test_the_waffles_servos_report_what_they_are() -> None:
+    with SimulatedTurtleBot3("waffle", "dynamixel", clock=ManualClock()) as robot, Host(robot.base_path) as host:
         assert host.ask("ff ff fd 00 01 03 00 01 19 4e") == "ff ff fd 00 01 07 00 55 00 06 04 26 65 5d"
 
 
@@ -107,13 +101,15 @@ def test_all_servos_answer_a_broadcast_ping(bus: tuple[SimulatedTurtleBot3, Host
     assert host.packet()[4] == 2
 
 
-def test_a_servo_tells_its_position(bus: tuple[SimulatedTurtleBot3, Host]) -> None:
+def test_a_servo_reports_its_position_and_an_overload(bus: tuple[SimulatedTurtleBot3, Host]) -> None:
     robot, host = bus
     robot.left.set_position(166)
     assert host.ask("ff ff fd 00 01 07 00 02 84 00 04 00 1d 15") == "ff ff fd 00 01 08 00 55 00 a6 00 00 00 8c c0"
+    robot.left.overload()
+    assert host.ask("ff ff fd 00 01 07 00 02 46 00 01 00 3c a3") == "ff ff fd 00 01 05 00 55 80 20 99 21"
 
 
-def test_refusals_are_told_with_their_numbers(bus: tuple[SimulatedTurtleBot3, Host]) -> None:
+def test_refusals_are_reported_with_their_numbers(bus: tuple[SimulatedTurtleBot3, Host]) -> None:
     robot, host = bus
     host.ask("ff ff fd 00 01 06 00 03 40 00 01 db 66")
     # The operating mode is in the EEPROM, and torque is on.
@@ -123,12 +119,6 @@ def test_refusals_are_told_with_their_numbers(bus: tuple[SimulatedTurtleBot3, Ho
     robot.left.brown_out(5.8)
     assert host.ask("ff ff fd 00 01 06 00 03 40 00 01 db 66") == "ff ff fd 00 01 04 00 55 80 a2 8f"
     assert host.ask("ff ff fd 00 01 06 00 03 0b 00 01 47 63") == "ff ff fd 00 01 04 00 55 87 b3 0f"
-
-
-def test_an_overload_is_told(bus: tuple[SimulatedTurtleBot3, Host]) -> None:
-    robot, host = bus
-    robot.left.overload()
-    assert host.ask("ff ff fd 00 01 07 00 02 46 00 01 00 3c a3") == "ff ff fd 00 01 05 00 55 80 20 99 21"
 
 
 def test_sync_packets_move_both_wheels(bus: tuple[SimulatedTurtleBot3, Host]) -> None:

@@ -67,17 +67,17 @@ def test_rays_agree_with_a_slow_twin(segments: list[tuple[float, float, float, f
 
 
 @given(SEGMENTS, SIZES, SIZES)
-def test_no_point_of_a_wall_is_nearer_than_told(
+def test_no_point_of_a_wall_is_nearer_than_its_distance(
     segments: list[tuple[float, float, float, float]], x: float, y: float
 ) -> None:
-    told = Walls(segments).distance_m(x, y)
+    distance_m = Walls(segments).distance_m(x, y)
     points = [
         math.hypot(x1 + share * (x2 - x1) - x, y1 + share * (y2 - y1) - y)
         for x1, y1, x2, y2 in segments
         for share in (index / 200 for index in range(201))
     ]
-    assert told == pytest.approx(min(points, default=math.inf), abs=0.08)
-    assert all(told <= point + 1e-9 for point in points)
+    assert distance_m == pytest.approx(min(points, default=math.inf), abs=0.08)
+    assert all(distance_m <= point + 1e-9 for point in points)
 
 
 def test_a_laser_in_a_room() -> None:
@@ -184,7 +184,7 @@ def test_a_factor_is_positive_and_no_more_than_can_be_lived(factor: float) -> No
 
 
 class ReadClock(SystemClock):
-    """A clock that goes when it is told; the devices take it for the computer's."""
+    """A clock that goes when it is set; the devices take it for the computer's."""
 
     def __init__(self) -> None:
         super().__init__()

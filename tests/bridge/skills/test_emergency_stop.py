@@ -32,45 +32,37 @@ def test_stop_wins_over_resume() -> None:
     assert stop.is_stopped
 
 
-def test_a_held_button_tells_once_and_each_press_anew() -> None:
+@pytest.mark.parametrize(
+    "steps",
+    [
+        pytest.param(
+            [(["button_1"], [], STOP), (["button_1"], [], None), ([], [], None), (["button_1"], [], STOP)],
+            id="a held button stops once and each press anew",
+        ),
+        pytest.param(
+            [(["button_1"], [], STOP), (["button_1", "bumper_1"], [], STOP)], id="a second stop button stops again"
+        ),
+        pytest.param(
+            [(["button_2"], [], None), (["button_2", "button_1"], [], STOP), (["button_2"], [], None)],
+            id="a jammed resume button lets nothing go on",
+        ),
+        pytest.param(
+            [(None, ["space"], STOP), (["button_2"], [], None), ([], [], None), (["button_2"], [], RESUME)],
+            id="nor one that jammed before it was seen",
+        ),
+        pytest.param(
+            [(["button_1"], [], STOP), (None, ["r"], None), ([], ["r"], RESUME)],
+            id="unknown buttons are as they were: nobody has seen it let go",
+        ),
+        pytest.param([([], ["r"], None), (["button_1"], [], STOP)], id="a resume without a stop sends nothing"),
+    ],
+)
+def test_buttons_and_keys_one_after_the_other(
+    steps: list[tuple[list[str] | None, list[str], StopEvent | None]],
+) -> None:
     stop = EmergencyStop(SETTINGS)
-    told = [stop.update(held) for held in (["button_1"], ["button_1"], [], ["button_1"])]
-    assert told == [STOP, None, None, STOP]
-
-
-def test_a_second_stop_button_tells_again() -> None:
-    stop = EmergencyStop(SETTINGS)
-    assert stop.update(["button_1"]) is STOP
-    assert stop.update(["button_1", "bumper_1"]) is STOP
-
-
-def test_a_jammed_resume_button_lets_nothing_go_on() -> None:
-    stop = EmergencyStop(SETTINGS)
-    assert stop.update(["button_2"]) is None
-    assert stop.update(["button_2", "button_1"]) is STOP
-    assert stop.update(["button_2"]) is None
-    assert stop.is_stopped
-
-
-def test_a_resume_button_that_jammed_before_it_was_seen_lets_nothing_go_on() -> None:
-    stop = EmergencyStop(SETTINGS)
-    assert stop.update(None, ["space"]) is STOP
-    assert stop.update(["button_2"]) is None
-    assert stop.update([]) is None
-    assert stop.update(["button_2"]) is RESUME
-
-
-def test_unknown_buttons_are_as_they_were() -> None:
-    stop = EmergencyStop(SETTINGS)
-    assert stop.update(["button_1"]) is STOP
-    assert stop.update(None, ["r"]) is None, "nobody has seen it let go"
-    assert stop.update([], ["r"]) is RESUME
-
-
-def test_a_resume_without_a_stop_tells_nothing() -> None:
-    stop = EmergencyStop(SETTINGS)
-    assert stop.update([], ["r"]) is None
-    assert stop.update(["button_1"]) is STOP
+    for buttons, keys, event in steps:
+        assert stop.update(buttons, keys) is event
 
 
 @given(
@@ -82,9 +74,7 @@ def test_a_resume_without_a_stop_tells_nothing() -> None:
         )
     )
 )
-def test_what_always_holds(
-    inputs: list[tuple[set[str] | None, list[str], StopEvent | None]],
-) -> None:
+def test_what_always_holds(inputs: list[tuple[set[str] | None, list[str], StopEvent | None]]) -> None:
     stop, held, last = EmergencyStop(SETTINGS), set[str](), False
     for buttons, keys, remote in inputs:
         event = stop.update(buttons, keys, remote)

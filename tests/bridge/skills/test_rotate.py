@@ -17,7 +17,7 @@ PERIOD_S = 0.02
 
 @dataclass
 class Body:
-    """Turns as it is told, after a delay, with a lag and a largest acceleration; what is read of it is old and noisy.
+    """Robot that turns as commanded, with a delay, a lag and a largest acceleration; readings are old and noisy.
 
     Delays are in periods, as is the time constant of the lag.
     """
@@ -140,10 +140,18 @@ def test_it_slows_down_towards_the_end() -> None:
     assert rotate.update(3.2, 0.2).angular_rad_s < 0, "it has gone too far"
 
 
-def test_braking_bounds_the_speed() -> None:
-    rotate = Rotate(RotateSettings(speed_rad_s=5.0, braking_rad_s2=0.5, gain_per_s=10.0))
-    rotate.start(1.0, 0.0)
-    assert rotate.update(0.0, 0.0).angular_rad_s == pytest.approx(1.0)
+@pytest.mark.parametrize(
+    ("settings", "angle_rad", "speed_rad_s"),
+    [
+        (RotateSettings(speed_rad_s=5.0, braking_rad_s2=0.5, gain_per_s=10.0), 1.0, 1.0),
+        (RotateSettings(tolerance_rad=0.01, slowest_rad_s=0.1, gain_per_s=2.0), 0.02, 0.1),
+    ],
+    ids=["braking bounds it", "it is never so slow that wheels stand still"],
+)
+def test_the_first_speed(settings: RotateSettings, angle_rad: float, speed_rad_s: float) -> None:
+    rotate = Rotate(settings)
+    rotate.start(angle_rad, 0.0)
+    assert rotate.update(0.0, 0.0).angular_rad_s == pytest.approx(speed_rad_s)
 
 
 def test_only_a_stay_within_the_tolerance_ends_it() -> None:
@@ -170,12 +178,6 @@ def test_the_next_turn_settles_by_itself() -> None:
         assert rotate.is_rotating
         rotate.update(0.5, start_s + 0.31)
         assert rotate.state is RotateState.DONE
-
-
-def test_it_is_never_so_slow_that_wheels_stand_still() -> None:
-    rotate = Rotate(RotateSettings(tolerance_rad=0.01, slowest_rad_s=0.1, gain_per_s=2.0))
-    rotate.start(0.02, 0.0)
-    assert rotate.update(0.0, 0.0).angular_rad_s == 0.1
 
 
 def test_a_blocked_body_fails_after_the_stated_time() -> None:

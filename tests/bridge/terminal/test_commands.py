@@ -277,7 +277,7 @@ class TestWatch:
             assert found["scan"]["ranges_m"][:2] == [1.5, "NaN"]
             assert found["lost_events"] == "0"
 
-    def test_the_end_of_the_bridge_is_told(self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_the_end_of_the_bridge_is_reported(self, daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch) -> None:
         # However long a busy machine takes for it.
         monkeypatch.setattr(endpoint_module, "_GRACE_S", PATIENCE_S)
         with served(daemon) as endpoint, watching("--address", endpoint.address) as process:
@@ -301,13 +301,13 @@ class TestWatch:
             assert process.stderr is not None
             assert (process.returncode, process.stderr.read()) == (0, "")
 
-    def test_lost_events_and_a_loop_that_hangs_are_told(self) -> None:
+    def test_lost_events_and_a_loop_that_hangs_are_printed(self) -> None:
         lines = list(Lines().of(pb.WatchResponse(lost_events=7, snapshot=pb.Snapshot(state=3, age_s=5.0))))  # type: ignore[arg-type]
         assert lines[0].endswith("! 7 events were lost: they came too quickly")
         assert lines[1].endswith("= running")
         assert lines[2].endswith("! the bridge's loop hangs")
 
-    def test_what_is_the_same_is_told_once(self) -> None:
+    def test_what_is_the_same_is_printed_once(self) -> None:
         lines = Lines()
         response = pb.WatchResponse(snapshot=pb.Snapshot(state=3))  # type: ignore[arg-type]
         assert len(list(lines.of(response))) == 1

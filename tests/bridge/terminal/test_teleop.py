@@ -103,7 +103,7 @@ class Bridge:
         requests: Time and velocities of each request: forward, and counter-clockwise, in m/s and rad/s.
         signs_s: Times at which the operator was reported present without a request, in seconds.
         heard: Stops, and commands of other kinds.
-        told: Callback that reports something to the operator; set when the stream is begun.
+        report: Callback that reports something to the operator; set when the stream is begun.
         refusal: Refusal of a resume; None: it is never answered.
         failure: Failure of whatever is sent next.
         is_closed: True if the stream has ended in order.
@@ -113,14 +113,14 @@ class Bridge:
         self.requests: list[tuple[float, float, float]] = []
         self.signs_s: list[float] = []
         self.heard: list[RequestedCommand | str] = []
-        self.told: Callable[[str, str], None] = lambda what, text: None
+        self.report: Callable[[str, str], None] = lambda what, text: None
         self.refusal: str | None = ""
         self.failure: Exception | None = None
         self.is_closed = False
         self._time = time
 
-    def operate(self, name: str, told: Callable[[str, str], None]) -> "Bridge":
-        self.told = told
+    def operate(self, name: str, report: Callable[[str, str], None]) -> "Bridge":
+        self.report = report
         return self
 
     def drive(self, topic: DriveTopic, linear_m_s: float, angular_rad_s: float) -> None:
@@ -152,7 +152,7 @@ class Typed:
     """A terminal whose keys a test types, and the program in it.
 
     Attributes:
-        seen: All output that it was told to show.
+        seen: All output that it was given to show.
         answers: True if it reports that it is there when it is asked.
         asked: Number of times that it was asked.
         error: Error that has ended the program; None: it goes on, or has ended in order.
@@ -286,10 +286,10 @@ class TestDriving:
 
     def test_what_is_blocked_and_refused_is_shown(self, typed: Typed) -> None:
         typed.type("w")
-        typed.bridge.told("blocked", "/cmd_vel")
+        typed.bridge.report("blocked", "/cmd_vel")
         typed.time.sleep(1.5 * PERIOD_S)
         assert "BLOCKED /cmd_vel" in typed.seen
-        typed.bridge.told("refused", "who are you?\x1b[2J")
+        typed.bridge.report("refused", "who are you?\x1b[2J")
         typed.time.sleep(1.5 * PERIOD_S)
         assert "who are you?" in typed.seen
         assert "\x1b[2J" not in typed.seen

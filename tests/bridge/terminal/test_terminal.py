@@ -33,7 +33,7 @@ def test_a_signal_ends_it_in_order(number: int, daemon: FakeDaemon) -> None:
         assert requested_velocities(daemon)[-1] == ("/cmd_vel", 0, 0)
 
 
-def test_the_end_of_the_bridge_is_told(daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_end_of_the_bridge_is_reported(daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch) -> None:
     # However long a busy machine takes for it.
     monkeypatch.setattr(endpoint_module, "_GRACE_S", PATIENCE_S)
     with served(daemon) as endpoint:

@@ -38,7 +38,7 @@ def test_addresses() -> None:
 
 
 @pytest.mark.parametrize("address", ["udpout:host", "tcp::5760", "udpin:127.0.0.1:x", "udpout:127.0.0.1:70000"])
-def test_what_is_no_address_is_told(address: str) -> None:
+def test_what_is_no_address_is_reported(address: str) -> None:
     with pytest.raises(LineError, match=r"udpin\|udpout\|tcp:HOST:PORT"):
         NetworkLine(address)
 
@@ -83,12 +83,12 @@ def test_a_listener_answers_whom_it_has_chosen(peer: socket.socket) -> None:
     line.close()
 
 
-def test_a_port_that_is_taken_is_told(peer: socket.socket) -> None:
+def test_a_port_that_is_taken_is_reported(peer: socket.socket) -> None:
     with pytest.raises(LineBusyError, match="another program listens there"):
         NetworkLine(f"udpin:127.0.0.1:{_port(peer)}")
 
 
-def test_a_connection_carries_bytes_both_ways_and_tells_its_end(server: socket.socket) -> None:
+def test_a_connection_carries_bytes_both_ways_and_reports_its_end(server: socket.socket) -> None:
     line = NetworkLine(f"tcp:127.0.0.1:{_port(server)}")
     other, _ = server.accept()
     line.write(b"x" * 100)
@@ -110,7 +110,7 @@ def test_nobody_serves_there() -> None:
             NetworkLine(f"tcp:127.0.0.1:{_port(silent)}")
 
 
-def test_a_closed_line_is_told_and_leaves_nothing(peer: socket.socket) -> None:
+def test_a_closed_line_is_reported_and_leaves_nothing(peer: socket.socket) -> None:
     before = open_descriptors()
     line = NetworkLine(f"udpout:127.0.0.1:{_port(peer)}")
     line.close()
@@ -123,7 +123,7 @@ def test_a_closed_line_is_told_and_leaves_nothing(peer: socket.socket) -> None:
         line.write(b"x")
 
 
-def test_who_listens_can_tell_strangers_and_answer_them(peer: socket.socket) -> None:
+def test_who_listens_can_recognize_strangers_and_answer_them(peer: socket.socket) -> None:
     line = NetworkLine("udpin:127.0.0.1:0")
     line.reply(b"to nobody")
     peer.sendto(b"first", ("127.0.0.1", line.port))

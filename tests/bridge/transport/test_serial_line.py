@@ -15,14 +15,7 @@ from typing import Any
 import pytest
 import serial.serialposix
 
-from robosc_bridge.errors import (
-    BridgeError,
-    LineBusyError,
-    LineDeniedError,
-    LineError,
-    LineLostError,
-    LineMissingError,
-)
+from robosc_bridge.errors import BridgeError, LineBusyError, LineDeniedError, LineError, LineLostError, LineMissingError
 from robosc_bridge.transport.serial_line import SerialLine
 from support.descriptors import open_descriptors
 from support.pty_end import LIMIT_S, PtyEnd
@@ -45,7 +38,7 @@ def line(pty: PtyEnd) -> Iterator[SerialLine]:
         yield opened
 
 
-def test_an_adapter_is_told_to_keep_no_bytes_back(pty: PtyEnd, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_adapter_is_asked_to_keep_no_bytes_back(pty: PtyEnd, monkeypatch: pytest.MonkeyPatch) -> None:
     """The setting of a UART's driver, `struct serial_struct` of the kernel: a pseudo-terminal has none."""
     wanted = []
 
@@ -272,7 +265,9 @@ def test_a_line_that_is_lost_while_a_thread_reads(pty: PtyEnd, line: SerialLine)
     assert str(result).startswith(f"{pty.path}: ")
 
 
-def test_what_came_before_the_line_was_lost_is_read_or_lost_but_the_loss_is_told(pty: PtyEnd, line: SerialLine) -> None:
+def test_what_came_before_the_line_was_lost_is_read_or_lost_but_the_loss_is_reported(
+    pty: PtyEnd, line: SerialLine
+) -> None:
     pty.send(b"x")
     pty.unplug()
     with pytest.raises(LineLostError):

@@ -139,47 +139,39 @@ def test_a_server_beyond_this_machine_takes_numbers_and_its_own_names() -> None:
 
 
 @pytest.mark.parametrize("token", [None, "", "x", 7, ["x"], "é" * 43, "x" * 10**3])
-def test_a_command_needs_the_token_and_a_stop_none(endpoint: ViewEndpoint, robot: LiveRobot, token: object) -> None:
-    async def look() -> None:
-        async with opened(endpoint.url) as page:
-            await page.send(type="command", command="standby", token=token)
-            told = await page.told("refused")
-            assert told["what"] == "standby"
-            assert "token" in told["why"]
-            await page.send(type="stop")
-            assert (await page.told("done"))["what"] == "stop"
-
-    asyncio.run(look())
+async def test_a_command_needs_the_token_and_a_stop_none(
+    endpoint: ViewEndpoint, robot: LiveRobot, token: object
+) -> None:
+    async with opened(endpoint.url) as page:
+        await page.send(type="command", command="standby", token=token)
+        answer = await page.told("refused")
+        assert answer["what"] == "standby"
+        assert "token" in answer["why"]
+        await page.send(type="stop")
+        assert (await page.told("done"))["what"] == "stop"
     assert [order.command for order in robot.orders] == [OperatorCommand.STOP]
 
 
-def test_with_the_token_the_robot_is_commanded(endpoint: ViewEndpoint, robot: LiveRobot) -> None:
-    async def look() -> None:
-        async with opened(endpoint.url) as page:
-            for command in ("standby", "start", "resume", "reset"):
-                await page.send(type="command", command=command, token=token_of(endpoint.url))
-                assert (await page.told("done"))["what"] == command
-            robot.refusal = "the motors are hot"
-            await page.send(type="command", command="start", token=token_of(endpoint.url))
-            assert (await page.told("refused"))["why"] == "the motors are hot"
-
-    asyncio.run(look())
+async def test_with_the_token_the_robot_is_commanded(endpoint: ViewEndpoint, robot: LiveRobot) -> None:
+    async with opened(endpoint.url) as page:
+        for command in ("standby", "start", "resume", "reset"):
+            await page.send(type="command", command=command, token=token_of(endpoint.url))
+            assert (await page.told("done"))["what"] == command
+        robot.refusal = "the motors are hot"
+        await page.send(type="command", command="start", token=token_of(endpoint.url))
+        assert (await page.told("refused"))["why"] == "the motors are hot"
     assert [str(order.command) for order in robot.orders] == ["standby", "start", "resume", "reset", "start"]
     assert all("127.0.0.1" in order.by for order in robot.orders)
 
 
-def test_a_command_is_taken_back_when_its_page_leaves(endpoint: ViewEndpoint, robot: LiveRobot) -> None:
+async def test_a_command_is_taken_back_when_its_page_leaves(endpoint: ViewEndpoint, robot: LiveRobot) -> None:
     robot.refusal = None  # Nobody answers.
-
-    async def look() -> None:
-        async with opened(endpoint.url) as page:
-            await page.send(type="command", command="resume", token=token_of(endpoint.url))
-            while not robot.orders:
-                await asyncio.sleep(0.002)
-        while len(robot.orders) < 2:
+    async with opened(endpoint.url) as page:
+        await page.send(type="command", command="resume", token=token_of(endpoint.url))
+        while not robot.orders:
             await asyncio.sleep(0.002)
-
-    asyncio.run(asyncio.wait_for(look(), 20))
+    while len(robot.orders) < 2:
+        await asyncio.sleep(0.002)
     assert [order.command for order in robot.orders] == [OperatorCommand.RESUME, OperatorCommand.STOP]
 
 
@@ -202,20 +194,16 @@ WRONG: list[Any] = [
 ]
 
 
-def test_what_makes_no_sense_is_refused_and_nothing_more(
+async def test_what_makes_no_sense_is_refused_and_nothing_more(
     endpoint: ViewEndpoint, robot: LiveRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(hub_module, "SIGN_OF_LIFE_S", 0.02)
-
-    async def look() -> None:
-        async with opened(endpoint.url) as page:
-            for text in WRONG:
-                await page.socket.send_str(text)
-                told = await page.told("refused")
-                assert told["why"].isprintable()
-            await page.told("update")
-
-    asyncio.run(look())
+    async with opened(endpoint.url) as page:
+        for text in WRONG:
+            await page.socket.send_str(text)
+            answer = await page.told("refused")
+            assert answer["why"].isprintable()
+        await page.told("update")
     assert robot.orders == []
 
 
@@ -245,14 +233,11 @@ def test_large_binary_and_too_many_requests_end_the_stream(
     assert {order.command for order in robot.orders} == {OperatorCommand.STOP}
 
 
-def test_a_stop_of_a_page_that_closes_at_once_counts(endpoint: ViewEndpoint, robot: LiveRobot) -> None:
-    async def look() -> None:
-        async with opened(endpoint.url) as page:
-            await page.send(type="stop")
-        while not robot.orders:
-            await asyncio.sleep(0.002)
-
-    asyncio.run(asyncio.wait_for(look(), 20))
+async def test_a_stop_of_a_page_that_closes_at_once_counts(endpoint: ViewEndpoint, robot: LiveRobot) -> None:
+    async with opened(endpoint.url) as page:
+        await page.send(type="stop")
+    while not robot.orders:
+        await asyncio.sleep(0.002)
 
 
 def test_there_is_a_limit_of_pages_and_of_connections(
@@ -293,45 +278,40 @@ def test_there_is_a_limit_of_pages_and_of_connections(
             assert first.recv(1) == b""
 
 
-def test_connections_that_come_at_once_give_way_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_connections_that_come_at_once_give_way_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(server_module, "MAXIMUM_CONNECTIONS", 1)
     monkeypatch.setattr(server_module, "_SWEEP_S", 0.01)
-
-    async def test() -> None:
-        async with remotely_viewed("127.0.0.1:1") as server:
-            host, _, port = server.address.rpartition(":")
-            # The loop accepts both together, and knows the second before it has made the connection of the first.
-            with socket.create_connection((host, int(port))) as first, socket.create_connection((host, int(port))):
-                first.setblocking(False)
-                async with asyncio.timeout(LIMIT_S):
-                    with contextlib.suppress(ConnectionResetError):
-                        assert await asyncio.get_running_loop().sock_recv(first, 1) == b""
-
-    asyncio.run(test())
+    async with remotely_viewed("127.0.0.1:1") as server:
+        host, _, port = server.address.rpartition(":")
+        # The loop accepts both together, and knows the second before it has made the connection of the first.
+        with socket.create_connection((host, int(port))) as first, socket.create_connection((host, int(port))):
+            first.setblocking(False)
+            async with asyncio.timeout(LIMIT_S):
+                with contextlib.suppress(ConnectionResetError):
+                    assert await asyncio.get_running_loop().sock_recv(first, 1) == b""
 
 
-def test_strangers_cannot_lock_out_who_has_the_token(endpoint: ViewEndpoint, monkeypatch: pytest.MonkeyPatch) -> None:
-    async def pages() -> None:
-        monkeypatch.setattr(server_module, "MAXIMUM_VIEWERS", 4)
-        monkeypatch.setattr(server_module, "RESERVED_VIEWERS", 1)
-        monkeypatch.setattr(server_module, "VIEWERS_OF_HOST", 2)
-        base, _, token = endpoint.url.partition("/?token=")
-        async with opened(endpoint.url), opened(endpoint.url), aiohttp.ClientSession() as session:
-            with pytest.raises(aiohttp.WSServerHandshakeError) as error:
-                async with opened(endpoint.url):
-                    pass
-            assert error.value.status == 503
-            async with session.get(f"{base}/places") as answer:
-                assert answer.status == 503
-                assert (await answer.text()).startswith("full")
-            async with session.get(f"{base}/places?token={token}") as answer:
-                assert answer.status == 204
-            stream = f"{base}/stream?token={token}"
-            async with session.ws_connect(stream, headers={"Origin": base}) as known:
-                assert not known.closed
-        assert not endpoint._server._strangers or endpoint._server._strangers.total() <= 2
-
-    asyncio.run(pages())
+async def test_strangers_cannot_lock_out_who_has_the_token(
+    endpoint: ViewEndpoint, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(server_module, "MAXIMUM_VIEWERS", 4)
+    monkeypatch.setattr(server_module, "RESERVED_VIEWERS", 1)
+    monkeypatch.setattr(server_module, "VIEWERS_OF_HOST", 2)
+    base, _, token = endpoint.url.partition("/?token=")
+    async with opened(endpoint.url), opened(endpoint.url), aiohttp.ClientSession() as session:
+        with pytest.raises(aiohttp.WSServerHandshakeError) as error:
+            async with opened(endpoint.url):
+                pass
+        assert error.value.status == 503
+        async with session.get(f"{base}/places") as answer:
+            assert answer.status == 503
+            assert (await answer.text()).startswith("full")
+        async with session.get(f"{base}/places?token={token}") as answer:
+            assert answer.status == 204
+        stream = f"{base}/stream?token={token}"
+        async with session.ws_connect(stream, headers={"Origin": base}) as known:
+            assert not known.closed
+    assert not endpoint._server._strangers or endpoint._server._strangers.total() <= 2
 
 
 def test_who_asks_for_nothing_is_cut_off(robot: LiveRobot, monkeypatch: pytest.MonkeyPatch) -> None:

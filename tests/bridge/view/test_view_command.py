@@ -58,7 +58,7 @@ def test_a_log_is_served_until_a_signal_comes(files: tuple[Path, Path]) -> None:
         assert process.wait(20) == 0
 
 
-def test_it_ends_with_its_input_where_it_is_told_to(files: tuple[Path, Path]) -> None:
+def test_it_ends_with_its_input_where_it_is_asked_to(files: tuple[Path, Path]) -> None:
     with view_process("--model", files[0], "--end-with-input") as (process, url):
         assert process.stdin is not None
         process.stdin.write("whatever")
@@ -107,7 +107,7 @@ def test_wrong_use(files: tuple[Path, Path], tmp_path: Path) -> None:
             arguments(*words)
 
 
-def test_a_missing_extra_is_told(files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_extra_is_reported(files: tuple[Path, Path], monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
     with pytest.raises(CommandError, match=r"aiohttp and igraph: install robosc\[view\]"):
         command.run(arguments("--bridge", "127.0.0.1:1"))

@@ -1,10 +1,12 @@
 """Events of a robot of sixty components, through a real server: none is missed, and none comes twice."""
 
 import asyncio
+import contextlib
 import json
 import socket
 import time
-from collections.abc import Callable
+from collections.abc import AsyncIterator, Callable
+from contextlib import AbstractAsyncContextManager
 from typing import Any
 
 import pytest
@@ -13,7 +15,7 @@ from robosc.execution.runtime.event_log import plain
 from robosc_bridge.remote import RemoteSettings, serve
 from robosc_view import server as server_module
 from robosc_view.broadcaster import MAXIMUM_EVENTS
-from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
+from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed_meanwhile
 from support.pages_open import LIMIT_S, OpenPage, opened
 from support.view_servers import remotely_viewed
 
@@ -29,7 +31,7 @@ def large_robot() -> LiveRobot:
 async def lived(page: OpenPage, robot: LiveRobot, count: int) -> list[str]:
     """Execute `count` events in a thread like that of the control loop, and return their names.
 
-    Also receive everything that a page is told of them.
+    Also receive everything that a page receives of them.
     """
     taken: list[str] = []
     while len(page.entries()) + page.lost() < count:
@@ -78,69 +80,62 @@ def shown_requests(page: OpenPage) -> list[str]:
     return requests
 
 
-def test_every_event_comes_once_and_in_its_order() -> None:
-    robot = large_robot()
-
-    async def look(url: str) -> None:
-        async with opened(url) as page:
-            assert (await page.next())["type"] == "definition"
-            await page.told("update")
-            taken = await lived(page, robot, EVENTS)
-            await page.until(is_final(robot))
-            check_whole(page, robot, taken)
-
-    with viewed(robot) as endpoint:
-        asyncio.run(look(endpoint.url))
-
-
-def test_the_same_over_grpc() -> None:
-    robot = large_robot()
+@contextlib.asynccontextmanager
+async def viewed_over_grpc(robot: LiveRobot) -> AsyncIterator[str]:
+    """Address of a view that is connected to a robot's bridge."""
     endpoint = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
-
-    async def look() -> None:
-        async with remotely_viewed(endpoint.address) as server, opened(server.url) as page:
-            assert (await page.next())["type"] == "definition"
-            await page.told("update")
-            taken = await lived(page, robot, EVENTS)
-            await page.until(is_final(robot))
-            check_whole(page, robot, taken)
-
     try:
-        asyncio.run(look())
+        async with remotely_viewed(endpoint.address) as server:
+            yield server.url
     finally:
         endpoint.stop()
 
 
-def test_the_lit_transitions_lead_from_state_to_state() -> None:
+@contextlib.asynccontextmanager
+async def viewed_here(robot: LiveRobot) -> AsyncIterator[str]:
+    """Address of a bridge's own view."""
+    async with viewed_meanwhile(robot) as endpoint:
+        yield endpoint.url
+
+
+@pytest.mark.parametrize("way", [viewed_here, viewed_over_grpc])
+async def test_every_event_comes_once_and_in_its_order(
+    way: Callable[[LiveRobot], AbstractAsyncContextManager[str]],
+) -> None:
     robot = large_robot()
-
-    async def look(url: str) -> None:
-        async with opened(url) as page:
-            definition = await page.next()
-            await page.told("update")
-            edges = {
-                (component["name"], edge["id"]): edge
-                for component in definition["components"]
-                for edge in component["graph"]["edges"]
-            }
-            states = {name: part["state"] for name, part in robot.system.state().items()}
-            await lived(page, robot, 60)
-            lit = 0
-            for entry in page.entries():
-                for transition in entry["transitions"]:
-                    edge = edges[transition["component"], transition["id"]]
-                    # What happens before the first one of a component cannot be told.
-                    assert edge["from"] == states[transition["component"]]
-                    states[transition["component"]] = edge["to"]
-                    lit += 1
-            assert lit >= 40
-            assert states == {name: part["state"] for name, part in robot.system.state().items()}
-
-    with viewed(robot) as endpoint:
-        asyncio.run(look(endpoint.url))
+    async with way(robot) as url, opened(url) as page:
+        assert (await page.next())["type"] == "definition"
+        await page.told("update")
+        taken = await lived(page, robot, EVENTS)
+        await page.until(is_final(robot))
+        check_whole(page, robot, taken)
 
 
-def test_who_does_not_read_loses_entries_is_told_how_many_and_is_heard_all_the_same(
+async def test_the_lit_transitions_lead_from_state_to_state() -> None:
+    robot = large_robot()
+    async with viewed_meanwhile(robot) as endpoint, opened(endpoint.url) as page:
+        definition = await page.next()
+        await page.told("update")
+        edges = {
+            (component["name"], edge["id"]): edge
+            for component in definition["components"]
+            for edge in component["graph"]["edges"]
+        }
+        states = {name: part["state"] for name, part in robot.system.state().items()}
+        await lived(page, robot, 60)
+        lit = 0
+        for entry in page.entries():
+            for transition in entry["transitions"]:
+                edge = edges[transition["component"], transition["id"]]
+                # What happens before the first one of a component cannot be known.
+                assert edge["from"] == states[transition["component"]]
+                states[transition["component"]] = edge["to"]
+                lit += 1
+        assert lit >= 40
+        assert states == {name: part["state"] for name, part in robot.system.state().items()}
+
+
+async def test_who_does_not_read_loses_entries_learns_how_many_and_is_heard_all_the_same(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # It is never silent for so long that it would be cut off.
@@ -150,48 +145,39 @@ def test_who_does_not_read_loses_entries_is_told_how_many_and_is_heard_all_the_s
     # So large that the buffers on the way hold few of them.
     note = {"time": time.time(), "kind": "device", "what": "x" * 250}
     count = 12 * MAXIMUM_EVENTS
-
-    async def look(url: str) -> None:
-        async with opened(url) as page:
-            await page.told("update")
-            # No byte is taken off the connection from now on.
-            connection = page.socket._response.connection
-            assert connection is not None and connection.transport is not None
-            connection.transport.pause_reading()
-            for number in range(count):
-                robot.feed.append(note)
-                if number % 200 == 0:
-                    await asyncio.sleep(0.001)
-            await page.send(type="stop")
-            begin_s = time.monotonic()
-            while not robot.orders:
-                assert time.monotonic() - begin_s < LIMIT_S
+    async with viewed_meanwhile(robot) as endpoint, opened(endpoint.url) as page:
+        await page.told("update")
+        # No byte is taken off the connection from now on.
+        connection = page.socket._response.connection
+        assert connection is not None and connection.transport is not None
+        connection.transport.pause_reading()
+        for number in range(count):
+            robot.feed.append(note)
+            if number % 200 == 0:
                 await asyncio.sleep(0.001)
-            connection.transport.resume_reading()
-            await seen(page, count)
-            numbers = [entry["number"] for entry in page.entries()]
-            assert page.lost() > 0
-            assert numbers == sorted(set(numbers))
-            assert len(numbers) + page.lost() == count
-            assert numbers[-1] == count
-            # The latest state is never lost.
-            await page.until(lambda message: "OPERATOR_STOP" in json.dumps(message.get("reasons")))
+        await page.send(type="stop")
+        begin_s = time.monotonic()
+        while not robot.orders:
+            assert time.monotonic() - begin_s < LIMIT_S
+            await asyncio.sleep(0.001)
+        connection.transport.resume_reading()
+        await seen(page, count)
+        numbers = [entry["number"] for entry in page.entries()]
+        assert page.lost() > 0
+        assert numbers == sorted(set(numbers))
+        assert len(numbers) + page.lost() == count
+        assert numbers[-1] == count
+        # The latest state is never lost.
+        await page.until(lambda message: "OPERATOR_STOP" in json.dumps(message.get("reasons")))
 
-    with viewed(robot) as endpoint:
-        asyncio.run(look(endpoint.url))
 
-
-def test_a_reader_that_is_gone_without_a_word_holds_up_nobody() -> None:
+async def test_a_reader_that_is_gone_without_a_word_holds_up_nobody() -> None:
     robot = large_robot()
-
-    async def look(url: str) -> None:
-        host, _, rest = url.removeprefix("http://").partition(":")
+    async with viewed_meanwhile(robot) as endpoint:
+        host, _, rest = endpoint.url.removeprefix("http://").partition(":")
         port = int(rest.partition("/")[0])
         with socket.create_connection((host, port)) as silent:
             silent.sendall(b"GET /stream HTTP/1.1\r\nHost: ")
-            async with opened(url) as page:
+            async with opened(endpoint.url) as page:
                 await page.told("update")
                 await lived(page, robot, 20)
-
-    with viewed(robot) as endpoint:
-        asyncio.run(look(endpoint.url))

@@ -81,24 +81,20 @@ class _Shown:
         return lambda *arguments, **named: None
 
 
-def test_a_replay_shows_the_robot_where_it_was(tmp_path: Path) -> None:
+async def test_a_replay_shows_the_robot_where_it_was(tmp_path: Path) -> None:
     supervisor = supervisor_without_synthesis(large_model(2))
     log = tmp_path / "run.jsonl"
     entries = [{"time": BEGIN_S + time_s, "kind": "release", "identifier": "/x"} for time_s in (0.0, 2.0)]
     log.write_text("".join(json.dumps(entry) + "\n" for entry in entries), encoding="utf-8")
     motion = MotionTrace(Motion((sample(0.0, 0.0), sample(1.0, 3.0)), ()))
     replay, sink = Replay(Recording(read_log(log), supervisor, None, motion)), _Shown()
-
-    async def go() -> None:
-        running = asyncio.create_task(replay.run(sink))
-        while not sink.drives:
-            await asyncio.sleep(0)
-        replay.control_replay(Seek(BEGIN_S + 1.5))
-        while len(sink.drives) < 2:
-            await asyncio.sleep(0)
-        running.cancel()
-
-    asyncio.run(go())
+    running = asyncio.create_task(replay.run(sink))
+    while not sink.drives:
+        await asyncio.sleep(0)
+    replay.control_replay(Seek(BEGIN_S + 1.5))
+    while len(sink.drives) < 2:
+        await asyncio.sleep(0)
+    running.cancel()
     assert [drive.pose[0] for drive in sink.drives if drive is not None] == [0.0, 3.0]
     assert sink.scene == {"walls": [], "line": [], "way": [[0.0, 0.0], [3.0, 0.0], [3.0, 0.0]]}
     assert Recording(read_log(log), supervisor).robot.scene is None

@@ -1,4 +1,4 @@
-"""The page of the documentation tells the limits that hold, and is listed."""
+"""The page of the documentation states the limits that hold, and is listed."""
 
 from pathlib import Path
 

@@ -107,103 +107,88 @@ def components(update: dict[str, Any]) -> set[str]:
     return set(update["components"])
 
 
-def test_what_is_shown_first() -> None:
-    async def run() -> None:
-        files = Files()
-        async with looking(files) as page:
-            definition = await page.told("definition")
-            assert (definition["source"], definition["can_command"]) == (str(SourceKind.MODEL), False)
-            update = await page.told("update")
-            assert update["enabled"] and not update["warnings"]
-            assert not page.entries()
+async def test_what_is_shown_first() -> None:
+    files = Files()
+    async with looking(files) as page:
+        definition = await page.told("definition")
+        assert (definition["source"], definition["can_command"]) == (str(SourceKind.MODEL), False)
+        update = await page.told("update")
+        assert update["enabled"] and not update["warnings"]
+        assert not page.entries()
+        await files.look()
+        assert files.begun == []
+
+
+async def test_a_change_is_shown_and_what_is_wrong_is_reported() -> None:
+    files = Files()
+    async with looking(files) as page:
+        await page.told("definition")
+        before = components(await page.told("update"))
+        files.content = "second"
+        await files.look()
+        files.made.set_result(SynthesizedModel(SECOND))
+        await files.look()
+        await page.told("definition")
+        after = components(await page.told("update"))
+        assert before < after
+        files.content = "third"
+        await files.look()
+        files.made.set_exception(NoSupervisorError("a component is missing"))
+        await files.look()
+        update = await page.until(lambda message: message["type"] == "update" and message["warnings"])
+        assert components(update) == after
+        assert "a component is missing" in str(update["warnings"])
+        files.content = NoSupervisorError("it is gone")
+        await files.look()
+        assert files.begun[-1] == "it is gone"
+        files.content = "third"
+        await files.look()
+        files.made.set_result(SynthesizedModel(FIRST))
+        await files.look()
+        update = await page.until(lambda message: message["type"] == "update" and not message["warnings"])
+        assert components(update) == before
+
+
+async def test_a_change_ends_the_synthesis_of_the_one_before_and_so_does_the_end() -> None:
+    files = Files()
+    async with looking(files) as page:
+        await page.told("update")
+        for content in ("second", "third"):
+            files.content = content
             await files.look()
-            assert files.begun == []
-
-    asyncio.run(run())
-
-
-def test_a_change_is_shown_and_what_is_wrong_is_told() -> None:
-    async def run() -> None:
-        files = Files()
-        async with looking(files) as page:
-            await page.told("definition")
-            before = components(await page.told("update"))
-            files.content = "second"
-            await files.look()
-            files.made.set_result(SynthesizedModel(SECOND))
-            await files.look()
-            await page.told("definition")
-            after = components(await page.told("update"))
-            assert before < after
-            files.content = "third"
-            await files.look()
-            files.made.set_exception(NoSupervisorError("a component is missing"))
-            await files.look()
-            update = await page.until(lambda told: told["type"] == "update" and told["warnings"])
-            assert components(update) == after
-            assert "a component is missing" in str(update["warnings"])
-            files.content = NoSupervisorError("it is gone")
-            await files.look()
-            assert files.begun[-1] == "it is gone"
-            files.content = "third"
-            await files.look()
-            files.made.set_result(SynthesizedModel(FIRST))
-            await files.look()
-            update = await page.until(lambda told: told["type"] == "update" and not told["warnings"])
-            assert components(update) == before
-
-    asyncio.run(run())
+        assert (files.begun, files.cancelled) == (["second", "third"], ["second"])
+    assert files.cancelled == ["second", "third"]
 
 
-def test_a_change_ends_the_synthesis_of_the_one_before_and_so_does_the_end() -> None:
-    async def run() -> None:
-        files = Files()
-        async with looking(files) as page:
-            await page.told("update")
-            for content in ("second", "third"):
-                files.content = content
-                await files.look()
-            assert (files.begun, files.cancelled) == (["second", "third"], ["second"])
-        assert files.cancelled == ["second", "third"]
-
-    asyncio.run(run())
+async def test_nothing_is_commanded_or_replayed() -> None:
+    source = Files().source()
+    with pytest.raises(RefusedError, match="nothing is executed"):
+        await source.order(OperatorCommand.STOP, "somebody")
+    with pytest.raises(RefusedError, match="only a log"):
+        source.control_replay(Pause())
 
 
-def test_nothing_is_commanded_or_replayed() -> None:
-    async def run() -> None:
-        source = Files().source()
-        with pytest.raises(RefusedError, match="nothing is executed"):
-            await source.order(OperatorCommand.STOP, "somebody")
-        with pytest.raises(RefusedError, match="only a log"):
-            source.control_replay(Pause())
-
-    asyncio.run(run())
-
-
-def test_what_synth_tells(tmp_path: Path) -> None:
-    async def run() -> None:
-        made = await synthesized(["--", str(MODEL)])
-        assert supervisor_in(made).model.name == "LineFollower"
-        again = await synthesized([], MODEL.read_text(encoding="utf-8"))
-        assert again.supervisor.added == made.supervisor.added
-        wrong = tmp_path / "wrong.rscd"
-        for text, why in (
-            ("robot R { component C {} component C {} component C {} }", r"wrong.rscd, line 1: .*'C'.* \(2 errors\)"),
-            ("robot R {", "wrong.rscd, line 1: "),
-            (
-                "robot R { component C { outgoing message m with type: none behaviour { initial marked state a { on "
-                "response from m goto b } state b { on response from m goto a } } } requirement never C.b }",
-                "no supervisor exists",
-            ),
-        ):
-            wrong.write_text(text)
-            with pytest.raises(NoSupervisorError, match=why):
-                await synthesized(["--", str(wrong)])
-        wrong.unlink()
-        with pytest.raises(NoSupervisorError, match="there is no file"):
+async def test_findings_of_synth_become_the_problem(tmp_path: Path) -> None:
+    made = await synthesized(["--", str(MODEL)])
+    assert supervisor_in(made).model.name == "LineFollower"
+    again = await synthesized([], MODEL.read_text(encoding="utf-8"))
+    assert again.supervisor.added == made.supervisor.added
+    wrong = tmp_path / "wrong.rscd"
+    for text, why in (
+        ("robot R { component C {} component C {} component C {} }", r"wrong.rscd, line 1: .*'C'.* \(2 errors\)"),
+        ("robot R {", "wrong.rscd, line 1: "),
+        (
+            "robot R { component C { outgoing message m with type: none behaviour { initial marked state a { on "
+            "response from m goto b } state b { on response from m goto a } } } requirement never C.b }",
+            "no supervisor exists",
+        ),
+    ):
+        wrong.write_text(text)
+        with pytest.raises(NoSupervisorError, match=why):
             await synthesized(["--", str(wrong)])
-
-    asyncio.run(run())
+    wrong.unlink()
+    with pytest.raises(NoSupervisorError, match="there is no file"):
+        await synthesized(["--", str(wrong)])
 
 
 def test_nothing_of_the_folder_that_one_works_in_is_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -213,7 +198,7 @@ def test_nothing_of_the_folder_that_one_works_in_is_run(tmp_path: Path, monkeypa
     assert not (tmp_path / "was_run").exists()
 
 
-def test_one_that_is_not_wanted_any_more_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_one_that_is_not_wanted_any_more_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     # Reading it never ends, since nobody writes.
     model = tmp_path / "pipe.rscd"
     os.mkfifo(model)
@@ -225,17 +210,13 @@ def test_one_that_is_not_wanted_any_more_is_ended(tmp_path: Path, monkeypatch: p
         return started[-1]
 
     monkeypatch.setattr(watched_model.asyncio, "create_subprocess_exec", noted)  # type: ignore[attr-defined]
-
-    async def run() -> None:
-        task = asyncio.create_task(synthesized(["--", str(model)]))
-        while not started:
-            await asyncio.sleep(0)
-        task.cancel()
-        with pytest.raises(asyncio.CancelledError):
-            await asyncio.wait_for(task, LIMIT_S)
-        assert started[0].returncode is not None
-
-    asyncio.run(run())
+    task = asyncio.create_task(synthesized(["--", str(model)]))
+    while not started:
+        await asyncio.sleep(0)
+    task.cancel()
+    with pytest.raises(asyncio.CancelledError):
+        await asyncio.wait_for(task, LIMIT_S)
+    assert started[0].returncode is not None
 
 
 def test_a_supervisors_file(tmp_path: Path) -> None:
@@ -255,7 +236,7 @@ def test_a_supervisors_file(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("suffix", [".rscd", ".rsup"])
-def test_the_command_follows_its_file(tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_the_command_follows_its_file(tmp_path: Path, suffix: str, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watched_model, "LOOK_S", 0.01)
     file = tmp_path / f"robot{suffix}"
 
@@ -268,20 +249,16 @@ def test_the_command_follows_its_file(tmp_path: Path, suffix: str, monkeypatch: 
     parser: argparse.ArgumentParser = Parser(prog="robosc")
     command.add_parser(parser.add_subparsers())
     make, is_shared, robot = command._source(parser.parse_args(["view", "--model", str(file)]))
-
-    async def look() -> None:
-        async with served(make, is_shared=is_shared, robot=robot) as server, opened(server.url) as page:
-            before = components(await page.told("update"))
-            write(SECOND, 3)
-            await page.until(lambda told: told["type"] == "update" and components(told) > before)
-            file.write_bytes(b"robot {")
-            await page.until(lambda told: told["type"] == "update" and told["warnings"])
-            write(FIRST, 2)
-            await page.until(
-                lambda told: told["type"] == "update" and components(told) == before and not told["warnings"]
-            )
-
-    asyncio.run(look())
+    async with served(make, is_shared=is_shared, robot=robot) as server, opened(server.url) as page:
+        before = components(await page.told("update"))
+        write(SECOND, 3)
+        await page.until(lambda message: message["type"] == "update" and components(message) > before)
+        file.write_bytes(b"robot {")
+        await page.until(lambda message: message["type"] == "update" and message["warnings"])
+        write(FIRST, 2)
+        await page.until(
+            lambda message: message["type"] == "update" and components(message) == before and not message["warnings"]
+        )
 
 
 GATE = """robot Gate {
@@ -329,209 +306,185 @@ class Playing(Files):
 async def done(view: Any, kind: str, **request: Any) -> dict[str, Any]:
     """Ask for something, and return the answer about the run."""
     await view.send(type=kind, **request)
-    told: dict[str, Any] = await view.told("run")
-    return told
+    answer: dict[str, Any] = await view.told("run")
+    return answer
 
 
-def test_events_happen_with_their_data_and_are_taken_back() -> None:
-    async def run() -> None:
-        async with looking(Playing()) as page:
-            definition = await page.told("definition")
-            events = {item["event"]: item for item in definition["play"]["events"]}
-            assert [name for name, item in events.items() if item["controllable"]] == ["open.request", "shut.request"]
-            (field,) = events["light.response"]["fields"]
-            assert field == {"path": [], "type": "Light", "choices": ["day", "night"], "is_boolean": False}
-            first = await page.told("run")
-            assert (first["steps"], first["undo"], first["redo"], first["is_marked"]) == (0, "", "", True)
-            assert first["blocked"]["shut.request"] == ["Gate is in closed, not in opened"]
-            told = await done(page, "event", line="open")
-            assert (told["kind"], told["steps"]) == ("wrong", 0)
-            assert "open.request' is not allowed now: requirement open needs Sensor.light = day" in told["lines"][0]
-            # Data that is not given is unknown, and stays so.
-            told = await done(page, "event", line="light.response")
-            assert (told["kind"], told["steps"]) == ("unknown", 1)
-            assert told["lines"][1] == "value is night by default: an earlier rule is unknown"
-            told = await done(page, "event", line="light.response 512.0")
-            assert (told["kind"], told["lines"]) == ("step", ["light.response (value = day): Sensor.light = day"])
-            assert "open.request" not in told["blocked"]
-            told = await done(page, "event", line="open.request")
-            assert (told["undo"], told["is_marked"]) == ("open.request", False)
-            assert [entry["number"] for entry in page.entries()] == [1, 2, 3, 4]
-            assert [entry["event"] for entry in page.entries()][-2:] == ["light.response", "open.request"]
-            assert page.entries()[-1]["transitions"][0]["component"] == "Gate"
-            told = await done(page, "undo")
-            assert (told["entries"], told["redo"], told["undo"]) == (3, "open.request", "light.response")
-            update = await page.until(lambda message: message["type"] == "update")
-            assert update["components"]["Gate"]["state"] == "closed"
-            assert "Gate" not in update["last"]
-            told = await done(page, "redo")
-            assert (told["entries"], told["redo"]) == (4, "")
-            told = await done(page, "undo")
-            told = await done(page, "event", line="seen 3")
-            # It takes the number of what was taken back.
-            assert (page.entries()[-1]["number"], page.entries()[-1]["event"]) == (4, "seen.response")
-            told = await done(page, "event", line="seen null")
-            assert told["lines"][1] == "Sensor.people keeps its value, since what it was to take is unknown"
-            told = await done(page, "restart")
-            assert (told["entries"], told["steps"], told["redo"]) == (0, 0, "")
-
-    asyncio.run(run())
+async def test_events_happen_with_their_data_and_are_taken_back() -> None:
+    async with looking(Playing()) as page:
+        definition = await page.told("definition")
+        events = {item["event"]: item for item in definition["play"]["events"]}
+        assert [name for name, item in events.items() if item["controllable"]] == ["open.request", "shut.request"]
+        (field,) = events["light.response"]["fields"]
+        assert field == {"path": [], "type": "Light", "choices": ["day", "night"], "is_boolean": False}
+        first = await page.told("run")
+        assert (first["steps"], first["undo"], first["redo"], first["is_marked"]) == (0, "", "", True)
+        assert first["blocked"]["shut.request"] == ["Gate is in closed, not in opened"]
+        answer = await done(page, "event", line="open")
+        assert (answer["kind"], answer["steps"]) == ("wrong", 0)
+        assert "open.request' is not allowed now: requirement open needs Sensor.light = day" in answer["lines"][0]
+        # Data that is not given is unknown, and stays so.
+        answer = await done(page, "event", line="light.response")
+        assert (answer["kind"], answer["steps"]) == ("unknown", 1)
+        assert answer["lines"][1] == "value is night by default: an earlier rule is unknown"
+        answer = await done(page, "event", line="light.response 512.0")
+        assert (answer["kind"], answer["lines"]) == ("step", ["light.response (value = day): Sensor.light = day"])
+        assert "open.request" not in answer["blocked"]
+        answer = await done(page, "event", line="open.request")
+        assert (answer["undo"], answer["is_marked"]) == ("open.request", False)
+        assert [entry["number"] for entry in page.entries()] == [1, 2, 3, 4]
+        assert [entry["event"] for entry in page.entries()][-2:] == ["light.response", "open.request"]
+        assert page.entries()[-1]["transitions"][0]["component"] == "Gate"
+        answer = await done(page, "undo")
+        assert (answer["entries"], answer["redo"], answer["undo"]) == (3, "open.request", "light.response")
+        update = await page.until(lambda message: message["type"] == "update")
+        assert update["components"]["Gate"]["state"] == "closed"
+        assert "Gate" not in update["last"]
+        answer = await done(page, "redo")
+        assert (answer["entries"], answer["redo"]) == (4, "")
+        answer = await done(page, "undo")
+        answer = await done(page, "event", line="seen 3")
+        # It takes the number of what was taken back.
+        assert (page.entries()[-1]["number"], page.entries()[-1]["event"]) == (4, "seen.response")
+        answer = await done(page, "event", line="seen null")
+        assert answer["lines"][1] == "Sensor.people keeps its value, since what it was to take is unknown"
+        answer = await done(page, "restart")
+        assert (answer["entries"], answer["steps"], answer["redo"]) == (0, 0, "")
 
 
-def test_chance_and_findings() -> None:
-    async def run() -> None:
-        async with looking(Playing()) as page:
-            told = await page.told("run")
-            told = await done(page, "walk", steps=12, seed=3)
-            assert (told["steps"], told["lines"]) == (12, ["12 events by chance, seed 3"])
-            twin = Run(supervisor_in(playable_automata(GATE)))
-            assert [entry["event"] for entry in page.entries() if entry["kind"] == "event"] == [
-                step.event for step in twin.walk(12, 3)
-            ]
-            told = await done(page, "restart")
-            told = await done(page, "walk", steps=1000, seed=0, until_finding=True)
-            twin.restart()
-            assert (told["kind"], told["lines"]) == ("finding", [str(twin.walk_until_finding(1000, 0))])
-            assert told["steps"] == len(twin)
-            for _ in range(4):
-                told = await done(page, "walk", steps=5000, seed=1)
-            assert (told["kind"], told["steps"]) == ("wrong", 15000 + len(twin))
-            assert "at most 20000 events" in told["lines"][0]
-
-    asyncio.run(run())
+async def test_chance_and_findings() -> None:
+    async with looking(Playing()) as page:
+        answer = await page.told("run")
+        answer = await done(page, "walk", steps=12, seed=3)
+        assert (answer["steps"], answer["lines"]) == (12, ["12 events by chance, seed 3"])
+        twin = Run(supervisor_in(playable_automata(GATE)))
+        assert [entry["event"] for entry in page.entries() if entry["kind"] == "event"] == [
+            step.event for step in twin.walk(12, 3)
+        ]
+        answer = await done(page, "restart")
+        answer = await done(page, "walk", steps=1000, seed=0, until_finding=True)
+        twin.restart()
+        assert (answer["kind"], answer["lines"]) == ("finding", [str(twin.walk_until_finding(1000, 0))])
+        assert answer["steps"] == len(twin)
+        for _ in range(4):
+            answer = await done(page, "walk", steps=5000, seed=1)
+        assert (answer["kind"], answer["steps"]) == ("wrong", 15000 + len(twin))
+        assert "at most 20000 events" in answer["lines"][0]
 
 
-def test_a_run_is_kept_as_a_log_and_as_a_test() -> None:
-    async def run() -> None:
-        async with looking(Playing()) as page:
-            await page.told("run")
-            await done(page, "event", line="light day")
-            await done(page, "event", line="open")
-            twin = Run(supervisor_in(playable_automata(GATE)))
-            twin.step("light.response", "day")
-            twin.step("open.request")
-            await page.send(type="save", form="log")
-            told = await page.told("saved")
-            assert (told["name"], told["text"]) == ("gate.jsonl", event_log(twin))
-            await page.send(type="save", form="test")
-            told = await page.told("saved")
-            assert told["name"] == "test_gate.py"
-            assert "MODEL = FOLDER / 'gate.rscd'" in told["text"]
-            assert "'open.request'" in told["text"]
-            compile(told["text"], told["name"], "exec")
-
-    asyncio.run(run())
+async def test_a_run_is_kept_as_a_log_and_as_a_test() -> None:
+    async with looking(Playing()) as page:
+        await page.told("run")
+        await done(page, "event", line="light day")
+        await done(page, "event", line="open")
+        twin = Run(supervisor_in(playable_automata(GATE)))
+        twin.step("light.response", "day")
+        twin.step("open.request")
+        await page.send(type="save", form="log")
+        answer = await page.told("saved")
+        assert (answer["name"], answer["text"]) == ("gate.jsonl", event_log(twin))
+        await page.send(type="save", form="test")
+        answer = await page.told("saved")
+        assert answer["name"] == "test_gate.py"
+        assert "MODEL = FOLDER / 'gate.rscd'" in answer["text"]
+        assert "'open.request'" in answer["text"]
+        compile(answer["text"], answer["name"], "exec")
 
 
-def test_each_page_has_a_run_of_its_own() -> None:
-    async def run() -> None:
-        files = Playing()
-        async with (
-            served(files.source, is_shared=False, robot=files.robot) as server,
-            opened(server.url) as one,
-            opened(server.url) as other,
-        ):
-            await one.told("run")
-            await other.told("run")
-            assert (await done(one, "event", line="light day"))["steps"] == 1
-            assert (await done(other, "undo"))["steps"] == 0
-
-    asyncio.run(run())
+async def test_each_page_has_a_run_of_its_own() -> None:
+    files = Playing()
+    async with (
+        served(files.source, is_shared=False, robot=files.robot) as server,
+        opened(server.url) as one,
+        opened(server.url) as other,
+    ):
+        await one.told("run")
+        await other.told("run")
+        assert (await done(one, "event", line="light day"))["steps"] == 1
+        assert (await done(other, "undo"))["steps"] == 0
 
 
-def test_a_saved_file_says_what_has_changed_and_the_run_happens_again() -> None:
-    async def run() -> None:
-        files = Playing()
-        async with looking(files) as page:
-            await page.told("run")
-            await done(page, "event", line="light day")
-            await done(page, "event", line="open")
-            files.content = "second"
-            await files.look()
-            changed = GATE.replace("needs Sensor.light = day", "needs Sensor.light = day and Sensor.people = 0")
-            changed = changed.replace("requirement shut needs Sensor.people = 0", "requirement shut needs Gate.closed")
-            changed = changed.replace("state opened", "marked state opened")
-            files.made.set_result(playable_automata(changed, ("warning: shut never happens [never-enabled]",)))
-            await files.look()
-            told = await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
-            assert told["steps"] == 2
-            assert told["lines"][0] == "the model has changed"
-            assert "new finding: warning: shut never happens [never-enabled]" in told["lines"]
-            files.content = "third"
-            await files.look()
-            files.made.set_result(
-                playable_automata(changed.replace("needs Sensor.light = day and", "needs Gate.opened and"))
-            )
-            await files.look()
-            told = await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
-            # An event that cannot happen any more ends it there.
-            assert told["steps"] == 1
-            assert any(line.startswith("of 2 events 1 happened again: 'open.request' is") for line in told["lines"])
-            assert "no longer found: warning: shut never happens [never-enabled]" in told["lines"]
-            assert any("states, which were" in line for line in told["lines"])
-
-    asyncio.run(run())
+async def test_a_saved_file_says_what_has_changed_and_the_run_happens_again() -> None:
+    files = Playing()
+    async with looking(files) as page:
+        await page.told("run")
+        await done(page, "event", line="light day")
+        await done(page, "event", line="open")
+        files.content = "second"
+        await files.look()
+        changed = GATE.replace("needs Sensor.light = day", "needs Sensor.light = day and Sensor.people = 0")
+        changed = changed.replace("requirement shut needs Sensor.people = 0", "requirement shut needs Gate.closed")
+        changed = changed.replace("state opened", "marked state opened")
+        files.made.set_result(playable_automata(changed, ("warning: shut never happens [never-enabled]",)))
+        await files.look()
+        answer = await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
+        assert answer["steps"] == 2
+        assert answer["lines"][0] == "the model has changed"
+        assert "new finding: warning: shut never happens [never-enabled]" in answer["lines"]
+        files.content = "third"
+        await files.look()
+        files.made.set_result(
+            playable_automata(changed.replace("needs Sensor.light = day and", "needs Gate.opened and"))
+        )
+        await files.look()
+        answer = await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
+        # An event that cannot happen any more ends it there.
+        assert answer["steps"] == 1
+        assert any(line.startswith("of 2 events 1 happened again: 'open.request' is") for line in answer["lines"])
+        assert "no longer found: warning: shut never happens [never-enabled]" in answer["lines"]
+        assert any("states, which were" in line for line in answer["lines"])
 
 
-def test_a_link_holds_the_model() -> None:
-    async def run() -> None:
-        files = Playing()
-        async with (
-            served(files.source, is_shared=False, robot=files.robot) as server,
-            opened(server.url) as page,
-        ):
-            token = token_of(server.url)
-            link = (await page.told("definition"))["play"]["link"]
-            assert unpacked(link) == GATE
-            await page.told("run")
-            # Somebody else's link does not set this machine to work.
-            for shown in (None, "x", 3):
-                await page.send(type="model", packed=packed("robot Other { }"), token=shown)
-                told = await page.until(lambda message: message["type"] in ("refused", "run"))
-                assert "needs the token of this start" in told.get("why", "")
-            assert files.begun == []
-            await page.send(type="model", packed=packed("robot Other { }"), token=token)
-            told = await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
-            assert told["lines"] == ["this is the model of the link"]
-            assert files.begun == ["robot Other { }"]
-            for wrong in ("", "x", "!!!", link[:40], link[:-8]):
-                await page.send(type="model", packed=wrong, token=token)
-                told = await page.until(lambda message: message["type"] in ("run", "refused"))
-                assert "link" in str(told) or "must be a text" in str(told)
-
-    asyncio.run(run())
+async def test_a_link_holds_the_model() -> None:
+    files = Playing()
+    async with served(files.source, is_shared=False, robot=files.robot) as server, opened(server.url) as page:
+        token = token_of(server.url)
+        link = (await page.told("definition"))["play"]["link"]
+        assert unpacked(link) == GATE
+        await page.told("run")
+        # Somebody else's link does not set this machine to work.
+        for shown in (None, "x", 3):
+            await page.send(type="model", packed=packed("robot Other { }"), token=shown)
+            answer = await page.until(lambda message: message["type"] in ("refused", "run"))
+            assert "needs the token of this start" in answer.get("why", "")
+        assert files.begun == []
+        await page.send(type="model", packed=packed("robot Other { }"), token=token)
+        answer = await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
+        assert answer["lines"] == ["this is the model of the link"]
+        assert files.begun == ["robot Other { }"]
+        for wrong in ("", "x", "!!!", link[:40], link[:-8]):
+            await page.send(type="model", packed=wrong, token=token)
+            answer = await page.until(lambda message: message["type"] in ("run", "refused"))
+            assert "link" in str(answer) or "must be a text" in str(answer)
     assert packed("x".join(map(str, range(9000)))) is None
     with pytest.raises(RefusedError, match="too large"):
         unpacked(base64.urlsafe_b64encode(zlib.compress(b"x" * (1 << 21))).decode())
 
 
-def test_a_page_that_comes_back_goes_on_with_its_run() -> None:
-    async def run() -> None:
-        files = Playing()
-        async with served(files.source, is_shared=False, robot=files.robot) as server:
-            async with opened(server.url) as page:
-                await page.told("run")
-                # Nothing was kept of it yet.
-                await page.send(type="resume", page="one")
-                await done(page, "event", line="light day")
-                assert (await done(page, "event", line="open"))["steps"] == 2
-            async with opened(server.url) as page, opened(server.url) as other:
-                await page.told("run")
-                told = await done(page, "resume", page="one")
-                assert (told["steps"], told["lines"]) == (2, ["what this page did before is here again"])
-                assert [entry["event"] for entry in page.entries()] == ["light.response", "open.request"]
-                await other.told("run")
-                await other.send(type="resume", page="two")
-                assert (await done(other, "event", line="seen 1"))["steps"] == 1
-                await page.send(type="model", packed=packed("robot Other { }"), token=token_of(server.url))
-                await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
-            async with opened(server.url) as page:
-                first = components(await page.told("update"))
-                await page.send(type="resume", page="one")
-                # The model of the link is kept, too.
-                await page.until(lambda message: message["type"] == "update" and components(message) != first)
-
-    asyncio.run(run())
+async def test_a_page_that_comes_back_goes_on_with_its_run() -> None:
+    files = Playing()
+    async with served(files.source, is_shared=False, robot=files.robot) as server:
+        async with opened(server.url) as page:
+            await page.told("run")
+            # Nothing was kept of it yet.
+            await page.send(type="resume", page="one")
+            await done(page, "event", line="light day")
+            assert (await done(page, "event", line="open"))["steps"] == 2
+        async with opened(server.url) as page, opened(server.url) as other:
+            await page.told("run")
+            answer = await done(page, "resume", page="one")
+            assert (answer["steps"], answer["lines"]) == (2, ["what this page did before is here again"])
+            assert [entry["event"] for entry in page.entries()] == ["light.response", "open.request"]
+            await other.told("run")
+            await other.send(type="resume", page="two")
+            assert (await done(other, "event", line="seen 1"))["steps"] == 1
+            await page.send(type="model", packed=packed("robot Other { }"), token=token_of(server.url))
+            await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
+        async with opened(server.url) as page:
+            first = components(await page.told("update"))
+            await page.send(type="resume", page="one")
+            # The model of the link is kept, too.
+            await page.until(lambda message: message["type"] == "update" and components(message) != first)
     kept = StoredRuns()
     for number in range(MAXIMUM_KEPT + 1):
         kept.keep(str(number), StoredRun(SynthesizedModel(FIRST)))
@@ -563,19 +516,16 @@ def test_requests_that_make_no_sense_are_refused(request_: dict[str, Any]) -> No
         parse_request(json.dumps(request_))
 
 
-def test_what_is_shown_live_is_not_led_by_hand() -> None:
-    async def run() -> None:
-        made = playable_automata(GATE)
-        log = LoggedRun((LogEntry(1, 0.0, "restart", "", False, {}),))
-        recording = Recording(log, supervisor_in(made))
-        async with served(lambda: Replay(recording), is_shared=False) as server, opened(server.url) as page:
-            await page.send(type="undo")
-            assert "only a model alone is" in (await page.told("refused"))["why"]
-
-    asyncio.run(run())
+async def test_what_is_shown_live_is_not_led_by_hand() -> None:
+    made = playable_automata(GATE)
+    log = LoggedRun((LogEntry(1, 0.0, "restart", "", False, {}),))
+    recording = Recording(log, supervisor_in(made))
+    async with served(lambda: Replay(recording), is_shared=False) as server, opened(server.url) as page:
+        await page.send(type="undo")
+        assert "only a model alone is" in (await page.told("refused"))["why"]
 
 
-def test_changes_of_the_supervisor_are_told() -> None:
+def test_changes_of_the_supervisor_are_reported() -> None:
     carrier = """robot Carrier {
         component Gate {
             incoming message open with identifier: "/open", type: none
@@ -598,9 +548,9 @@ def test_changes_of_the_supervisor_are_told() -> None:
     }"""
     before = playable_automata(carrier)
     after = playable_automata(carrier.replace("requirement shut needs Lift.down", ""))
-    told = model_changes(before, after)
-    assert "4 states, which were 3" in told
-    assert any(line.startswith("the supervisor adds nothing more to open.request (before: Lift.down") for line in told)
+    lines = model_changes(before, after)
+    assert "4 states, which were 3" in lines
+    assert any(line.startswith("the supervisor adds nothing more to open.request (before: Lift.down") for line in lines)
     assert model_changes(before, before) == ("nothing that the supervisor does has changed",)
     assert "gone: shut.request" in model_changes(
         before, playable_automata(carrier.replace("shut with", "close with").replace("to shut", "to close")
@@ -609,7 +559,7 @@ def test_changes_of_the_supervisor_are_told() -> None:
 
 
 @pytest.mark.parametrize("how", ["file", "-", "link"])
-def test_the_command_plays_with_a_file_a_text_or_a_link(
+async def test_the_command_plays_with_a_file_a_text_or_a_link(
     how: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -622,13 +572,9 @@ def test_the_command_plays_with_a_file_a_text_or_a_link(
     command._take_played(arguments)
     make, is_shared, robot = command._source(arguments)
     assert (is_shared, robot is not None and robot.shape.name) == (False, "Gate")
-
-    async def look() -> None:
-        async with served(make, is_shared=is_shared, robot=robot) as server, opened(server.url) as page:
-            await page.told("run")
-            assert (await done(page, "event", line="light day"))["steps"] == 1
-
-    asyncio.run(look())
+    async with served(make, is_shared=is_shared, robot=robot) as server, opened(server.url) as page:
+        await page.told("run")
+        assert (await done(page, "event", line="light day"))["steps"] == 1
 
 
 @pytest.mark.parametrize(

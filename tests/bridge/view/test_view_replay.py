@@ -78,73 +78,65 @@ def shown(message: dict[str, Any]) -> list[Any]:
     return [message["components"], message["communications"], message["enabled"]]
 
 
-def test_every_place_shows_the_state_after_the_last_entry_before_it(tmp_path: Path) -> None:
+async def test_every_place_shows_the_state_after_the_last_entry_before_it(tmp_path: Path) -> None:
     written = Written(tmp_path, 400)
     dice = Random(1)
-
-    async def look() -> None:
-        recording = written.recording()
-        async with (
-            served(lambda: Replay(recording), is_shared=False, robot=recording.robot) as server,
-            opened(server.url) as page,
-        ):
-            definition = await page.told("definition")
-            assert definition["source"] == "log"
-            assert definition["can_command"] is False
-            assert definition["log"] == {
-                "begin_s": BEGIN_S,
-                "end_s": pytest.approx(BEGIN_S + STEP_S * 399),
-                "count": 400,
-            }
-            await page.told("update")
-            for _ in range(12):
-                number = dice.randrange(1, 400)
-                time_s = BEGIN_S + STEP_S * (number - 1) + 0.05
-                page.messages.clear()
-                await page.send(type="seek", time_s=time_s)
-                told = await page.until(_is_update_of(time_s))
-                assert shown(told) == written.states[number]
-                assert told["last"] == slowly_last(recording, number)
-                (position,) = [message for message in page.messages if message["type"] == "position"]
-                assert position == {"type": "position", "time_s": time_s, "is_playing": False, "speed": 1.0}
-                entries = page.entries()
-                assert [entry["number"] for entry in entries] == list(range(max(number - HISTORY, 0) + 1, number + 1))
-                assert entries[-1]["event"] == written.events[number - 1]
-                lit = [entry for entry in entries if entry["transitions"]]
-                assert len(lit) > len(entries) / 3
-
-    asyncio.run(look())
+    recording = written.recording()
+    async with (
+        served(lambda: Replay(recording), is_shared=False, robot=recording.robot) as server,
+        opened(server.url) as page,
+    ):
+        definition = await page.told("definition")
+        assert definition["source"] == "log"
+        assert definition["can_command"] is False
+        assert definition["log"] == {
+            "begin_s": BEGIN_S,
+            "end_s": pytest.approx(BEGIN_S + STEP_S * 399),
+            "count": 400,
+        }
+        await page.told("update")
+        for _ in range(12):
+            number = dice.randrange(1, 400)
+            time_s = BEGIN_S + STEP_S * (number - 1) + 0.05
+            page.messages.clear()
+            await page.send(type="seek", time_s=time_s)
+            received = await page.until(_is_update_of(time_s))
+            assert shown(received) == written.states[number]
+            assert received["last"] == slowly_last(recording, number)
+            (position,) = [message for message in page.messages if message["type"] == "position"]
+            assert position == {"type": "position", "time_s": time_s, "is_playing": False, "speed": 1.0}
+            entries = page.entries()
+            assert [entry["number"] for entry in entries] == list(range(max(number - HISTORY, 0) + 1, number + 1))
+            assert entries[-1]["event"] == written.events[number - 1]
+            lit = [entry for entry in entries if entry["transitions"]]
+            assert len(lit) > len(entries) / 3
 
 
-def test_it_plays_to_the_end_and_every_entry_comes_once(tmp_path: Path) -> None:
+async def test_it_plays_to_the_end_and_every_entry_comes_once(tmp_path: Path) -> None:
     written = Written(tmp_path, 300)
-
-    async def look() -> None:
-        recording = written.recording()
-        async with (
-            served(lambda: Replay(recording), is_shared=False) as server,
-            opened(server.url) as page,
-            opened(server.url) as other,
-        ):
-            await page.told("update")
-            await other.told("update")
-            await page.send(type="play", speed=40)
-            await page.until(_stands_at(BEGIN_S + STEP_S * 299))
-            await page.until(lambda message: message["type"] == "update" and shown(message) == written.states[-1])
-            assert [entry["number"] for entry in page.entries()] == list(range(1, 301))
-            assert [entry["event"] for entry in page.entries()] == written.events
-            # Each page has a place of its own.
-            assert shown(await other.told("update")) == written.states[1]
-            await page.send(type="play", speed=0.5)
-            begun = await page.told("position")
-            # It stood at the end, 29.9 s later.
-            assert begun["is_playing"] and begun["time_s"] < BEGIN_S + 20.0
-            await page.send(type="pause")
-            await page.until(lambda message: message["type"] == "position" and not message["is_playing"])
-            await page.send(type="stop")
-            assert (await page.told("refused"))["what"] == "stop"
-
-    asyncio.run(look())
+    recording = written.recording()
+    async with (
+        served(lambda: Replay(recording), is_shared=False) as server,
+        opened(server.url) as page,
+        opened(server.url) as other,
+    ):
+        await page.told("update")
+        await other.told("update")
+        await page.send(type="play", speed=40)
+        await page.until(_stands_at(BEGIN_S + STEP_S * 299))
+        await page.until(lambda message: message["type"] == "update" and shown(message) == written.states[-1])
+        assert [entry["number"] for entry in page.entries()] == list(range(1, 301))
+        assert [entry["event"] for entry in page.entries()] == written.events
+        # Each page has a place of its own.
+        assert shown(await other.told("update")) == written.states[1]
+        await page.send(type="play", speed=0.5)
+        begun = await page.told("position")
+        # It stood at the end, 29.9 s later.
+        assert begun["is_playing"] and begun["time_s"] < BEGIN_S + 20.0
+        await page.send(type="pause")
+        await page.until(lambda message: message["type"] == "position" and not message["is_playing"])
+        await page.send(type="stop")
+        assert (await page.told("refused"))["what"] == "stop"
 
 
 def _is_update_of(time_s: float) -> Any:
@@ -203,7 +195,7 @@ def _state() -> Any:
     return LiveRobot(SUPERVISOR).system.state()
 
 
-def test_faults_stops_and_restarts_are_told(tmp_path: Path) -> None:
+def test_faults_stops_and_restarts_are_reported(tmp_path: Path) -> None:
     state = {**_state(), "Motor1": {"state": "moving", "variables": {}}}
     run = _run(
         tmp_path / "log.jsonl",
@@ -273,7 +265,7 @@ def test_the_last_transitions_are_those_of_a_run_from_the_beginning(seed: int, h
         assert recording.last(number) == slowly_last(recording, number)
 
 
-def test_what_waits_of_another_place_is_not_told_after_a_jump() -> None:
+def test_what_waits_of_another_place_is_not_sent_after_a_jump() -> None:
     async def look() -> list[str]:
         viewer = Viewer()
         viewer.append_events(["of before"], 3)
@@ -293,7 +285,7 @@ DEEP = 900
 
 @pytest.mark.parametrize("deep", [f"{'[' * DEEP}7{']' * DEEP}", f"{'{"a":' * DEEP}7{'}' * DEEP}"])
 @pytest.mark.parametrize("place", ["data", "state", "what", "transitions", "more"])
-def test_what_is_nested_deeply_in_a_log_ends_nothing(tmp_path: Path, deep: str, place: str) -> None:
+async def test_what_is_nested_deeply_in_a_log_ends_nothing(tmp_path: Path, deep: str, place: str) -> None:
     state = json.dumps(_state())
     if place == "state":
         state = state.replace('"level": 0', f'"level": {deep}', 1)
@@ -303,18 +295,14 @@ def test_what_is_nested_deeply_in_a_log_ends_nothing(tmp_path: Path, deep: str, 
     begin = f'{{"time":{BEGIN_S},"kind":"event","event":"seen0.response","controllable":false,"state":{state}'
     path.write_text(f"{begin}{more}}}\n" + entries({"kind": "stop", "what": "x"}))
     recording = Recording(read_log(path), SUPERVISOR)
-
-    async def look() -> None:
-        async with (
-            served(lambda: Replay(recording), is_shared=False, robot=recording.robot) as server,
-            opened(server.url) as page,
-        ):
-            assert (await page.next())["type"] == "definition"
-            told = await page.until(lambda message: message["type"] in ("gone", "update"))
-            assert told["type"] == "update"
-            assert [entry["kind"] for entry in page.entries()] == ["event", "stop"]
-
-    asyncio.run(look())
+    async with (
+        served(lambda: Replay(recording), is_shared=False, robot=recording.robot) as server,
+        opened(server.url) as page,
+    ):
+        assert (await page.next())["type"] == "definition"
+        received = await page.until(lambda message: message["type"] in ("gone", "update"))
+        assert received["type"] == "update"
+        assert [entry["kind"] for entry in page.entries()] == ["event", "stop"]
 
 
 def test_a_clock_that_was_set_back_hides_nothing(tmp_path: Path) -> None:

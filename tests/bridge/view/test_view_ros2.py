@@ -18,10 +18,10 @@ def large() -> Supervisor:
     return supervisor_without_synthesis(large_model(6))
 
 
-def test_each_text_tells_state_and_events(large: Supervisor, tmp_path: Path) -> None:
+def test_each_text_reports_state_and_events(large: Supervisor, tmp_path: Path) -> None:
     node, reader = Node(large, tmp_path), StateReader(large)
     mentioned = {event for event, parts in reader.read(node.system.report(), 1.0)[0].table.items() if parts}
-    told: list[str] = []
+    events: list[str] = []
     taken: list[str] = []
     places: set[str] = set()
     states = {name: part["state"] for name, part in node.system.state().items()}
@@ -38,14 +38,14 @@ def test_each_text_tells_state_and_events(large: Supervisor, tmp_path: Path) -> 
         # An event that changes nothing anywhere has no transition.
         if any(before[name] in states_of for name, states_of in robot.table[event].items()):
             taken.append(event)
-        told += [entry["event"] for entry in entries]
+        events += [entry["event"] for entry in entries]
         assert all(entry["controllable"] == entry["event"].endswith(".request") for entry in entries)
-    assert told == taken
-    assert len(told) > 50
+    assert events == taken
+    assert len(events) > 50
     assert places == {"idle", "waiting", "ready", "failed"}
 
 
-def test_many_events_in_one_text_are_told_one_by_one(large: Supervisor, tmp_path: Path) -> None:
+def test_many_events_in_one_text_are_reported_one_by_one(large: Supervisor, tmp_path: Path) -> None:
     node, reader = Node(large, tmp_path), StateReader(large)
     reader.read(node.system.report(), 1.0)
     for event in ("seen0.response", "go1.request", "halt1.request", "seen0.response"):
@@ -66,25 +66,25 @@ def test_without_the_model_the_automata_are_shown_all_the_same(large: Supervisor
     ]
 
 
-def test_a_node_of_before_does_not_tell_where_services_are(large: Supervisor, tmp_path: Path) -> None:
+def test_a_node_of_before_does_not_report_where_services_are(large: Supervisor, tmp_path: Path) -> None:
     text = Node(large, tmp_path).system.report()
-    told = json.loads(text)
-    # In C++ it is told in the same words: the test of those nodes has this list, too.
-    assert list(told) == ["current", "communications", "transitions", "definition"]
-    assert told.pop("communications") == {"hold2": "idle", "hold5": "idle"}
+    state = json.loads(text)
+    # In C++ it is sent in the same words: the test of those nodes has this list, too.
+    assert list(state) == ["current", "communications", "transitions", "definition"]
+    assert state.pop("communications") == {"hold2": "idle", "hold5": "idle"}
     reader = StateReader(large)
-    robot, status, _ = reader.read(json.dumps(told), 1.0)
+    robot, status, _ = reader.read(json.dumps(state), 1.0)
     assert status.communications == {}
     shown = json.loads(MessageBuilder(PreparedRobot(robot)).update(status, 1, 0.0))
     named = {*shown["enabled"], *(item["event"] for item in shown["disabled"])}
     assert set(robot.requests) - named == {"hold2.request", "hold5.request"}
-    # One that tells leaves nothing open.
+    # One that sends them leaves nothing open.
     shown = json.loads(MessageBuilder(PreparedRobot(robot)).update(reader.read(text, 1.0)[1], 1, 0.0))
     assert shown["communications"] == {"hold2": "idle", "hold5": "idle"}
     assert {*shown["enabled"], *(item["event"] for item in shown["disabled"])} == set(robot.requests)
 
 
-def test_what_makes_no_sense_is_told_in_a_sentence(large: Supervisor, tmp_path: Path) -> None:
+def test_what_makes_no_sense_is_reported_in_a_sentence(large: Supervisor, tmp_path: Path) -> None:
     good = json.loads(Node(large, tmp_path).system.report())
     wrong = [
         "",

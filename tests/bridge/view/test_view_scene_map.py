@@ -19,7 +19,7 @@ line: {points: [[1.0, 2.0], [1.0, 2.5]]}
 """
 
 
-def test_walls_and_line_are_told_from_where_the_robot_began(tmp_path: Path) -> None:
+def test_walls_and_line_are_seen_from_where_the_robot_began(tmp_path: Path) -> None:
     file = tmp_path / "place.yaml"
     file.write_text(SCENE)
     # The wall is a metre ahead, and goes to the right.
@@ -29,21 +29,21 @@ def test_walls_and_line_are_told_from_where_the_robot_began(tmp_path: Path) -> N
 @pytest.mark.parametrize("name", ["maze-random", "line-curves"])
 def test_distances_are_those_of_the_simulator(name: str) -> None:
     scene = load_scene(name, 3)
-    told = scene_map(name, 3)
-    assert told is not None
-    json.dumps(told, allow_nan=False)
+    result = scene_map(name, 3)
+    assert result is not None
+    json.dumps(result, allow_nan=False)
     world = World(BODIES["burger"], scene.walls, Timebase(), scene.start)
-    nearest_m = min(math.dist((0, 0), (x1, y1)) for x1, y1, _, _ in told["walls"])
+    nearest_m = min(math.dist((0, 0), (x1, y1)) for x1, y1, _, _ in result["walls"])
     begin_x_m, begin_y_m, _ = scene.start
     assert nearest_m == pytest.approx(
         min(math.dist((begin_x_m, begin_y_m), segment[:2]) for segment in world.walls.segments), abs=1e-3
     )
 
 
-def test_without_a_scene_nothing_is_told() -> None:
+def test_without_a_scene_there_is_no_map() -> None:
     assert scene_map(None) is None
 
 
-def test_a_scene_that_is_not_there_is_told() -> None:
+def test_a_scene_that_is_not_there_is_reported() -> None:
     with pytest.raises(ViewError, match="the scene: there is no scene and no file 'nowhere'"):
         scene_map("nowhere")

@@ -109,10 +109,10 @@ def see_a_place(endpoint: ViewEndpoint, loop: HeldLoop) -> None:
 
     async def look() -> None:
         async with opened(endpoint.url) as page:
-            told = asyncio.create_task(page.told("update"))
-            while not told.done():
+            arrival = asyncio.create_task(page.told("update"))
+            while not arrival.done():
                 await asyncio.to_thread(loop.advance, server_module.BATCH_S)
-            await told
+            await arrival
 
     asyncio.run(look())
 

@@ -1,4 +1,4 @@
-"""Sources that are lost and come back, commands over gRPC, and what a page is told where little is known."""
+"""Sources that are lost and come back, commands over gRPC, and what a page receives where little is known."""
 
 import asyncio
 import json
@@ -17,7 +17,7 @@ from robosc_view.remote_bridge import robot_from
 from robosc_view.reports import EventBatch, Status
 from robosc_view.running import RunningBridge
 from robosc_view.sources import RefusedError
-from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
+from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed_meanwhile
 from support.pages_open import opened, token_of
 from support.view_servers import remotely_viewed, served
 
@@ -27,52 +27,47 @@ def robot() -> LiveRobot:
     return LiveRobot(supervisor_without_synthesis(large_model(6)))
 
 
-def test_a_bridge_that_ends_is_told_and_found_again(robot: LiveRobot, monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_a_bridge_that_ends_is_reported_and_found_again(
+    robot: LiveRobot, monkeypatch: pytest.MonkeyPatch
+) -> None:
     monkeypatch.setattr(hub_module, "FIRST_PAUSE_S", 0.1)
     monkeypatch.setattr(hub_module, "LONGEST_PAUSE_S", 0.3)
-
-    async def look() -> None:
-        endpoint = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
-        try:
-            async with remotely_viewed(endpoint.address) as server, opened(server.url) as page:
+    endpoint = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
+    try:
+        async with remotely_viewed(endpoint.address) as server, opened(server.url) as page:
+            await page.told("definition")
+            await page.told("update")
+            await asyncio.to_thread(endpoint.stop)
+            assert (await page.told("gone"))["why"]
+            await page.send(type="stop")
+            assert "bridge" in (await page.told("refused"))["why"]
+            # Who comes now learns it, too.
+            async with opened(server.url) as late:
+                assert (await late.next())["type"] == "gone"
+            again = serve(robot.operations, RemoteSettings(endpoint.address))
+            try:
                 await page.told("definition")
                 await page.told("update")
-                await asyncio.to_thread(endpoint.stop)
-                assert (await page.told("gone"))["why"]
-                await page.send(type="stop")
-                assert "bridge" in (await page.told("refused"))["why"]
-                # Who comes now is told so, too.
-                async with opened(server.url) as late:
-                    assert (await late.next())["type"] == "gone"
-                again = serve(robot.operations, RemoteSettings(endpoint.address))
-                try:
-                    await page.told("definition")
-                    await page.told("update")
-                    robot.step()
-                    await page.until(lambda message: message["type"] == "events" and message["entries"])
-                finally:
-                    await asyncio.to_thread(again.stop)
-        finally:
-            endpoint.stop()
-
-    asyncio.run(look())
+                robot.step()
+                await page.until(lambda message: message["type"] == "events" and message["entries"])
+            finally:
+                await asyncio.to_thread(again.stop)
+    finally:
+        endpoint.stop()
 
 
-def test_a_robot_that_is_there_again_is_not_told_as_lost() -> None:
-    async def look() -> None:
-        viewer = hub_module.Viewer()
-        # Who has not read for a while is told what is so now, and every answer.
-        viewer.answer("refused")
-        for _ in range(2 * hub_module.MAXIMUM_ANSWERS):
-            viewer.source_lost("gone")
-        viewer.define("definition")
-        viewer.show("update")
-        assert await viewer.take() == ["definition", "refused", "update"]
-        viewer.define("definition")
+async def test_a_robot_that_is_there_again_is_not_reported_as_lost() -> None:
+    viewer = hub_module.Viewer()
+    # Who has not read for a while receives what is so now, and every answer.
+    viewer.answer("refused")
+    for _ in range(2 * hub_module.MAXIMUM_ANSWERS):
         viewer.source_lost("gone")
-        assert await viewer.take() == ["definition", "gone"]
-
-    asyncio.run(look())
+    viewer.define("definition")
+    viewer.show("update")
+    assert await viewer.take() == ["definition", "refused", "update"]
+    viewer.define("definition")
+    viewer.source_lost("gone")
+    assert await viewer.take() == ["definition", "gone"]
 
 
 def test_a_bridge_elsewhere_is_commanded(robot: LiveRobot) -> None:
@@ -103,13 +98,13 @@ def test_a_bridge_elsewhere_is_commanded(robot: LiveRobot) -> None:
     ]
 
 
-def test_both_ways_to_a_bridge_define_and_tell_the_same(robot: LiveRobot) -> None:
-    told = convert.definition(robot.operations)
-    near, far = RunningBridge(robot.operations).robot, robot_from(told)
+def test_both_ways_to_a_bridge_define_and_report_the_same(robot: LiveRobot) -> None:
+    response = convert.definition(robot.operations)
+    near, far = RunningBridge(robot.operations).robot, robot_from(response)
     assert near == far
-    # As a bridge of before, which did not tell its supervisor.
-    told.supervisor = b""
-    without = robot_from(told)
+    # As a bridge of before, which did not send its supervisor.
+    response.supervisor = b""
+    without = robot_from(response)
     assert (without.shape, without.table, without.communications, without.requests) == (
         near.shape,
         near.table,
@@ -118,47 +113,39 @@ def test_both_ways_to_a_bridge_define_and_tell_the_same(robot: LiveRobot) -> Non
     )
     assert without.supervisor is None
     # As one of later, with another format.
-    told.supervisor = b'{"format":"robosc-supervisor","version":99}'
-    assert robot_from(told).supervisor is None
-    told.definition = "[" * 100_000
+    response.supervisor = b'{"format":"robosc-supervisor","version":99}'
+    assert robot_from(response).supervisor is None
+    response.definition = "[" * 100_000
     with pytest.raises(DefinitionError):
-        robot_from(told)
-    assert isinstance(told, pb.GetDefinitionResponse)
+        robot_from(response)
+    assert isinstance(response, pb.GetDefinitionResponse)
 
 
-def test_at_rest_there_is_a_sign_of_life_and_nothing_is_executed(
+async def test_at_rest_there_is_a_sign_of_life_and_nothing_is_executed(
     robot: LiveRobot, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(hub_module, "SIGN_OF_LIFE_S", 0.02)
     robot.state = State.STANDBY
     robot.show()
-
-    async def look(url: str) -> None:
-        async with opened(url) as page:
-            await page.told("definition")
-            first, second = await page.told("update"), await page.told("update")
-            assert second["number"] > first["number"]
-            assert second["age_s"] > first["age_s"]
-            assert (second["state"], second["components"], second["enabled"]) == ("standby", {}, [])
-            assert {tuple(item["why"]) for item in second["disabled"]} == {(NOT_EXECUTED,)}
-
-    with viewed(robot) as endpoint:
-        asyncio.run(look(endpoint.url))
+    async with viewed_meanwhile(robot) as endpoint, opened(endpoint.url) as page:
+        await page.told("definition")
+        first, second = await page.told("update"), await page.told("update")
+        assert second["number"] > first["number"]
+        assert second["age_s"] > first["age_s"]
+        assert (second["state"], second["components"], second["enabled"]) == ("standby", {}, [])
+        assert {tuple(item["why"]) for item in second["disabled"]} == {(NOT_EXECUTED,)}
 
 
-def test_the_feed_is_asked_only_while_somebody_looks(robot: LiveRobot) -> None:
-    async def look() -> None:
-        async with served(lambda: RunningBridge(robot.operations)) as server:
-            assert not robot.feed.is_watched
-            async with opened(server.url) as page:
-                await page.told("update")
-                assert robot.feed.is_watched
-            while robot.feed.is_watched:
-                await asyncio.sleep(0.002)
-            async with opened(server.url) as page:
-                await page.told("update")
-
-    asyncio.run(asyncio.wait_for(look(), 30))
+async def test_the_feed_is_asked_only_while_somebody_looks(robot: LiveRobot) -> None:
+    async with served(lambda: RunningBridge(robot.operations)) as server:
+        assert not robot.feed.is_watched
+        async with opened(server.url) as page:
+            await page.told("update")
+            assert robot.feed.is_watched
+        while robot.feed.is_watched:
+            await asyncio.sleep(0.002)
+        async with opened(server.url) as page:
+            await page.told("update")
 
 
 def update(builder: MessageBuilder, status: Status) -> Any:
@@ -169,16 +156,16 @@ def test_what_is_not_known_is_neither_enabled_nor_not(robot: LiveRobot) -> None:
     defined = RunningBridge(robot.operations).robot
     builder = MessageBuilder(PreparedRobot(defined))
     system = InterpretedSystem(robot.supervisor)
-    told = update(builder, Status(1.0, components=system.state()))
-    named = {*told["enabled"], *(item["event"] for item in told["disabled"])}
+    message = update(builder, Status(1.0, components=system.state()))
+    named = {*message["enabled"], *(item["event"] for item in message["disabled"])}
     assert set(defined.requests) - named == {"hold2.request", "hold5.request"}
     wrong = {**system.state(), "Motor1": {"state": "flying", "variables": {}}}
-    told = update(builder, Status(1.0, components=wrong))
-    assert (told["enabled"], told["disabled"]) == ([], [])
-    assert "flying" in told["warnings"][0]["text"]
-    told = update(builder, Status(1.0, components=wrong, enabled=["go1"]))
-    assert told["enabled"] == ["go1.request"]
-    assert {tuple(item["why"]) for item in told["disabled"]} == {(NOT_KNOWN,)}
+    message = update(builder, Status(1.0, components=wrong))
+    assert (message["enabled"], message["disabled"]) == ([], [])
+    assert "flying" in message["warnings"][0]["text"]
+    message = update(builder, Status(1.0, components=wrong, enabled=["go1"]))
+    assert message["enabled"] == ["go1.request"]
+    assert {tuple(item["why"]) for item in message["disabled"]} == {(NOT_KNOWN,)}
 
 
 def test_after_a_gap_only_what_is_sure_is_lit(robot: LiveRobot) -> None:

@@ -116,89 +116,71 @@ async def press(page: OpenPage, count: int) -> None:
     await page.until(lambda message: message["type"] == "refused" and message["what"] == "request")
 
 
-def test_who_comes_and_goes_and_hammers_on_the_button_starts_few_threads(robot: LiveRobot, address: str) -> None:
-    async def look() -> None:
-        async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server:
-            for _ in range(12):
-                async with opened(server.url) as page:
-                    await press(page, 40)
-                assert asking() <= MOST_THREADS
-            assert robot.orders == []
-            # Of all those who have left at least one is heard, and who stays has an answer.
+async def test_who_comes_and_goes_and_hammers_on_the_button_starts_few_threads(robot: LiveRobot, address: str) -> None:
+    async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server:
+        for _ in range(12):
             async with opened(server.url) as page:
-                await press(page, 3)
-                gate.is_open.set()
-                await until_stopped(robot, 1)
-                assert (await page.told("done"))["what"] == "stop"
-            assert {order.command for order in robot.orders} == {OperatorCommand.STOP}
+                await press(page, 40)
+            assert asking() <= MOST_THREADS
+        assert robot.orders == []
+        # Of all those who have left at least one is heard, and who stays has an answer.
+        async with opened(server.url) as page:
+            await press(page, 3)
+            gate.is_open.set()
+            await until_stopped(robot, 1)
+            assert (await page.told("done"))["what"] == "stop"
+        assert {order.command for order in robot.orders} == {OperatorCommand.STOP}
 
-    asyncio.run(look())
 
-
-def test_a_stop_that_is_wanted_while_one_is_under_way_follows_it(
+async def test_a_stop_that_is_wanted_while_one_is_under_way_follows_it(
     robot: LiveRobot, address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(remote_bridge, "FOLLOW_S", LIMIT_S)
-
-    async def look() -> None:
-        async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server:
-            async with opened(server.url) as page:
-                await press(page, 1)
-                async with opened(server.url) as other:
-                    await press(other, 1)
-                await press(page, 30)
-                gate.is_open.set()
-                await until_stopped(robot, 2)
-                for _ in range(31):
-                    assert (await page.told("done"))["what"] == "stop"
-            # One for the first, and one for all who came after it, also for who has left.
-            assert [order.command for order in robot.orders] == [OperatorCommand.STOP] * 2
-            async with opened(server.url) as page:
-                await page.send(type="stop")
-                await until_stopped(robot, 3)
-
-    asyncio.run(look())
+    async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server:
+        async with opened(server.url) as page:
+            await press(page, 1)
+            async with opened(server.url) as other:
+                await press(other, 1)
+            await press(page, 30)
+            gate.is_open.set()
+            await until_stopped(robot, 2)
+            for _ in range(31):
+                assert (await page.told("done"))["what"] == "stop"
+        # One for the first, and one for all who came after it, also for who has left.
+        assert [order.command for order in robot.orders] == [OperatorCommand.STOP] * 2
+        async with opened(server.url) as page:
+            await page.send(type="stop")
+            await until_stopped(robot, 3)
 
 
-def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(
+async def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(
     robot: LiveRobot, address: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert remote_bridge.FOLLOW_S <= 0.5
     monkeypatch.setattr(remote_bridge, "FOLLOW_S", 0.01)
     # Whatever ends one, it is not its time.
     monkeypatch.setattr(client, "STOP_LIMIT_S", 10 * LIMIT_S)
-
-    async def look() -> None:
-        async with (
-            Gate(address).standing() as gate,
-            remotely_viewed(gate.address) as server,
-            opened(server.url) as page,
-        ):
-            # What the robot is, and a stop; then one after the other, each on a way of its own.
-            for count in range(2, 5):
-                await press(page, 1)
-                async with asyncio.timeout(LIMIT_S):
-                    while gate.connections < count:
-                        await asyncio.sleep(0.005)
+    async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server, opened(server.url) as page:
+        # What the robot is, and a stop; then one after the other, each on a way of its own.
+        for count in range(2, 5):
             await press(page, 1)
-            assert not any(message.get("what") == "stop" for message in page.messages)
-            assert robot.orders == []
-            # In the end who wanted it is told that nobody has heard it.
-            gate.fall()
-            assert (await page.told("refused"))["what"] == "stop"
+            async with asyncio.timeout(LIMIT_S):
+                while gate.connections < count:
+                    await asyncio.sleep(0.005)
+        await press(page, 1)
+        assert not any(message.get("what") == "stop" for message in page.messages)
+        assert robot.orders == []
+        # In the end who wanted it learns that nobody has heard it.
+        gate.fall()
+        assert (await page.told("refused"))["what"] == "stop"
 
-    asyncio.run(look())
 
-
-def test_who_comes_and_goes_asks_a_bridge_once_what_it_is(robot: LiveRobot, address: str) -> None:
-    async def look() -> None:
-        async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server:
-            for _ in range(30):
-                async with opened(server.url):
-                    pass
-            assert asking() <= 1
-            async with opened(server.url) as page:
-                gate.is_open.set()
-                await page.told("definition")
-
-    asyncio.run(look())
+async def test_who_comes_and_goes_asks_a_bridge_once_what_it_is(robot: LiveRobot, address: str) -> None:
+    async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server:
+        for _ in range(30):
+            async with opened(server.url):
+                pass
+        assert asking() <= 1
+        async with opened(server.url) as page:
+            gate.is_open.set()
+            await page.told("definition")

@@ -33,177 +33,146 @@ class Clock:
         return self.now_s
 
 
-def test_a_task_is_done_and_its_place_is_free_again() -> None:
-    async def test() -> None:
-        scheduler = Scheduler(ScriptedWorkers(1), QueueLimits())
-        for _ in range(3):
-            outcome = await scheduler.run(task_of("a"), "me", TaskLimits(), drop)
-            assert isinstance(outcome, Result)
-        assert (scheduler.waiting, scheduler.running) == (0, 0)
-
-    run(test)
+async def test_a_task_is_done_and_its_place_is_free_again() -> None:
+    scheduler = Scheduler(ScriptedWorkers(1), QueueLimits())
+    for _ in range(3):
+        outcome = await scheduler.run(task_of("a"), "me", TaskLimits(), drop)
+        assert isinstance(outcome, Result)
+    assert (scheduler.waiting, scheduler.running) == (0, 0)
 
 
-def test_what_is_known_when_the_turn_comes_is_not_done() -> None:
-    async def test() -> None:
-        workers = ScriptedWorkers(1)
-        scheduler = Scheduler(workers, QueueLimits())
-        known = Result((b"known",))
-        assert await scheduler.run(task_of("a"), "me", TaskLimits(), drop, lambda: known) is known
-        assert workers.begun == []
-        assert (scheduler.waiting, scheduler.running) == (0, 0)
-
-    run(test)
+async def test_what_is_known_when_the_turn_comes_is_not_done() -> None:
+    workers = ScriptedWorkers(1)
+    scheduler = Scheduler(workers, QueueLimits())
+    known = Result((b"known",))
+    assert await scheduler.run(task_of("a"), "me", TaskLimits(), drop, lambda: known) is known
+    assert workers.begun == []
+    assert (scheduler.waiting, scheduler.running) == (0, 0)
 
 
-def test_who_has_no_task_running_need_not_wait_for_who_has_all_workers() -> None:
-    async def test() -> None:
-        scheduler = Scheduler(ScriptedWorkers(2), QueueLimits(waiting=3, reserved=1))
-        greedy = [scheduler.enter("greedy") for _ in range(5)]
-        assert [place.has_worker for place in greedy] == [True, True, False, False, False]
-        # The line is full, too.
-        first, second = scheduler.enter("modest"), None
-        assert first.has_worker
-        with pytest.raises(RefusedError):
-            second = scheduler.enter("modest")
-        assert (scheduler.running, second) == (3, None)
-        # One of three has ended: as many go on as there are workers.
-        scheduler.leave(greedy[0])
-        assert not greedy[2].has_worker
-        scheduler.leave(greedy[1])
-        assert greedy[2].has_worker
-        scheduler.leave(first)
-        assert (greedy[3].has_worker, greedy[4].has_worker) == (True, False)
-
-    run(test)
+async def test_who_has_no_task_running_need_not_wait_for_who_has_all_workers() -> None:
+    scheduler = Scheduler(ScriptedWorkers(2), QueueLimits(waiting=3, reserved=1))
+    greedy = [scheduler.enter("greedy") for _ in range(5)]
+    assert [place.has_worker for place in greedy] == [True, True, False, False, False]
+    # The line is full, too.
+    first, second = scheduler.enter("modest"), None
+    assert first.has_worker
+    with pytest.raises(RefusedError):
+        second = scheduler.enter("modest")
+    assert (scheduler.running, second) == (3, None)
+    # One of three has ended: as many go on as there are workers.
+    scheduler.leave(greedy[0])
+    assert not greedy[2].has_worker
+    scheduler.leave(greedy[1])
+    assert greedy[2].has_worker
+    scheduler.leave(first)
+    assert (greedy[3].has_worker, greedy[4].has_worker) == (True, False)
 
 
-def test_cancelling_frees_the_place_waiting_or_running(tmp_path: object) -> None:
-    async def test() -> None:
-        workers = ScriptedWorkers(1)
-        scheduler = Scheduler(workers, QueueLimits())
-        calls = [
-            asyncio.create_task(scheduler.run(task_of(f"until {tmp_path}/never\n{number}"), "me", TaskLimits(), drop))
-            for number in range(3)
-        ]
-        await asyncio.sleep(0)
-        assert (scheduler.waiting, scheduler.running) == (2, 1)
-        calls[1].cancel()
-        await asyncio.gather(calls[1], return_exceptions=True)
-        assert (scheduler.waiting, scheduler.running) == (1, 1)
-        calls[0].cancel()
-        await asyncio.gather(calls[0], return_exceptions=True)
-        await asyncio.sleep(0)
-        assert (scheduler.waiting, scheduler.running) == (0, 1)
-        assert workers.begun[-1].endswith("2")
-        calls[2].cancel()
-        await asyncio.gather(calls[2], return_exceptions=True)
-        assert (scheduler.waiting, scheduler.running) == (0, 0)
-
-    run(test)
+async def test_cancelling_frees_the_place_waiting_or_running(tmp_path: object) -> None:
+    workers = ScriptedWorkers(1)
+    scheduler = Scheduler(workers, QueueLimits())
+    calls = [
+        asyncio.create_task(scheduler.run(task_of(f"until {tmp_path}/never\n{number}"), "me", TaskLimits(), drop))
+        for number in range(3)
+    ]
+    await asyncio.sleep(0)
+    assert (scheduler.waiting, scheduler.running) == (2, 1)
+    calls[1].cancel()
+    await asyncio.gather(calls[1], return_exceptions=True)
+    assert (scheduler.waiting, scheduler.running) == (1, 1)
+    calls[0].cancel()
+    await asyncio.gather(calls[0], return_exceptions=True)
+    await asyncio.sleep(0)
+    assert (scheduler.waiting, scheduler.running) == (0, 1)
+    assert workers.begun[-1].endswith("2")
+    calls[2].cancel()
+    await asyncio.gather(calls[2], return_exceptions=True)
+    assert (scheduler.waiting, scheduler.running) == (0, 0)
 
 
-def test_bounds_hold_and_tell_when_to_come_back() -> None:
-    async def test() -> None:
-        clock = Clock()
-        scheduler = Scheduler(ScriptedWorkers(1), QueueLimits(waiting=5, waiting_per_caller=3), clock)
-        first = scheduler.enter("greedy")
-        places = [scheduler.enter("greedy") for _ in range(3)]
-        with pytest.raises(RefusedError) as refused:
-            scheduler.enter("greedy")
-        assert refused.value.reason is Reason.SERVER_BUSY
-        assert refused.value.retry_after_s == pytest.approx(3.0)
-        others = [scheduler.enter(f"other {number}") for number in range(2)]
-        with pytest.raises(RefusedError) as refused:
-            scheduler.enter("late")
-        assert refused.value.reason is Reason.SERVER_BUSY
-        # What was accepted before is not bounded.
-        adopted = scheduler.enter_unbounded("greedy")
-        clock.now_s = 4.0
-        scheduler.leave(first)
-        # Tasks take four seconds, then: five wait, one is done at a time.
-        with pytest.raises(RefusedError) as refused:
-            scheduler.enter("late")
-        assert refused.value.retry_after_s == pytest.approx(20.0)
-        for place in (*places, *others, adopted):
-            scheduler.leave(place)
-        assert (scheduler.waiting, scheduler.running) == (0, 0)
-
-    run(test)
+async def test_bounds_hold_and_say_when_to_come_back() -> None:
+    clock = Clock()
+    scheduler = Scheduler(ScriptedWorkers(1), QueueLimits(waiting=5, waiting_per_caller=3), clock)
+    first = scheduler.enter("greedy")
+    places = [scheduler.enter("greedy") for _ in range(3)]
+    with pytest.raises(RefusedError) as refused:
+        scheduler.enter("greedy")
+    assert refused.value.reason is Reason.SERVER_BUSY
+    assert refused.value.retry_after_s == pytest.approx(3.0)
+    others = [scheduler.enter(f"other {number}") for number in range(2)]
+    with pytest.raises(RefusedError) as refused:
+        scheduler.enter("late")
+    assert refused.value.reason is Reason.SERVER_BUSY
+    # What was accepted before is not bounded.
+    adopted = scheduler.enter_unbounded("greedy")
+    clock.now_s = 4.0
+    scheduler.leave(first)
+    # Tasks take four seconds, then: five wait, one is done at a time.
+    with pytest.raises(RefusedError) as refused:
+        scheduler.enter("late")
+    assert refused.value.retry_after_s == pytest.approx(20.0)
+    for place in (*places, *others, adopted):
+        scheduler.leave(place)
+    assert (scheduler.waiting, scheduler.running) == (0, 0)
 
 
-def test_all_addresses_of_one_network_stand_in_one_line() -> None:
-    async def test() -> None:
-        scheduler = Scheduler(ScriptedWorkers(1), QueueLimits(100, 2))
-        taken = scheduler.enter("2001:db8::1")
-        waiting = [scheduler.enter(f"2001:db8::{number}") for number in (2, 3)]
-        with pytest.raises(RefusedError, match="of this caller"):
-            scheduler.enter("2001:db8::4")
-        others = [scheduler.enter(name) for name in ("2001:db8:0:1::1", "192.0.2.1", "192.0.2.2", "robot")]
-        # One after the other: whoever has had a turn goes to the end.
-        assert [scheduler.tasks_ahead(place) for place in (waiting[0], *others, waiting[1])] == list(range(6))
-        for place in (taken, *waiting, *others):
-            scheduler.leave(place)
-        assert (scheduler.running, scheduler.waiting) == (0, 0)
-
-    run(test)
+async def test_all_addresses_of_one_network_stand_in_one_line() -> None:
+    scheduler = Scheduler(ScriptedWorkers(1), QueueLimits(100, 2))
+    taken = scheduler.enter("2001:db8::1")
+    waiting = [scheduler.enter(f"2001:db8::{number}") for number in (2, 3)]
+    with pytest.raises(RefusedError, match="of this caller"):
+        scheduler.enter("2001:db8::4")
+    others = [scheduler.enter(name) for name in ("2001:db8:0:1::1", "192.0.2.1", "192.0.2.2", "robot")]
+    # One after the other: whoever has had a turn goes to the end.
+    assert [scheduler.tasks_ahead(place) for place in (waiting[0], *others, waiting[1])] == list(range(6))
+    for place in (taken, *waiting, *others):
+        scheduler.leave(place)
+    assert (scheduler.running, scheduler.waiting) == (0, 0)
 
 
-def test_more_workers_are_noticed_while_tasks_wait(monkeypatch: pytest.MonkeyPatch) -> None:
+async def test_more_workers_are_noticed_while_tasks_wait(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robosc_server.jobs.scheduler._POLL_S", 0.01)
-
-    async def test() -> None:
-        workers = ScriptedWorkers(0)
-        scheduler = Scheduler(workers, QueueLimits())
-        with pytest.raises(RefusedError) as refused:
-            await scheduler.run(task_of("a"), "me", TaskLimits(), drop)
-        assert refused.value.reason is Reason.WORKERS_UNAVAILABLE
-        place = scheduler.enter("me")
-        assert not place.has_worker
-        workers.capacity = 1
-        async with asyncio.timeout(30):
-            await place.wait_for_worker()
-        assert place.has_worker
-
-    run(test)
+    workers = ScriptedWorkers(0)
+    scheduler = Scheduler(workers, QueueLimits())
+    with pytest.raises(RefusedError) as refused:
+        await scheduler.run(task_of("a"), "me", TaskLimits(), drop)
+    assert refused.value.reason is Reason.WORKERS_UNAVAILABLE
+    place = scheduler.enter("me")
+    assert not place.has_worker
+    workers.capacity = 1
+    async with asyncio.timeout(30):
+        await place.wait_for_worker()
+    assert place.has_worker
 
 
-def test_workers_that_are_away_are_told_as_such() -> None:
-    async def test() -> None:
-        workers = ScriptedWorkers(1)
-        workers.is_away = True
-        scheduler = Scheduler(workers, QueueLimits())
-        with pytest.raises(RefusedError) as refused:
-            await scheduler.run(task_of("a"), "me", TaskLimits(), drop)
-        assert refused.value.reason is Reason.WORKERS_UNAVAILABLE
-        assert scheduler.running == 0
-
-    run(test)
+async def test_workers_that_are_away_are_reported_as_such() -> None:
+    workers = ScriptedWorkers(1)
+    workers.is_away = True
+    scheduler = Scheduler(workers, QueueLimits())
+    with pytest.raises(RefusedError) as refused:
+        await scheduler.run(task_of("a"), "me", TaskLimits(), drop)
+    assert refused.value.reason is Reason.WORKERS_UNAVAILABLE
+    assert scheduler.running == 0
 
 
-def test_a_call_that_loses_its_worker_is_not_told_to_come_again() -> None:
-    async def test() -> None:
-        scheduler = Scheduler(ScriptedWorkers(1), QueueLimits())
-        outcome = await scheduler.run(task_of("lose"), "me", TaskLimits(), drop)
-        assert isinstance(outcome, Failure)
-        assert outcome.reason is Reason.WORKER_DIED
-        assert scheduler.running == 0
-
-    run(test)
+async def test_a_call_that_loses_its_worker_is_not_asked_to_come_again() -> None:
+    scheduler = Scheduler(ScriptedWorkers(1), QueueLimits())
+    outcome = await scheduler.run(task_of("lose"), "me", TaskLimits(), drop)
+    assert isinstance(outcome, Failure)
+    assert outcome.reason is Reason.WORKER_DIED
+    assert scheduler.running == 0
 
 
-def test_a_closed_line_takes_nothing_more() -> None:
-    async def test() -> None:
-        scheduler = Scheduler(ScriptedWorkers(1), QueueLimits())
+async def test_a_closed_line_takes_nothing_more() -> None:
+    scheduler = Scheduler(ScriptedWorkers(1), QueueLimits())
+    scheduler.enter("me")
+    waiting = scheduler.enter("me")
+    scheduler.close()
+    with pytest.raises(RefusedError) as refused:
         scheduler.enter("me")
-        waiting = scheduler.enter("me")
-        scheduler.close()
-        with pytest.raises(RefusedError) as refused:
-            scheduler.enter("me")
-        assert refused.value.reason is Reason.SHUTTING_DOWN
-        assert scheduler.tasks_ahead(waiting) == 0
-
-    run(test)
+    assert refused.value.reason is Reason.SHUTTING_DOWN
+    assert scheduler.tasks_ahead(waiting) == 0
 
 
 class Twin:

@@ -15,7 +15,7 @@ from sqlalchemy import Connection, text
 from robosc_server.store import Store, StoreError, StoreUnavailableError, open_store
 from robosc_server.store.records import blocks_of, messages_of
 from support.held_store import held_store
-from support.held_time import HeldLoop, on_held_time
+from support.held_time import HeldLoop
 from support.job_parts import in_loop
 from support.waiting import PATIENCE_S
 
@@ -29,8 +29,8 @@ def test_messages_are_found_again_in_their_blocks(messages: list[bytes]) -> None
 
 def test_a_folder_is_for_one_server_and_free_after_a_kill(tmp_path: Path) -> None:
     folder = tmp_path / "deep" / "state"
-    with held_store(folder) as told:
-        assert told == "open"
+    with held_store(folder) as outcome:
+        assert outcome == "open"
         with pytest.raises(StoreError, match="in use by another robosc-server"):
             open_store(folder)
     store = open_store(folder)
@@ -80,13 +80,15 @@ def test_other_urls_are_refused_without_their_passwords(tmp_path: Path, url: str
     assert "\n" not in str(refused.value)
 
 
-def test_a_folder_that_cannot_be_made_is_told(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_made_is_reported(tmp_path: Path) -> None:
     (tmp_path / "file").touch()
     with pytest.raises(StoreError, match="cannot be used"):
         open_store(tmp_path / "file" / "state")
 
 
-def test_a_transaction_that_takes_too_long_is_cut_off_and_the_next_one_is_served(tmp_path: Path) -> None:
+async def test_a_transaction_that_takes_too_long_is_cut_off_and_the_next_one_is_served(
+    tmp_path: Path, loop: HeldLoop
+) -> None:
     store = open_store(tmp_path)
     endless = "WITH RECURSIVE n(i) AS (SELECT 1 UNION ALL SELECT i + 1 FROM n) SELECT count(*) FROM n"
     begun, ended = threading.Event(), threading.Event()
@@ -98,23 +100,20 @@ def test_a_transaction_that_takes_too_long_is_cut_off_and_the_next_one_is_served
         finally:
             ended.set()
 
-    async def test(loop: HeldLoop) -> None:
-        for _ in range(5):  # More than there are threads.
-            reading = asyncio.create_task(store._database.read(work))
-            assert await asyncio.to_thread(begun.wait, PATIENCE_S)
-            await loop.passed(7.0)
-            assert not reading.done()
-            await loop.passed(1.0)
-            with pytest.raises(StoreUnavailableError):
-                await reading
-            assert await asyncio.to_thread(ended.wait, PATIENCE_S)
-            begun.clear()
-            ended.clear()
-        assert not store.is_available
-        assert await store.find("x") is None
-        assert store.is_available
-
-    on_held_time(test)
+    for _ in range(5):  # More than there are threads.
+        reading = asyncio.create_task(store._database.read(work))
+        assert await asyncio.to_thread(begun.wait, PATIENCE_S)
+        await loop.passed(7.0)
+        assert not reading.done()
+        await loop.passed(1.0)
+        with pytest.raises(StoreUnavailableError):
+            await reading
+        assert await asyncio.to_thread(ended.wait, PATIENCE_S)
+        begun.clear()
+        ended.clear()
+    assert not store.is_available
+    assert await store.find("x") is None
+    assert store.is_available
     store.close()
 
 

@@ -1,4 +1,4 @@
-"""Watchers of jobs are told each state at once, and progress no more often than all of them together can be told."""
+"""Watchers of jobs receive each state at once, and progress no more often than all of them together can read it."""
 
 from contextlib import ExitStack
 from dataclasses import replace
@@ -7,7 +7,7 @@ from typing import Any
 from robosc_server.jobs.watchers import PROGRESS_PER_SECOND, JobWatch, Watchers
 from robosc_server.store import JobRecord, JobState
 from robosc_server.tasks.task import TaskKind
-from support.held_time import HeldLoop, on_held_time
+from support.held_time import HeldLoop
 
 JOB = "a" * 32
 MANY = 1000
@@ -18,7 +18,7 @@ def state(revision: int, state: JobState = JobState.RUNNING) -> JobRecord:
     return replace(QUEUED, state=state, revision=revision)
 
 
-async def told(watch: JobWatch) -> int:
+async def received(watch: JobWatch) -> int:
     record = await watch.next_record()
     assert record is not None
     return record.revision
@@ -32,65 +32,53 @@ def has_news(watch: JobWatch) -> bool:
     return watch._has_news.is_set()
 
 
-def test_many_get_a_new_state_at_once_and_the_newest_progress_later() -> None:
-    async def test(loop: HeldLoop) -> None:
-        watchers = Watchers()
-        with ExitStack() as stack:
-            watches = [stack.enter_context(watchers.watch(JOB)) for _ in range(MANY)]
-            watchers.notify(state(2))
-            assert {await told(watch) for watch in watches} == {2}
-            for revision in range(3, 20):
-                watchers.notify(state(revision))
-                await loop.passed(0.1)
-            assert not any(map(has_news, watches))
-            await loop.passed(MANY / PROGRESS_PER_SECOND - 1.7)
-            assert {await told(watch) for watch in watches} == {19}
-            # The end replaces progress that is held.
-            watchers.notify(state(20))
-            watchers.notify(state(21, JobState.SUCCEEDED))
-            assert {await told(watch) for watch in watches} == {21}
-            await loop.passed(60.0)
-            assert not any(map(has_news, watches))
-
-    on_held_time(test)
+async def test_many_get_a_new_state_at_once_and_the_newest_progress_later(loop: HeldLoop) -> None:
+    watchers = Watchers()
+    with ExitStack() as stack:
+        watches = [stack.enter_context(watchers.watch(JOB)) for _ in range(MANY)]
+        watchers.notify(state(2))
+        assert {await received(watch) for watch in watches} == {2}
+        for revision in range(3, 20):
+            watchers.notify(state(revision))
+            await loop.passed(0.1)
+        assert not any(map(has_news, watches))
+        await loop.passed(MANY / PROGRESS_PER_SECOND - 1.7)
+        assert {await received(watch) for watch in watches} == {19}
+        # The end replaces progress that is held.
+        watchers.notify(state(20))
+        watchers.notify(state(21, JobState.SUCCEEDED))
+        assert {await received(watch) for watch in watches} == {21}
+        await loop.passed(60.0)
+        assert not any(map(has_news, watches))
 
 
-def test_a_record_that_is_late_replaces_none_that_is_newer() -> None:
-    async def test(loop: HeldLoop) -> None:
-        watchers = Watchers()
-        with ExitStack() as stack:
-            watches = [stack.enter_context(watchers.watch(JOB)) for _ in range(MANY)]
-            watchers.notify(state(2))
-            assert {await told(watch) for watch in watches} == {2}
-            watchers.notify(state(9))
-            watchers.notify(state(8))
-            await loop.passed(60.0)
-            assert {await told(watch) for watch in watches} == {9}
-
-    on_held_time(test)
+async def test_a_record_that_is_late_replaces_none_that_is_newer(loop: HeldLoop) -> None:
+    watchers = Watchers()
+    with ExitStack() as stack:
+        watches = [stack.enter_context(watchers.watch(JOB)) for _ in range(MANY)]
+        watchers.notify(state(2))
+        assert {await received(watch) for watch in watches} == {2}
+        watchers.notify(state(9))
+        watchers.notify(state(8))
+        await loop.passed(60.0)
+        assert {await received(watch) for watch in watches} == {9}
 
 
-def test_few_get_all_progress() -> None:
-    async def test(loop: HeldLoop) -> None:
-        watchers = Watchers()
-        with watchers.watch(JOB) as one, watchers.watch(JOB) as other:
-            for revision in range(2, 50):
-                watchers.notify(state(revision))
-                assert (await told(one), await told(other)) == (revision, revision)
-
-    on_held_time(test)
+async def test_few_get_all_progress(loop: HeldLoop) -> None:
+    watchers = Watchers()
+    with watchers.watch(JOB) as one, watchers.watch(JOB) as other:
+        for revision in range(2, 50):
+            watchers.notify(state(revision))
+            assert (await received(one), await received(other)) == (revision, revision)
 
 
-def test_no_timer_outlives_the_last_watcher() -> None:
-    async def test(loop: HeldLoop) -> None:
-        watchers = Watchers()
-        with ExitStack() as stack:
-            for _ in range(MANY):
-                stack.enter_context(watchers.watch(JOB))
-            watchers.notify(state(2))
-            watchers.notify(state(3))
-            assert len(timers(loop)) == 1
-        assert not timers(loop)
-        assert watchers.revisions() == {}
-
-    on_held_time(test)
+async def test_no_timer_outlives_the_last_watcher(loop: HeldLoop) -> None:
+    watchers = Watchers()
+    with ExitStack() as stack:
+        for _ in range(MANY):
+            stack.enter_context(watchers.watch(JOB))
+        watchers.notify(state(2))
+        watchers.notify(state(3))
+        assert len(timers(loop)) == 1
+    assert not timers(loop)
+    assert watchers.revisions() == {}

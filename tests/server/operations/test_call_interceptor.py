@@ -64,7 +64,7 @@ def test_an_odd_request_id_is_not(given: list[str]) -> None:
     assert len(made) == 16
 
 
-def test_a_refusal_is_told_with_its_reason_and_when_to_come_again() -> None:
+def test_a_refusal_is_reported_with_its_reason_and_when_to_come_again() -> None:
     metrics = Metrics("1")
     with logged() as log:
         ended = outcome(b"busy", metrics)
@@ -76,7 +76,7 @@ def test_a_refusal_is_told_with_its_reason_and_when_to_come_again() -> None:
     assert counted(metrics, f'robosc_server_calls_total{{code="RESOURCE_EXHAUSTED",method="/{SERVICE}/Unary"}} 1.0')
 
 
-def test_a_fault_is_told_by_its_id_alone() -> None:
+def test_a_fault_is_reported_by_its_id_alone() -> None:
     with logged(LogLevel.INFO) as log:
         ended = outcome(b"fault")
     assert (ended.code, ended.reason) == (grpc.StatusCode.INTERNAL, "INTERNAL_FAULT")
@@ -104,7 +104,7 @@ def test_what_handlers_say_themselves_stays() -> None:
 
 
 def test_a_deadline_that_passes() -> None:
-    """Only the server has a timer: it is told a deadline that its caller has not set.
+    """Only the server has a timer: it is given a deadline that its caller has not set.
 
     One that passes before the call has reached the handler says nothing: a longer one is given then.
     """
@@ -178,20 +178,16 @@ def test_a_call_that_is_cancelled_where_its_deadline_passes_has_reached_it(
     assert [line["code"] for line in log.lines("call")] == [code]
 
 
-def test_a_caller_that_goes_away_is_counted_and_no_longer_under_way() -> None:
+async def test_a_caller_that_goes_away_is_counted_and_no_longer_under_way() -> None:
     metrics = Metrics("1")
-
-    async def run() -> None:
-        calls = CallInterceptor(metrics)
-        async with small_server(interceptors=[calls], unary=answer) as (channel, _):
-            method: Any = channel.unary_unary(f"/{SERVICE}/Unary")
-            made = method(b"stuck")
-            await until(lambda: calls.under_way() == 1)
-            assert counted(metrics, "robosc_server_calls_under_way 1.0")
-            made.cancel()
-            await until(lambda: not calls.under_way())
-
-    limited(run())
+    calls = CallInterceptor(metrics)
+    async with small_server(interceptors=[calls], unary=answer) as (channel, _):
+        method: Any = channel.unary_unary(f"/{SERVICE}/Unary")
+        made = method(b"stuck")
+        await until(lambda: calls.under_way() == 1)
+        assert counted(metrics, "robosc_server_calls_under_way 1.0")
+        made.cancel()
+        await until(lambda: not calls.under_way())
     assert counted(metrics, f'robosc_server_calls_total{{code="CANCELLED",method="/{SERVICE}/Unary"}} 1.0')
 
 
@@ -229,16 +225,12 @@ def test_streams_of_either_kind_and_a_generator_is_closed_with_its_call() -> Non
         limited(run(handler))
 
 
-def test_methods_that_there_are_not_are_counted_without_their_names() -> None:
+async def test_methods_that_there_are_not_are_counted_without_their_names() -> None:
     metrics = Metrics("1")
-
-    async def run() -> None:
-        async with small_server(interceptors=[CallInterceptor(metrics)], unary=answer) as (channel, _):
-            made: Any = channel.unary_unary(f"/{MARKER}/Unary")
-            with pytest.raises(grpc.aio.AioRpcError):
-                await made(b"")
-
-    asyncio.run(run())
+    async with small_server(interceptors=[CallInterceptor(metrics)], unary=answer) as (channel, _):
+        made: Any = channel.unary_unary(f"/{MARKER}/Unary")
+        with pytest.raises(grpc.aio.AioRpcError):
+            await made(b"")
     assert counted(metrics, 'robosc_server_calls_total{code="UNIMPLEMENTED",method="unknown"} 1.0')
     assert MARKER not in metrics.text().decode()
 
@@ -270,7 +262,7 @@ def test_what_a_guard_refuses_is_logged_with_a_reason_and_whom_it_lets_in_by_nam
     assert token not in log.text
 
 
-def test_a_call_is_a_span_that_continues_its_callers_trace_and_holds_no_message() -> None:
+async def test_a_call_is_a_span_that_continues_its_callers_trace_and_holds_no_message() -> None:
     exporter, provider = InMemorySpanExporter(), TracerProvider()
     provider.add_span_processor(SimpleSpanProcessor(exporter))
     tracing = OtlpTracing(provider)
@@ -280,13 +272,10 @@ def test_a_call_is_a_span_that_continues_its_callers_trace_and_holds_no_message(
         with tracing.span("worker run", {"task.kind": "check"}):
             return await answer(request, context)
 
-    async def run() -> None:
-        calls = CallInterceptor(Metrics("1"), tracing)
-        async with small_server(interceptors=[calls], unary=inside) as (channel, _):
-            await call(channel, metadata=[("traceparent", f"00-{trace}-{parent}-01")])
-            await call(channel, b"fault", metadata=[("x-request-id", "mine")])
-
-    asyncio.run(run())
+    calls = CallInterceptor(Metrics("1"), tracing)
+    async with small_server(interceptors=[calls], unary=inside) as (channel, _):
+        await call(channel, metadata=[("traceparent", f"00-{trace}-{parent}-01")])
+        await call(channel, b"fault", metadata=[("x-request-id", "mine")])
     tracing.close()
     run_span, call_span, failed_run, failed_call = exporter.get_finished_spans()
     assert (call_span.name, run_span.name) == (f"{SERVICE}/Unary", "worker run")

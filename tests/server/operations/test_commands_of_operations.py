@@ -200,16 +200,16 @@ def folder_state(folder: Path) -> dict[str, bytes]:
     return {path.name: b"" if path.name.endswith("-shm") else path.read_bytes() for path in folder.iterdir()}
 
 
-def test_tables_of_another_version_are_told_and_nothing_is_left_behind(
+def test_tables_of_another_version_are_reported_and_nothing_is_left_behind(
     capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> None:
     state = tmp_path / "a state"
 
     def found() -> list[tuple[str, str]]:
         before = folder_state(state)
-        told = Checked(capsys, "--state-dir", str(state)).of("database")
+        findings = Checked(capsys, "--state-dir", str(state)).of("database")
         assert folder_state(state) == before
-        return told
+        return findings
 
     store = open_store(state)
     open_now = found()
@@ -236,11 +236,11 @@ def test_tables_of_another_version_are_told_and_nothing_is_left_behind(
 def test_a_migration_is_announced(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     with contextlib.closing(sqlite3.connect(tmp_path / DATABASE_FILE)) as connection:
         connection.executescript(script_of(1, "sqlite"))
-    told = f"; the next start migrates the tables from schema version 1 to {latest_version()}"
+    migration = f"; the next start migrates the tables from schema version 1 to {latest_version()}"
     found = Checked(capsys, "--state-dir", str(tmp_path)).of("database")
-    assert found == [("ok", f"SQLite in {tmp_path / DATABASE_FILE}{told}")]
+    assert found == [("ok", f"SQLite in {tmp_path / DATABASE_FILE}{migration}")]
     open_store(tmp_path).close()
-    assert Checked(capsys, "--state-dir", str(tmp_path)).of("database") == [("ok", found[0][1].removesuffix(told))]
+    assert Checked(capsys, "--state-dir", str(tmp_path)).of("database") == [("ok", found[0][1].removesuffix(migration))]
 
 
 def test_a_database_that_a_running_server_has(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
@@ -248,8 +248,8 @@ def test_a_database_that_a_running_server_has(capsys: pytest.CaptureFixture[str]
     link = tmp_path / "link"
     link.symlink_to(state)
     in_use = f"{DATABASE_FILE} is in use by another robosc-server"
-    with held_store(state) as told:
-        assert told == "open"
+    with held_store(state) as outcome:
+        assert outcome == "open"
         before = {path.name for path in state.iterdir()}
         for place in (state, link):
             checked = Checked(capsys, "--state-dir", str(place))
@@ -271,8 +271,8 @@ def test_a_look_at_a_database_of_this_process_leaves_it_the_lock(
     store = open_store(tmp_path)
     assert Checked(capsys, "--state-dir", str(tmp_path)).grade("database") == "warning"
     try:
-        with held_store(tmp_path) as told:
-            assert told.endswith("is in use by another robosc-server")
+        with held_store(tmp_path) as outcome:
+            assert outcome.endswith("is in use by another robosc-server")
     finally:
         store.close()
 
@@ -352,7 +352,7 @@ def test_a_token_with_quotas(capsys: pytest.CaptureFixture[str]) -> None:
 
 
 @pytest.mark.parametrize(
-    ("scopes", "is_told"),
+    ("scopes", "is_reported"),
     [
         ([], False),
         (["synthesize"], False),
@@ -363,22 +363,22 @@ def test_a_token_with_quotas(capsys: pytest.CaptureFixture[str]) -> None:
     ],
 )
 def test_a_token_with_which_nothing_can_be_called(
-    scopes: list[str], is_told: bool, capsys: pytest.CaptureFixture[str]
+    scopes: list[str], is_reported: bool, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run_command(["token", "laptop", *(word for scope in scopes for word in ("--scope", scope))]) == 0
     captured = capsys.readouterr()
     assert captured.out.startswith("robosc_")
     assert captured.out.count("\n") == 1
-    assert ("cannot be used with this server: it lacks the scope 'synthesize'" in captured.err) is is_told
+    assert ("cannot be used with this server: it lacks the scope 'synthesize'" in captured.err) is is_reported
     assert parse_tokens(captured.err.splitlines()[-1], "line")
 
 
 def test_the_help_says_what_each_scope_is_for(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         run_command(["token", "--help"])
-    told = " ".join(capsys.readouterr().out.split())
+    help_text = " ".join(capsys.readouterr().out.split())
     for scope in Scope:
-        assert re.search(rf"{scope}(, besides synthesize)?: [a-z]", told), scope
+        assert re.search(rf"{scope}(, besides synthesize)?: [a-z]", help_text), scope
 
 
 def test_a_server_that_lets_nobody_in_says_so(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
@@ -391,7 +391,7 @@ def test_a_server_that_lets_nobody_in_says_so(tmp_path: Path, caplog: pytest.Log
     assert caplog.text.count(words) == 1
 
 
-def test_tokens_that_expire_are_told(
+def test_tokens_that_expire_are_reported(
     capsys: pytest.CaptureFixture[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now_s = read_time("2026-11-26T12:00:00Z")

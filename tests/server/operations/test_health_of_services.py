@@ -31,45 +31,39 @@ async def status(channel: Any, service: str = "") -> Any:
     return (await health_pb2_grpc.HealthStub(channel).Check(request, timeout=PATIENCE_S)).status
 
 
-def test_each_service_follows_what_it_needs() -> None:
-    async def run() -> None:
-        health = Health(SERVICES)
-        async with small_server(setup=with_health(health)) as (channel, _):
+async def test_each_service_follows_what_it_needs() -> None:
+    health = Health(SERVICES)
+    async with small_server(setup=with_health(health)) as (channel, _):
 
-            async def all_of_them() -> list[Any]:
-                return [await status(channel, name) for name in ("robosc.Works", "robosc.Keeps", "")]
+        async def all_of_them() -> list[Any]:
+            return [await status(channel, name) for name in ("robosc.Works", "robosc.Keeps", "")]
 
-            assert await all_of_them() == [NOT_SERVING] * 3
-            health.set_condition("workers", True)
-            assert await all_of_them() == [SERVING, NOT_SERVING, NOT_SERVING]
-            health.set_condition("store", True)
-            assert await all_of_them() == [SERVING] * 3
-            health.drain()
-            assert await all_of_them() == [NOT_SERVING] * 3
-            with pytest.raises(grpc.aio.AioRpcError) as caught:
-                await status(channel, "nobody")
-            assert caught.value.code() is grpc.StatusCode.NOT_FOUND
-
-    limited(run())
+        assert await all_of_them() == [NOT_SERVING] * 3
+        health.set_condition("workers", True)
+        assert await all_of_them() == [SERVING, NOT_SERVING, NOT_SERVING]
+        health.set_condition("store", True)
+        assert await all_of_them() == [SERVING] * 3
+        health.drain()
+        assert await all_of_them() == [NOT_SERVING] * 3
+        with pytest.raises(grpc.aio.AioRpcError) as caught:
+            await status(channel, "nobody")
+        assert caught.value.code() is grpc.StatusCode.NOT_FOUND
 
 
-def test_a_watcher_is_told_each_change_once() -> None:
-    async def run() -> None:
-        health = Health(SERVICES)
-        async with small_server(setup=with_health(health)) as (channel, _):
-            watch = health_pb2_grpc.HealthStub(channel).Watch(health_pb2.HealthCheckRequest(service="robosc.Keeps"))
-            assert (await watch.read()).status == NOT_SERVING
-            health.set_condition("workers", True)
-            health.set_condition("store", True)
-            assert (await watch.read()).status == SERVING
-            health.set_condition("store", False)
-            assert (await watch.read()).status == NOT_SERVING
-            other = health_pb2_grpc.HealthStub(channel).Watch(health_pb2.HealthCheckRequest(service="nobody"))
-            assert (await other.read()).status == health_pb2.HealthCheckResponse.SERVICE_UNKNOWN
-            for stream in (watch, other):
-                stream.cancel()
-
-    limited(run())
+async def test_a_watcher_receives_each_change_once() -> None:
+    health = Health(SERVICES)
+    async with small_server(setup=with_health(health)) as (channel, _):
+        watch = health_pb2_grpc.HealthStub(channel).Watch(health_pb2.HealthCheckRequest(service="robosc.Keeps"))
+        assert (await watch.read()).status == NOT_SERVING
+        health.set_condition("workers", True)
+        health.set_condition("store", True)
+        assert (await watch.read()).status == SERVING
+        health.set_condition("store", False)
+        assert (await watch.read()).status == NOT_SERVING
+        other = health_pb2_grpc.HealthStub(channel).Watch(health_pb2.HealthCheckRequest(service="nobody"))
+        assert (await other.read()).status == health_pb2.HealthCheckResponse.SERVICE_UNKNOWN
+        for stream in (watch, other):
+            stream.cancel()
 
 
 def frame(kind: int, flags: int, stream: int, content: bytes) -> bytes:
@@ -103,58 +97,51 @@ def watch_without_taking(service: str) -> bytes:
     )
 
 
-def test_a_watcher_that_takes_nothing_keeps_nobody_from_the_truth() -> None:
-    async def run() -> None:
-        health, ports, watching = Health(SERVICES), list[int](), asyncio.Event()
-        watch = health.Watch
+async def test_a_watcher_that_takes_nothing_keeps_nobody_from_the_truth() -> None:
+    health, ports, watching = Health(SERVICES), list[int](), asyncio.Event()
+    watch = health.Watch
 
-        async def noted(request: Any, context: Any) -> None:
-            watching.set()
-            await watch(request, context)
+    async def noted(request: Any, context: Any) -> None:
+        watching.set()
+        await watch(request, context)
 
-        health.Watch = noted  # type: ignore[method-assign]
+    health.Watch = noted  # type: ignore[method-assign]
 
-        def listen(server: grpc.aio.Server) -> None:
-            with_health(health)(server)
-            ports.append(server.add_insecure_port("127.0.0.1:0"))
+    def listen(server: grpc.aio.Server) -> None:
+        with_health(health)(server)
+        ports.append(server.add_insecure_port("127.0.0.1:0"))
 
-        async with small_server(setup=listen) as (channel, server):
-            _, writer = await asyncio.open_connection("127.0.0.1", ports[0])
-            writer.write(watch_without_taking("robosc.Works"))
-            await watching.wait()
-            told = health_pb2_grpc.HealthStub(channel).Watch(health_pb2.HealthCheckRequest(service="robosc.Works"))
-            assert (await told.read()).status == NOT_SERVING
-            health.set_condition("workers", True)
-            assert (await told.read()).status == SERVING
-            assert await status(channel, "robosc.Works") == SERVING
-            await drain(server, health, CallInterceptor(Metrics("1")), 0.0)
-            assert not health.is_serving("robosc.Works")
-            told.cancel()
-            writer.close()
-
-    limited(run())
+    async with small_server(setup=listen) as (channel, server):
+        _, writer = await asyncio.open_connection("127.0.0.1", ports[0])
+        writer.write(watch_without_taking("robosc.Works"))
+        await watching.wait()
+        watcher = health_pb2_grpc.HealthStub(channel).Watch(health_pb2.HealthCheckRequest(service="robosc.Works"))
+        assert (await watcher.read()).status == NOT_SERVING
+        health.set_condition("workers", True)
+        assert (await watcher.read()).status == SERVING
+        assert await status(channel, "robosc.Works") == SERVING
+        await drain(server, health, CallInterceptor(Metrics("1")), 0.0)
+        assert not health.is_serving("robosc.Works")
+        watcher.cancel()
+        writer.close()
 
 
-def test_many_who_watch_keep_nobody_from_watching() -> None:
-    async def run() -> None:
-        health = Health(SERVICES)
-        async with small_server(setup=with_health(health)) as (channel, _):
-            stub = health_pb2_grpc.HealthStub(channel)
-            watches = [stub.Watch(health_pb2.HealthCheckRequest(service="robosc.Works")) for _ in range(300)]
-            assert [(await watch.read()).status for watch in watches] == [NOT_SERVING] * len(watches)
-            health.set_condition("workers", True)
-            assert [(await watch.read()).status for watch in watches] == [SERVING] * len(watches)
-            assert await status(channel, "robosc.Works") == SERVING
-            for watch in watches:
-                watch.cancel()
-
-    limited(run())
+async def test_many_who_watch_keep_nobody_from_watching() -> None:
+    health = Health(SERVICES)
+    async with small_server(setup=with_health(health)) as (channel, _):
+        stub = health_pb2_grpc.HealthStub(channel)
+        watches = [stub.Watch(health_pb2.HealthCheckRequest(service="robosc.Works")) for _ in range(300)]
+        assert [(await watch.read()).status for watch in watches] == [NOT_SERVING] * len(watches)
+        health.set_condition("workers", True)
+        assert [(await watch.read()).status for watch in watches] == [SERVING] * len(watches)
+        assert await status(channel, "robosc.Works") == SERVING
+        for watch in watches:
+            watch.cancel()
 
 
-def test_conditions_are_asked_for_again_and_again_and_who_raises_says_no() -> None:
+async def test_conditions_are_asked_for_again_and_again_and_who_raises_says_no() -> None:
     is_there: dict[str, bool | Exception] = {"store": True, "workers": True}
-
-    async def run() -> None:
+    with logged() as log:
         health = Health(SERVICES)
 
         def probe(name: str) -> Any:
@@ -174,9 +161,6 @@ def test_conditions_are_asked_for_again_and_again_and_who_raises_says_no() -> No
             assert health.conditions() == {"store": False, "workers": True, "accepting": True}
             is_there["store"] = True
             await until(lambda: health.is_serving("robosc.Keeps") is True)
-
-    with logged() as log:
-        limited(run())
     assert [line["condition"] for line in log.lines("condition not met")] == ["store"]
 
 
@@ -184,29 +168,26 @@ async def is_draining(channel: Any) -> bool:
     return bool(await status(channel) != SERVING)
 
 
-def test_draining_says_no_first_then_refuses_and_lets_calls_end() -> None:
-    async def run() -> None:
-        health, release, seen = Health({}), asyncio.Event(), asyncio.Event()
+async def test_draining_says_no_first_then_refuses_and_lets_calls_end() -> None:
+    health, release, seen = Health({}), asyncio.Event(), asyncio.Event()
 
-        async def slow(request: bytes, context: Any) -> bytes:
-            seen.set()
-            await release.wait()
-            return b"done"
+    async def slow(request: bytes, context: Any) -> bytes:
+        seen.set()
+        await release.wait()
+        return b"done"
 
-        calls = CallInterceptor(Metrics("1"))
-        async with small_server(interceptors=[calls], unary=slow, setup=with_health(health)) as (channel, server):
-            under_way = asyncio.create_task(call(channel))
-            await seen.wait()
-            ending = asyncio.create_task(drain(server, health, calls, PATIENCE_S))
-            await until(lambda: is_draining(channel))
-            refused = await call(channel)
-            assert (refused.code, refused.reason) == (grpc.StatusCode.UNAVAILABLE, "SHUTTING_DOWN")
-            assert not ending.done()
-            release.set()
-            assert (await under_way).answer == b"done"
-            await ending
-
-    limited(run())
+    calls = CallInterceptor(Metrics("1"))
+    async with small_server(interceptors=[calls], unary=slow, setup=with_health(health)) as (channel, server):
+        under_way = asyncio.create_task(call(channel))
+        await seen.wait()
+        ending = asyncio.create_task(drain(server, health, calls, PATIENCE_S))
+        await until(lambda: is_draining(channel))
+        refused = await call(channel)
+        assert (refused.code, refused.reason) == (grpc.StatusCode.UNAVAILABLE, "SHUTTING_DOWN")
+        assert not ending.done()
+        release.set()
+        assert (await under_way).answer == b"done"
+        await ending
 
 
 async def passes(loop: HeldLoop, ending: asyncio.Task[None]) -> None:
@@ -220,39 +201,35 @@ async def passes(loop: HeldLoop, ending: asyncio.Task[None]) -> None:
     await ending
 
 
-def test_a_large_answer_that_was_sent_is_waited_for() -> None:
+async def test_a_large_answer_that_was_sent_is_waited_for(loop: HeldLoop) -> None:
     size = 3_000_000
+    sender, calls, health = ResultSender(size, size), CallInterceptor(Metrics("1")), Health({})
 
-    async def test(loop: HeldLoop) -> None:
-        sender, calls, health = ResultSender(size, size), CallInterceptor(Metrics("1")), Health({})
+    async def large(request: bytes, context: Any) -> bytes:
+        answer = bytes(size)
+        sender.reserve(context, (answer,))
+        return answer
 
-        async def large(request: bytes, context: Any) -> bytes:
-            answer = bytes(size)
-            sender.reserve(context, (answer,))
-            return answer
+    ports: list[int] = []
 
-        ports: list[int] = []
+    def listen(server: grpc.aio.Server) -> None:
+        ports.append(server.add_insecure_port("127.0.0.1:0"))
 
-        def listen(server: grpc.aio.Server) -> None:
-            ports.append(server.add_insecure_port("127.0.0.1:0"))
-
-        async with small_server(interceptors=[calls], unary=large, setup=listen) as (_, server):
-            # More than is taken over the line before somebody reads: the handler is long done by then.
-            options = [("grpc.http2.lookahead_bytes", 65535), ("grpc.http2.bdp_probe", 0)]
-            async with grpc.aio.insecure_channel(f"127.0.0.1:{ports[0]}", options) as slow:
-                method: Any = slow.unary_stream(f"/{SERVICE}/Unary")
-                reader = method(b"")
-                await until(lambda: sender.unread_bytes > 0 and not calls.under_way())
-                ending = asyncio.create_task(
-                    drain(server, health, calls, PATIENCE_S, unread_bytes=lambda: sender.unread_bytes)
-                )
-                # Longer than small answers are given.
-                await loop.passed(5.0)
-                assert not ending.done()
-                assert [len(message) async for message in reader] == [size]
-                await passes(loop, ending)
-
-    on_held_time(test)
+    async with small_server(interceptors=[calls], unary=large, setup=listen) as (_, server):
+        # More than is taken over the line before somebody reads: the handler is long done by then.
+        options = [("grpc.http2.lookahead_bytes", 65535), ("grpc.http2.bdp_probe", 0)]
+        async with grpc.aio.insecure_channel(f"127.0.0.1:{ports[0]}", options) as slow:
+            method: Any = slow.unary_stream(f"/{SERVICE}/Unary")
+            reader = method(b"")
+            await until(lambda: sender.unread_bytes > 0 and not calls.under_way())
+            ending = asyncio.create_task(
+                drain(server, health, calls, PATIENCE_S, unread_bytes=lambda: sender.unread_bytes)
+            )
+            # Longer than small answers are given.
+            await loop.passed(5.0)
+            assert not ending.done()
+            assert [len(message) async for message in reader] == [size]
+            await passes(loop, ending)
 
 
 def test_connections_that_grpc_does_not_let_go_of_keep_nobody_from_ending(monkeypatch: pytest.MonkeyPatch) -> None:

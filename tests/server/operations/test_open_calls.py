@@ -125,7 +125,7 @@ def test_a_caller_has_its_places_and_no_more(small: str, all_are_free: Callable[
     assert eventually(lambda: is_answered(small))
 
 
-def test_all_places_are_bounded_and_health_is_told_all_the_same(small: str) -> None:
+def test_all_places_are_bounded_and_health_is_answered_all_the_same(small: str) -> None:
     with strangers(small, 1, source="127.0.0.2") as (one,), strangers(small, 1, source="127.0.0.3") as (other,):
         hold(one, 4)
         hold(other, 3)

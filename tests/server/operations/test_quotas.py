@@ -78,7 +78,7 @@ def test_so_many_tasks_in_a_minute_and_then_at_their_pace(tmp_path: Path) -> Non
     refused(quotas, "a")
 
 
-def test_who_comes_when_it_is_told_is_let_in(tmp_path: Path) -> None:
+def test_who_comes_at_the_time_of_the_refusal_is_let_in(tmp_path: Path) -> None:
     clock = Clock()
     quotas = quotas_for(tmp_path, clock, a=Quota(per_minute=7))
     for _ in range(50):
@@ -127,34 +127,30 @@ def test_without_tokens_there_are_no_quotas() -> None:
     assert quotas.waiting("127.0.0.1") is None
 
 
-def test_the_line_before_the_workers_keeps_to_a_tokens_own_bound_and_notes_what_it_takes(tmp_path: Path) -> None:
+async def test_the_line_before_the_workers_keeps_to_a_tokens_own_bound_and_notes_what_it_takes(tmp_path: Path) -> None:
     clock = Clock()
     quotas = quotas_for(tmp_path, clock, little=Quota(waiting=1), timed=Quota(cpu_seconds_per_hour=60))
-
-    async def run() -> None:
-        workers = ScriptedWorkers(1)
-        scheduler = Scheduler(workers, QueueLimits(waiting_per_caller=3), clock, quotas)
-        at_work = scheduler.enter("timed")
-        overtaken = asyncio.create_task(scheduler.run(task_of("a"), "timed", TaskLimits(), drop))
-        little = scheduler.enter("little")
-        with pytest.raises(RefusedError, match="too many tasks of this caller"):
-            scheduler.enter("little")
-        for _ in range(3):
-            scheduler.leave(scheduler.enter("anybody"))
-        quotas.admit("timed")
-        # By the clock, nothing passes.
-        await scheduler.work(at_work, task_of("spend 90"), TaskLimits(), drop)
-        assert refused(quotas, "timed").retry_after_s == pytest.approx(30 * 60)
-        for place in (little, at_work):
-            scheduler.leave(place)
-        # What was admitted before, and has its turn now, comes too late.
-        with pytest.raises(RefusedError) as caught:
-            await overtaken
-        assert caught.value.reason is Reason.QUOTA_EXCEEDED
-        assert caught.value.retry_after_s == pytest.approx(30 * 60)
-        assert (scheduler.running, scheduler.waiting, workers.begun) == (0, 0, ["spend 90"])
-        clock.now_s += 30 * 60
-        await scheduler.run(task_of("fail CPU_LIMIT\nspend 3"), "timed", TaskLimits(), drop)
-        assert refused(quotas, "timed").retry_after_s == pytest.approx(3 * 60)
-
-    asyncio.run(run())
+    workers = ScriptedWorkers(1)
+    scheduler = Scheduler(workers, QueueLimits(waiting_per_caller=3), clock, quotas)
+    at_work = scheduler.enter("timed")
+    overtaken = asyncio.create_task(scheduler.run(task_of("a"), "timed", TaskLimits(), drop))
+    little = scheduler.enter("little")
+    with pytest.raises(RefusedError, match="too many tasks of this caller"):
+        scheduler.enter("little")
+    for _ in range(3):
+        scheduler.leave(scheduler.enter("anybody"))
+    quotas.admit("timed")
+    # By the clock, nothing passes.
+    await scheduler.work(at_work, task_of("spend 90"), TaskLimits(), drop)
+    assert refused(quotas, "timed").retry_after_s == pytest.approx(30 * 60)
+    for place in (little, at_work):
+        scheduler.leave(place)
+    # What was admitted before, and has its turn now, comes too late.
+    with pytest.raises(RefusedError) as caught:
+        await overtaken
+    assert caught.value.reason is Reason.QUOTA_EXCEEDED
+    assert caught.value.retry_after_s == pytest.approx(30 * 60)
+    assert (scheduler.running, scheduler.waiting, workers.begun) == (0, 0, ["spend 90"])
+    clock.now_s += 30 * 60
+    await scheduler.run(task_of("fail CPU_LIMIT\nspend 3"), "timed", TaskLimits(), drop)
+    assert refused(quotas, "timed").retry_after_s == pytest.approx(3 * 60)

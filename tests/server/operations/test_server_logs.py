@@ -81,8 +81,8 @@ def test_half_a_character_can_be_logged() -> None:
 
 
 @pytest.mark.parametrize("form", list(LogFormat))
-def test_an_exception_is_told_without_its_words_above_debug(form: LogFormat) -> None:
-    def told(level: LogLevel) -> str:
+def test_an_exception_is_logged_without_its_words_above_debug(form: LogFormat) -> None:
+    def logged_text(level: LogLevel) -> str:
         with logged(level, form) as log:
             logging.getLogger("others").error("failed", exc_info=raised())
             structlog.get_logger().error("failed", exc_info=raised())
@@ -90,15 +90,15 @@ def test_an_exception_is_told_without_its_words_above_debug(form: LogFormat) -> 
             log_fault(_TRACEBACK)
         return log.text
 
-    quiet = told(LogLevel.INFO)
+    quiet = logged_text(LogLevel.INFO)
     assert MARKER not in quiet
     assert quiet.count("ValueError") == 3
     assert "SyntaxError" in quiet
     assert "robosc_server/tasks/run.py:3" in quiet
-    assert MARKER in told(LogLevel.DEBUG)
+    assert MARKER in logged_text(LogLevel.DEBUG)
 
 
-def test_what_the_system_says_is_told() -> None:
+def test_what_the_system_says_is_reported() -> None:
     with logged(LogLevel.INFO) as log:
         try:
             Path("/nowhere/at/all").read_text()
@@ -136,7 +136,7 @@ def test_how_a_worker_died_is_logged_and_an_exception_in_it_is_not() -> None:
     ],
 )
 @pytest.mark.parametrize("reason", [Reason.WORKER_DIED, Reason.INTERNAL_FAULT])
-def test_workers_can_say_what_they_like_and_nothing_of_it_is_told_above_debug(words: str, reason: Reason) -> None:
+def test_workers_can_say_what_they_like_and_nothing_of_it_is_logged_above_debug(words: str, reason: Reason) -> None:
     with logged(LogLevel.INFO) as log:
         public_failure(Failure(reason, MARKER, words))
     (line,) = log.lines()
@@ -162,13 +162,13 @@ def test_set_up_twice_each_line_is_written_once() -> None:
     assert (first.text, len(second.text.splitlines())) == ("", 1)
 
 
-def test_talkative_libraries_tell_warnings_alone() -> None:
+def test_talkative_libraries_log_warnings_alone() -> None:
     with logged(LogLevel.DEBUG) as log:
         for name in ("distributed.scheduler", "sqlalchemy.engine", "asyncio"):
             logger: Any = logging.getLogger(name)
             assert not logger.isEnabledFor(logging.INFO)
-        logging.getLogger("robosc_server").debug("told")
-    assert [line["event"] for line in log.lines()] == ["told"]
+        logging.getLogger("robosc_server").debug("said")
+    assert [line["event"] for line in log.lines()] == ["said"]
 
 
 def test_random_request_ids_differ() -> None:

@@ -24,7 +24,7 @@ def test_every_setting_stands_in_the_manual_as_it_is_defined() -> None:
 
 
 def test_every_metric_stands_in_the_manual() -> None:
-    told = set(re.findall(r"^\| `(robosc_server_[a-z_]+)` \|", PAGE, re.MULTILINE))
+    listed = set(re.findall(r"^\| `(robosc_server_[a-z_]+)` \|", PAGE, re.MULTILINE))
     metrics = Metrics("1")
     metrics.set_sources(jobs=lambda: {"queued": 1}, conditions=lambda: {"store": True})
     families = text_string_to_metric_families(metrics.text().decode())
@@ -33,7 +33,7 @@ def test_every_metric_stands_in_the_manual() -> None:
         for family in families
         if family.name.startswith("robosc_") and not family.name.endswith("_created")
     }
-    assert told == {name.removesuffix("_info") + "_info" if "info" in name else name for name in counted}
+    assert listed == {name.removesuffix("_info") + "_info" if "info" in name else name for name in counted}
 
 
 def test_no_row_of_a_table_is_broken() -> None:

@@ -173,7 +173,7 @@ def test_calls_of_each_method_are_counted_from_0() -> None:
             assert found["robosc_server_calls_total", method] == 0
 
 
-def test_where_other_machines_reach_it_only_if_it_is_told() -> None:
+def test_other_machines_reach_it_only_if_it_is_asked_for() -> None:
     async def opened(*, beyond_loopback: bool) -> None:
         async with MetricsEndpoint(Metrics("1"), "0.0.0.0:0", beyond_loopback=beyond_loopback) as endpoint:
             assert not endpoint.address.endswith(":0")
@@ -183,7 +183,7 @@ def test_where_other_machines_reach_it_only_if_it_is_told() -> None:
     asyncio.run(opened(beyond_loopback=True))
 
 
-def test_an_address_in_use_is_told() -> None:
+def test_an_address_in_use_is_reported() -> None:
     async def test(address: str) -> None:
         with pytest.raises(SecurityError, match="cannot listen"):
             async with MetricsEndpoint(Metrics("1"), address):
@@ -192,7 +192,7 @@ def test_an_address_in_use_is_told() -> None:
     asked(Metrics("1"), test)
 
 
-def test_tasks_are_counted_by_how_they_ended() -> None:
+async def test_tasks_are_counted_by_how_they_ended() -> None:
     class Scripted:
         capacity = 1
 
@@ -213,17 +213,14 @@ def test_tasks_are_counted_by_how_they_ended() -> None:
     async def drop(report: object) -> None:
         pass
 
-    async def run() -> None:
-        for request in (b"result", b"failure", b"stuck"):
-            task = Task(TaskKind.CHECK, request, "0" * 64, "name")
-            running = asyncio.create_task(observed.run(task, TaskLimits(), drop))
-            if request == b"stuck":
-                await asyncio.sleep(0)
-                running.cancel()
-            await asyncio.wait([running])
-        assert observed.running == 0
-
-    asyncio.run(run())
+    for request in (b"result", b"failure", b"stuck"):
+        task = Task(TaskKind.CHECK, request, "0" * 64, "name")
+        running = asyncio.create_task(observed.run(task, TaskLimits(), drop))
+        if request == b"stuck":
+            await asyncio.sleep(0)
+            running.cancel()
+        await asyncio.wait([running])
+    assert observed.running == 0
     for outcome in ("RESULT", "MEMORY_LIMIT", "CANCELLED"):
         assert value(metrics, "robosc_server_tasks_total", kind="check", outcome=outcome) == 1
     assert value(metrics, "robosc_server_task_seconds_count", kind="check") == 3

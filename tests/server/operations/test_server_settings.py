@@ -81,7 +81,7 @@ def test_flags_that_are_yes_or_no(tmp_path: Path) -> None:
     assert not load_settings(["--config", str(file), "--no-insecure-beyond-loopback"]).insecure_beyond_loopback
 
 
-def test_every_problem_is_told_with_its_place(
+def test_every_problem_is_reported_with_its_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = written(

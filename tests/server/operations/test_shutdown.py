@@ -1,4 +1,4 @@
-"""A server that is told to end does, whatever hangs: what its signals set going, on held time."""
+"""A server that is asked to end does, whatever hangs: what its signals set going, on held time."""
 
 import asyncio
 import faulthandler
@@ -34,7 +34,7 @@ def forced(monkeypatch: pytest.MonkeyPatch) -> dict[str, Any]:
     return found
 
 
-def told(test: Callable[[HeldLoop, ShutdownSignals], Coroutine[Any, Any, None]]) -> None:
+def run_on_held_time(test: Callable[[HeldLoop, ShutdownSignals], Coroutine[Any, Any, None]]) -> None:
     async def run(loop: HeldLoop) -> None:
         shutdown = ShutdownSignals(30.0)
         shutdown.listen()
@@ -44,7 +44,7 @@ def told(test: Callable[[HeldLoop, ShutdownSignals], Coroutine[Any, Any, None]])
 
 
 @pytest.mark.parametrize("number", [signal.SIGTERM, signal.SIGINT])
-def test_an_end_that_hangs_is_told_and_will_be_forced(
+def test_an_end_that_hangs_is_reported_and_will_be_forced(
     forced: dict[str, Any], caplog: pytest.LogCaptureFixture, number: signal.Signals
 ) -> None:
     async def hanging() -> None:
@@ -64,7 +64,7 @@ def test_an_end_that_hangs_is_told_and_will_be_forced(
         assert not forced
 
     with caplog.at_level(logging.ERROR):
-        told(test)
+        run_on_held_time(test)
 
 
 def test_a_second_interrupt_ends_it_at_once(forced: dict[str, Any], caplog: pytest.LogCaptureFixture) -> None:
@@ -78,7 +78,7 @@ def test_a_second_interrupt_ends_it_at_once(forced: dict[str, Any], caplog: pyte
         await until(lambda: "status" in forced)
         assert (forced["status"], shutdown._interrupts) == (128 + signal.SIGINT, 2)
 
-    told(test)
+    run_on_held_time(test)
     assert "exiting immediately after a second interrupt" in caplog.text
 
 
@@ -97,7 +97,7 @@ asyncio.run(main())
 """
 
 
-def test_a_process_that_hangs_is_ended_and_tells_where() -> None:
+def test_a_process_that_hangs_is_ended_and_reports_where() -> None:
     done = subprocess.run(
         [sys.executable, "-c", _HANGING], capture_output=True, text=True, check=False, timeout=PATIENCE_S
     )

@@ -1,4 +1,4 @@
-"""Workers on a Dask cluster, without one: how they are opened, what is told of them, and answers on their way."""
+"""Workers on a Dask cluster, without one: how they are opened, what is reported of them, and answers on their way."""
 
 import os
 import subprocess
@@ -24,13 +24,13 @@ from support.fake_tasks import TASK_FUNCTION
 LIMITS = TaskLimits(seconds=60, cpu_seconds=20, memory_bytes=512 * 2**20, result_bytes=10**6)
 
 
-def test_a_missing_package_is_told_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_missing_package_is_reported_in_one_sentence(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(sys.modules, "distributed", None)
     with pytest.raises(WorkersError, match=r"^workers on a Dask cluster need .*: pip install 'robosc\[dask\]'$"):
         open_workers("dask://localhost:8786", 1)
 
 
-def test_a_package_that_cannot_be_loaded_is_told_in_one_sentence(
+def test_a_package_that_cannot_be_loaded_is_reported_in_one_sentence(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     """The module cannot be loaded, like where /proc has processes alone."""
@@ -44,8 +44,8 @@ def test_a_package_that_cannot_be_loaded_is_told_in_one_sentence(
 def test_nobody_loads_dask_who_does_not_ask_for_it() -> None:
     program = "import sys, robosc_server.workers.factory; print({'distributed', 'dask', 'grpc'} & sys.modules.keys())"
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-    told = subprocess.run([sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True)
-    assert told.stdout.strip() == "set()"
+    done = subprocess.run([sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True)
+    assert done.stdout.strip() == "set()"
 
 
 def test_workers_are_opened_by_what_the_operator_writes() -> None:
@@ -64,7 +64,7 @@ def test_what_lost_workers_took_counts_by_the_clock() -> None:
     def begun(worker: str) -> dict[str, object]:
         return {"is": "begun", "task": "t", "worker": worker}
 
-    def told(worker: str, cpu_s: object) -> dict[str, object]:
+    def report(worker: str, cpu_s: object) -> dict[str, object]:
         return {"is": "spent", "task": "t", "worker": worker, "cpu_s": cpu_s}
 
     spent: list[float] = []
@@ -75,14 +75,14 @@ def test_what_lost_workers_took_counts_by_the_clock() -> None:
     # Another one begins: the first one was lost, and is not believed any more.
     now_s = 13.0
     account.record_event(begun("b"))
-    account.record_event(told("a", 1.0))
+    account.record_event(report("a", 1.0))
     assert spent == [3.0]
     for nonsense in (-1.0, float("nan"), float("inf"), "7", None):
-        account.record_event(told("b", nonsense))
-    account.record_event(told("b", 0.25))
-    account.record_event(told("b", 0.25))
+        account.record_event(report("b", nonsense))
+    account.record_event(report("b", 0.25))
+    account.record_event(report("b", 0.25))
     assert spent == [3.0, 0.25]
-    # It is given up, and what the last worker has to tell never comes.
+    # It is given up, and what the last worker has to report never comes.
     now_s = 20.0
     account.record_event(begun("c"))
     now_s = 21.5

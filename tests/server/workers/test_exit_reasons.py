@@ -43,7 +43,7 @@ LIMITS = TaskLimits(cpu_seconds=10, memory_bytes=1000 * MIB)
         (-63, 1, 10, False, Reason.WORKER_DIED, "the worker process was ended by signal 63"),
     ],
 )
-def test_each_ending_is_told_by_its_cause(
+def test_each_ending_is_reported_by_its_cause(
     exit_code: int, cpu_s: float, peak_mib: int, was_memory_short: bool, reason: Reason, message: str
 ) -> None:
     failure = failure_of(ProcessExit(exit_code, cpu_s, peak_mib * MIB), LIMITS, "Fatal error\n", was_memory_short)
@@ -59,8 +59,8 @@ def test_kills_before_now_are_asked_for_once_a_second() -> None:
     now_s = [100.0]
     counts = iter([3, 5])
     before = RecentOomKills(lambda: next(counts), lambda: now_s[0])
-    told = []
+    results = []
     for at_s in (100.0, 100.5, 100.999, 101.0, 101.5):
         now_s[0] = at_s
-        told.append(before())
-    assert told == [3, 3, 3, 5, 5]
+        results.append(before())
+    assert results == [3, 3, 3, 5, 5]

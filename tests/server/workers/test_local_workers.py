@@ -1,4 +1,4 @@
-"""Processes of this machine: they do what they are told, die of what they may not, and are killed in time."""
+"""Processes of this machine: they do what they are asked to, die of what they may not, and are killed in time."""
 
 import asyncio
 import contextlib
@@ -59,7 +59,7 @@ class TestAnswers:
 
 
 class TestLimits:
-    def test_the_kernel_is_told_the_limits(self, running: Running) -> None:
+    def test_the_kernel_gets_the_limits(self, running: Running) -> None:
         assert said(running.run("limits")) == f"{20} 0 0 {LIMITS.memory_bytes}"
 
     def test_what_the_process_has_already_is_left_to_it(self, running: Running) -> None:
@@ -92,8 +92,8 @@ class TestLimits:
                 clock.advance(49.0)
                 assert not future.done()
                 clock.advance(1.0)
-                told = Failure(Reason.TIME_LIMIT, "the task exceeded its time limit")
-                assert future.result(PATIENCE_S) == told
+                expected = Failure(Reason.TIME_LIMIT, "the task exceeded its time limit")
+                assert future.result(PATIENCE_S) == expected
             loop.run(workers.__aexit__())
 
     def test_the_size_of_a_result(self, running: Running) -> None:
@@ -132,7 +132,7 @@ class TestDeaths:
     def test_where_it_crashed_stands_in_the_details(self, running: Running) -> None:
         assert "in _misbehave" in running.failure("die 11").details
 
-    def test_a_fault_is_told_with_its_traceback(self, running: Running) -> None:
+    def test_a_fault_is_reported_with_its_traceback(self, running: Running) -> None:
         failure = running.failure("raise")
         assert failure.reason is Reason.INTERNAL_FAULT
         assert failure.details.rstrip().endswith("ValueError: a fault, on purpose")
@@ -169,7 +169,7 @@ class TestDeaths:
         restarts = running.local.restarts
         future, pid = running.begun("stop\necho over")
         assert eventually(lambda: is_stopped(pid))
-        # A fork server that is stopped does not tell that the worker has ended.
+        # A fork server that is stopped does not report that the worker has ended.
         server = parent_of(pid)
         os.kill(server, signal.SIGSTOP)
         assert eventually(lambda: is_stopped(server))
@@ -195,8 +195,8 @@ class TestDeaths:
         os.kill(again, signal.SIGCONT)
         assert said(future.result(60)) == "twice"
         assert running.local.restarts == restarts + 1
-        told = "ended with status -9; restarting it; tasks under way: check 0000000000000000"
-        assert f"the fork server of the workers {told}" in caplog.text
+        ended = "ended with status -9; restarting it; tasks under way: check 0000000000000000"
+        assert f"the fork server of the workers {ended}" in caplog.text
         assert eventually(lambda: has_ended(pid))
 
         future, reports = running.start("pid\nsleep 600")
@@ -207,10 +207,10 @@ class TestDeaths:
             future.result(60)
         assert said(running.run("echo again")) == "again"
 
-    def test_a_fork_server_that_cannot_load_is_told_in_one_sentence(self) -> None:
-        told = r"^cannot load no\.such:thing: ModuleNotFoundError: No module named"
+    def test_a_fork_server_that_cannot_load_is_reported_in_one_sentence(self) -> None:
+        problem = r"^cannot load no\.such:thing: ModuleNotFoundError: No module named"
         workers = LocalWorkers(1, "no.such:thing")
-        with BackgroundLoop() as loop, pytest.raises(WorkersError, match=told):
+        with BackgroundLoop() as loop, pytest.raises(WorkersError, match=problem):
             loop.run(workers.__aenter__())
         assert workers.fault.startswith("cannot load no.such:thing")
 
@@ -262,12 +262,12 @@ class TestNothingIsLeft:
             "from robosc_server.tasks.task import TaskLimits\n"
             "from robosc_server.workers.local import LocalWorkers\n"
             "from support.fake_tasks import TASK_FUNCTION, fake_task\n"
-            "async def tell(report):\n"
+            "async def note(report):\n"
             "    print(report.message, flush=True)\n"
             "async def main():\n"
             "    async with LocalWorkers(2, TASK_FUNCTION) as workers:\n"
             "        tasks = map(fake_task, ('pid\\nstuck', 'pid\\nstop'))\n"
-            "        await asyncio.gather(*(workers.run(task, TaskLimits(), tell) for task in tasks))\n"
+            "        await asyncio.gather(*(workers.run(task, TaskLimits(), note) for task in tasks))\n"
             "asyncio.run(main())\n"
         )
         environment = {**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)}
@@ -295,15 +295,12 @@ class TestNothingIsLeft:
         # Leftovers of earlier tests may have been closed meanwhile.
         assert eventually(lambda: open_descriptors() <= before)
 
-    def test_workers_end_also_where_a_burial_ends_that_very_moment(self) -> None:
-        async def run() -> None:
-            pool = WorkerPool(TASK_FUNCTION, 1, must_be_confined=False)
-            termination = pool._begin(asyncio.sleep(0))
-            while not termination.done():
-                await asyncio.sleep(0)
-            # It is done, and what follows from that is at its turn only when this here waits.
-            assert pool._terminations == {termination}
-            await pool.__aexit__()
-            assert not pool._terminations
-
-        asyncio.run(run())
+    async def test_workers_end_also_where_a_burial_ends_that_very_moment(self) -> None:
+        pool = WorkerPool(TASK_FUNCTION, 1, must_be_confined=False)
+        termination = pool._begin(asyncio.sleep(0))
+        while not termination.done():
+            await asyncio.sleep(0)
+        # It is done, and what follows from that is at its turn only when this here waits.
+        assert pool._terminations == {termination}
+        await pool.__aexit__()
+        assert not pool._terminations

@@ -28,50 +28,47 @@ def test_the_outcome_is_that_of_the_function(real: RealRunning, kind: TaskKind) 
     assert outcome == run_task(kind, task.request, LIMITS, lambda report: None)
 
 
-def test_processes_find_everything_loaded() -> None:
+ROBOTS = """
+from support.hostile_models import buttons
+from support.requests import small_request
+for kind in TaskKind:
+    done(kind, lambda: small_request(kind, buttons(2)))
+"""
+AUTOMATA = """
+from robosc_api.v1 import synthesis_pb2 as pb
+from support.automata_models import EMPTY, TWO_TANKS
+from support.requests import MESSAGES, automata_bundle
+more = {TaskKind.GENERATE: {'target': 'c99'}, TaskKind.SYNTHESIZE: {'modular': True}}
+for text in (TWO_TANKS, EMPTY):
+    for kind in [kind for kind in TaskKind if kind is not TaskKind.FORMAT]:
+        bundle = lambda: automata_bundle(text, pb.LANGUAGE_CIF, 'tank.cif')
+        done(kind, lambda: MESSAGES[kind](bundle=bundle(), **more.get(kind, {})))
+"""
+
+
+@pytest.mark.parametrize(
+    ("requests", "count"), [(ROBOTS, len(TaskKind)), (AUTOMATA, 2 * (len(TaskKind) - 1))], ids=["robots", "automata"]
+)
+def test_processes_find_everything_loaded(requests: str, count: int) -> None:
     program = (
         "import sys\n"
         "from robosc_server.tasks.task import TaskKind, TaskLimits\n"
         "from robosc_server.workers.fork_server import _load\n"
-        "from support.hostile_models import buttons\n"
-        "from support.requests import small_request\n"
         "function = _load('robosc_server.tasks.run:run_task')\n"
-        "for kind in TaskKind:\n"
+        "def done(kind, request):\n"
         "    loaded = set(sys.modules)\n"
-        "    request = small_request(kind, buttons(2)).SerializeToString()\n"
-        "    print(function(kind, request, TaskLimits(), lambda report: None).__class__.__name__, end=' ')\n"
+        "    content = request().SerializeToString()\n"
+        "    print(function(kind, content, TaskLimits(), lambda report: None).__class__.__name__, end=' ')\n"
         "    print(*sorted(set(sys.modules) - loaded))\n"
     )
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-    told = subprocess.run([sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True)
-    assert [line.strip() for line in told.stdout.splitlines()] == ["Result"] * len(TaskKind)
+    command = [sys.executable, "-c", program + requests]
+    done = subprocess.run(command, env=environment, check=True, capture_output=True, text=True)
+    assert [line.strip() for line in done.stdout.splitlines()] == ["Result"] * count
 
 
 def test_a_model_with_too_large_diagrams_reaches_the_limit_of_nodes(real: RealRunning) -> None:
     assert reason_of(real.run(synthesis(products()), TaskLimits(nodes=20_000))) is Reason.NODE_LIMIT
-
-
-def test_processes_find_everything_loaded_for_automata() -> None:
-    program = (
-        "import sys\n"
-        "from robosc_api.v1 import synthesis_pb2 as pb\n"
-        "from robosc_server.tasks.task import TaskKind, TaskLimits\n"
-        "from robosc_server.workers.fork_server import _load\n"
-        "from support.automata_models import EMPTY, TWO_TANKS\n"
-        "from support.requests import MESSAGES, automata_bundle\n"
-        "function = _load('robosc_server.tasks.run:run_task')\n"
-        "more = {TaskKind.GENERATE: {'target': 'c99'}, TaskKind.SYNTHESIZE: {'modular': True}}\n"
-        "for text in (TWO_TANKS, EMPTY):\n"
-        "    for kind in [kind for kind in TaskKind if kind is not TaskKind.FORMAT]:\n"
-        "        loaded = set(sys.modules)\n"
-        "        bundle = automata_bundle(text, pb.LANGUAGE_CIF, 'tank.cif')\n"
-        "        request = MESSAGES[kind](bundle=bundle, **more.get(kind, {})).SerializeToString()\n"
-        "        print(function(kind, request, TaskLimits(), lambda report: None).__class__.__name__, end=' ')\n"
-        "        print(*sorted(set(sys.modules) - loaded))\n"
-    )
-    environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-    told = subprocess.run([sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True)
-    assert [line.strip() for line in told.stdout.splitlines()] == ["Result"] * 2 * (len(TaskKind) - 1)
 
 
 def test_automata_keep_to_the_limits_of_a_process(real: RealRunning) -> None:

@@ -72,7 +72,7 @@ def tried(channel: Any, what: str) -> str:
 
 class TestHostileCode:
     @pytest.mark.parametrize(
-        ("what", "told"),
+        ("what", "expected"),
         [
             ("environment", "EACCES"),
             ("read /etc/hostname", "EACCES"),
@@ -95,8 +95,8 @@ class TestHostileCode:
             ("dumpable", "[0]"),
         ],
     )
-    def test_it_reaches_nothing(self, fake: Any, what: str, told: str) -> None:
-        assert tried(fake, what) == told
+    def test_it_reaches_nothing(self, fake: Any, what: str, expected: str) -> None:
+        assert tried(fake, what) == expected
 
     def test_it_reads_nothing_that_is_kept(self, fake: Any, state: Path) -> None:
         files = [path for path in state.rglob("*") if path.is_file()]
@@ -210,34 +210,34 @@ NO_LANDLOCK = "file access is not restricted (no Landlock): Function not impleme
 class TestAKernelWithoutAPart:
     def test_a_server_that_needs_it_does_not_start(self, tmp_path: Path) -> None:
         command = without(LANDLOCK, "-m", "robosc_server.main", "--port", "0", "--state-dir", str(tmp_path / "state"))
-        told = subprocess.run([*command, "--confinement", "required"], capture_output=True, text=True, timeout=100)
-        assert told.returncode == 1
+        done = subprocess.run([*command, "--confinement", "required"], capture_output=True, text=True, timeout=100)
+        assert done.returncode == 1
         assert (
             f"robosc-server: confinement is required, but this machine cannot confine workers: {NO_LANDLOCK}"
-            in told.stderr
+            in done.stderr
         )
 
-    def test_a_server_that_does_not_need_it_tells_and_keeps_the_rest(self, tmp_path: Path) -> None:
+    def test_a_server_that_does_not_need_it_warns_and_keeps_the_rest(self, tmp_path: Path) -> None:
         program = (
             "import asyncio, logging\n"
             "from robosc_server.tasks.task import TaskLimits\n"
             "from robosc_server.workers.local import LocalWorkers\n"
             "from support.fake_tasks import TASK_FUNCTION, fake_task, said\n"
-            "async def tell(report): pass\n"
+            "async def note(report): pass\n"
             "async def main():\n"
             "    async with LocalWorkers(1, TASK_FUNCTION) as workers:\n"
             "        print(workers.missing)\n"
             "        for what in ('read /etc/hostname', 'write FILE', 'socket inet'):\n"
-            "            print(said(await workers.run(fake_task('try ' + what), TaskLimits(), tell)))\n"
+            "            print(said(await workers.run(fake_task('try ' + what), TaskLimits(), note)))\n"
             "logging.basicConfig(format='%(message)s')\n"
             "asyncio.run(main())\n"
         )
         program = program.replace("FILE", str(tmp_path / "file"))
         environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
         command = without(LANDLOCK, "-c", program)
-        told = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100)
-        assert told.stdout.splitlines() == [str((NO_LANDLOCK,)), "done", "EPERM", "EPERM"]
-        assert told.stderr.splitlines() == [f"workers are not fully confined: {NO_LANDLOCK}"]
+        done = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=100)
+        assert done.stdout.splitlines() == [str((NO_LANDLOCK,)), "done", "EPERM", "EPERM"]
+        assert done.stderr.splitlines() == [f"workers are not fully confined: {NO_LANDLOCK}"]
 
     @pytest.mark.parametrize(
         ("is_there", "setting", "grade", "message", "status"),
@@ -247,20 +247,20 @@ class TestAKernelWithoutAPart:
             (True, "required", "ok", "workers can access only program files, no network and no other process", 0),
         ],
     )
-    def test_is_told_before_a_server_is_started(
+    def test_is_reported_before_a_server_is_started(
         self, tmp_path: Path, is_there: bool, setting: str, grade: str, message: str, status: int
     ) -> None:
         settings = ("--port", "0", "--state-dir", str(tmp_path), "--confinement", setting)
         words = ("-m", "robosc_server.main", "check-config", "--json", *settings)
         command = [sys.executable, *words] if is_there else without(LANDLOCK, *words)
-        told = subprocess.run(command, capture_output=True, text=True, timeout=100)
-        assert {"part": "confinement", "grade": grade, "message": message} in json.loads(told.stdout)["findings"]
-        assert told.returncode == status
+        done = subprocess.run(command, capture_output=True, text=True, timeout=100)
+        assert {"part": "confinement", "grade": grade, "message": message} in json.loads(done.stdout)["findings"]
+        assert done.returncode == status
 
     def test_also_where_who_tries_it_is_ended(self) -> None:
         command = without(LANDLOCK + 2, "-m", "robosc_server.workers.sandbox", instead=KILL)
-        told = subprocess.run(command, capture_output=True, text=True, timeout=100)
-        assert json.loads(told.stdout) == ["file access is not restricted (no Landlock): the attempt was killed"]
+        done = subprocess.run(command, capture_output=True, text=True, timeout=100)
+        assert json.loads(done.stdout) == ["file access is not restricted (no Landlock): the attempt was killed"]
 
 
 class TestTheServerItself:
@@ -271,21 +271,21 @@ class TestTheServerItself:
             "os.getuid() or os.setuid(65534)\n"
             "prctl(SET_DUMPABLE, 1)\n"  # As of a program that was started by this user.
             "def looked(pid):\n"
-            "    told, telling = os.pipe()\n"
+            "    answers, answering = os.pipe()\n"
             "    if os.fork() == 0:\n"
             "        try:\n"
             "            open(f'/proc/{pid}/environ').read(); answer = b'read'\n"
             "        except PermissionError:\n"
             "            answer = b'refused'\n"
-            "        os.write(telling, answer); os._exit(0)\n"
+            "        os.write(answering, answer); os._exit(0)\n"
             "    os.wait()\n"
-            "    return os.read(told, 100).decode()\n"
+            "    return os.read(answers, 100).decode()\n"
             "print(looked(os.getpid()))\n"
             "keep_memory_private()\n"
             "print(looked(os.getpid()))\n"
         )
-        told = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60)
-        assert told.stdout.split() == ["read", "refused"]
+        done = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True, timeout=60)
+        assert done.stdout.split() == ["read", "refused"]
 
     def test_does_so_from_its_start(self, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
         done: list[str] = []

@@ -37,11 +37,11 @@ def read(content: bytes, limits: TaskLimits = LIMITS) -> tuple[list[Report], Out
         payload = content[begin:place]
         if len(payload) < length:
             break
-        told = reader.read(tag, payload)
-        if isinstance(told, Report):
-            reports.append(told)
-        elif told is not None:
-            return reports, told
+        message = reader.read(tag, payload)
+        if isinstance(message, Report):
+            reports.append(message)
+        elif message is not None:
+            return reports, message
     return reports, None
 
 
@@ -78,12 +78,12 @@ def test_json_that_is_no_report_is_refused(value: object) -> None:
             read(frame(tag, json.dumps(value).encode()))
 
 
-def test_a_task_is_told_whole() -> None:
+def test_a_task_is_sent_whole() -> None:
     task = Task(TaskKind.VERIFY, b"\x00request", "0123", "robot\ud800.rscd")
     limits = TaskLimits(1.5, 2.5, 3, 4, 5)
-    told = task_frames(task, limits)
-    _, length = HEADER.unpack(told[: HEADER.size])
-    head, rest = told[HEADER.size :][:length], told[HEADER.size + length :]
+    frames = task_frames(task, limits)
+    _, length = HEADER.unpack(frames[: HEADER.size])
+    head, rest = frames[HEADER.size :][:length], frames[HEADER.size + length :]
     assert task_of(head, rest[HEADER.size :]) == (task, limits)
 
 
@@ -109,13 +109,13 @@ def test_countless_small_messages_are_too_large_as_well() -> None:
 
 def test_a_failure_is_cut_and_cleaned() -> None:
     said = Failure(Reason.NODE_LIMIT, "too many \ud800" + "x" * 10_000, "first" + "y" * 100_000 + "last")
-    told = read(failure_frame(said))[1]
-    assert isinstance(told, Failure)
-    assert told.reason is Reason.NODE_LIMIT
-    assert told.message.startswith("too many ?xx")
-    assert len(told.message) == 4_000
-    assert told.details.endswith("last")
-    assert len(told.details) == 60_000
+    failure = read(failure_frame(said))[1]
+    assert isinstance(failure, Failure)
+    assert failure.reason is Reason.NODE_LIMIT
+    assert failure.message.startswith("too many ?xx")
+    assert len(failure.message) == 4_000
+    assert failure.details.endswith("last")
+    assert len(failure.details) == 60_000
 
 
 @pytest.mark.parametrize("reason", [Reason.UNAUTHENTICATED, Reason.SERVER_BUSY, Reason.NO_SUCH_JOB])

@@ -22,6 +22,7 @@ from robosc.model.structure import (
     ISSUED_KINDS,
     Behaviour,
     Communication,
+    CommunicationKind,
     Component,
     Deployment,
     EventKind,
@@ -173,6 +174,25 @@ class ExecutableSystem:
     def received(self) -> tuple[str, ...]:
         """The events of the environment, in source order."""
         return tuple(event.name for event in self.events.values() if not event.is_issued)
+
+    @cached_property
+    def requests(self) -> tuple[str, ...]:
+        """The events of requests, in source order."""
+        return tuple(event.name for event in self.events.values() if event.kind is EventKind.REQUEST)
+
+    @cached_property
+    def batches(self) -> tuple[tuple[str, ...], ...]:
+        """The events of each step of the environment: messages on one identifier together, every other event alone."""
+        topics: dict[str, tuple[str, ...]] = {}
+        others: list[tuple[str, ...]] = []
+        uncontrollable = {event.name for event in self.automata.events if not event.is_controllable}
+        for event in self.events.values():
+            if event.communication and event.communication.kind is CommunicationKind.OUTGOING_MESSAGE:
+                identifier = event.communication.identifier
+                topics[identifier] = (*topics.get(identifier, ()), event.name)
+            elif event.name in uncontrollable:
+                others.append((event.name,))
+        return (*topics.values(), *others)
 
     @cached_property
     def behaviours(self) -> tuple[tuple[str, Behaviour], ...]:

@@ -278,6 +278,31 @@ class Invariant(msgspec.Struct, frozen=True, gc=False):
         return Unary("not", self.expression) if self.is_never else self.expression
 
 
+class GoalForm(StrEnum):
+    """Form of a goal or an assumption."""
+
+    ALWAYS_EVENTUALLY = "always eventually"
+    LEADS_TO = "leads to"
+    ONCE = "once"
+
+
+class Goal(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """A goal of the robot."""
+
+    form: GoalForm
+    condition: Expression
+    trigger: Expression | None = None
+
+
+class Assumption(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """An assumption about the surroundings."""
+
+    form: GoalForm
+    condition: Expression
+    trigger: Expression | None = None
+    is_allowed: bool = False
+
+
 class ObjectValue(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="object"):
     """Data given property by property; a missing property keeps the middleware's default."""
 
@@ -295,7 +320,7 @@ class Provide(msgspec.Struct, frozen=True, gc=False):
     condition: Expression | None
 
 
-class Model(msgspec.Struct, frozen=True, gc=False):
+class Model(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     """A checked robot."""
 
     name: Name
@@ -306,6 +331,8 @@ class Model(msgspec.Struct, frozen=True, gc=False):
     requirements: tuple[Requirement, ...]
     provides: tuple[Provide, ...]
     invariants: tuple[Invariant, ...]
+    goals: tuple[Goal, ...] = ()
+    assumptions: tuple[Assumption, ...] = ()
 
     def component(self, name: str) -> Component:
         """The component called `name` (KeyError if there is none)."""

@@ -59,6 +59,29 @@ class AddedCondition(msgspec.Struct, frozen=True):
     condition: DecisionDiagram
 
 
+class Choice(msgspec.Struct, frozen=True):
+    """Condition for choosing a request.
+
+    Attributes:
+        event: The request's event.
+        condition: Condition over the state and the memory of goals.
+    """
+
+    event: Annotated[str, msgspec.Meta(max_length=511)]
+    condition: DecisionDiagram
+
+
+class Strategy(msgspec.Struct, frozen=True):
+    """Choice among the requests that the supervisor enables, so that the goals of the model come true.
+
+    Attributes:
+        modes: For each goal of the model, in its order, the choices that approach it: the first whose condition is
+            true, else none. Once the goal is true, the next one in turn is approached.
+    """
+
+    modes: tuple[tuple[Choice, ...], ...]
+
+
 CheckResult = Literal["passed", "not checked"]
 
 

@@ -1,0 +1,99 @@
+"""Strategies of random robots against an explicit game, which is solved and checked another way."""
+
+from collections import Counter
+from collections.abc import Callable
+from random import Random
+from typing import Any
+
+import pytest
+
+from robosc.automata import ExecutableSystem
+from robosc.model.structure import Deployment, Model
+from robosc.strategies.arena import remembering
+from robosc.strategies.gr1 import solve
+from robosc.strategies.memory import Obligations, obligations
+from robosc.strategies.synthesize import StrategySynthesis
+from robosc.supervisor.predicates import state_predicate
+from robosc.synthesis.workspace import workspace
+from support.goal_twin import LOST, Game, Position, game_of, unfair_goal, winning_positions
+from support.random_controllers import random_controller
+from support.random_goals import with_random_goals
+
+LIMIT = 3_000
+
+
+def values_of(position: Position, model: Model, owed: Obligations) -> tuple[Any, ...]:
+    """Return a position of the explicit game as a state of the automata with their memory."""
+    (state, held), marks = position
+    memory: dict[str, bool] = {}
+    for cancel, mask in zip(owed.cancels, held, strict=True):
+        memory |= {place.name: bool(mask >> bit & 1) for bit, place in enumerate(cancel.places)}
+    names = [f"assumption {number}" for number in range(len(model.assumptions))]
+    names += [f"goal {number}" for number in range(len(model.goals))]
+    memory |= dict(zip(names, marks, strict=True))
+    return (*state, "only", *(memory[place.name] for place in owed.places))
+
+
+def next_mode(game: Game, position: Position, mode: int) -> int | None:
+    """Return the mode after those goals that are true, or None if all are."""
+    holding = game.holding(position, game.goals)
+    following = [(mode + step) % len(holding) for step in range(len(holding))]
+    return next((number for number in following if not holding[number]), None)
+
+
+def compare(seed: int, engine: str, met: Counter[str]) -> None:
+    supervisor = random_controller(seed)
+    if supervisor is None:
+        return
+    model = with_random_goals(supervisor.model, Random(seed))
+    executable = ExecutableSystem(model, Deployment.CONTROLLER)
+    game = game_of(executable, supervisor.added, LIMIT)
+    if game is None:
+        return
+    won = winning_positions(game)
+    owed = obligations(executable)
+    system = remembering(executable.executed_automata, owed.places)
+    with workspace(system, engine, lambda: False, lambda progress: None) as place:
+        synthesis = StrategySynthesis(executable, supervisor.added, owed, place)
+        false = place.encoding.manager.false
+        winning = solve(synthesis.arena, synthesis.assumptions, synthesis.goals, false=false).winning
+        for position in game.choices:
+            state = place.encoding.state(values_of(position, model, owed))
+            assert state & ~synthesis.arena.positions == false, seed
+            assert (state & winning != false) == (position in won), seed
+        strategy = synthesis.result().strategy
+    is_won = game.first != LOST and game.first in won
+    assert (strategy is not None) == is_won, seed
+    met["models"] += 1
+    met["positions"] += len(game.choices)
+    met["won" if is_won else "lost"] += 1
+    if strategy is None:
+        return
+    modes = [[(item.event, state_predicate(system, item.condition)) for item in mode] for mode in strategy.modes]
+    met["with requests"] += any(modes)
+
+    def decide(position: Position, mode: int) -> tuple[str | None, int]:
+        number = next_mode(game, position, mode)
+        if number is None:
+            return None, mode
+        values = values_of(position, model, owed)
+        return next((event for event, condition in modes[number] if condition(values)), None), number
+
+    assert unfair_goal(game, decide) is None, seed
+
+
+@pytest.mark.parametrize("first", range(0, 2_400, 400))
+def test_random_robots_agree(first: int, record_property: Callable[[str, object], None]) -> None:
+    met: Counter[str] = Counter()
+    for seed in range(first, first + 400):
+        compare(seed, "auto", met)
+    for name, count in sorted(met.items()):
+        record_property(name, count)
+    assert met["models"] > 100 and min(met["won"], met["lost"]) > 30 and met["with requests"] > 10, met
+
+
+def test_engines_agree() -> None:
+    met: Counter[str] = Counter()
+    for seed in range(120):
+        compare(seed, "autoref", met)
+    assert met["won"] > 5 and met["lost"] > 5, met

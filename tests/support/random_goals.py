@@ -1,0 +1,43 @@
+"""Random goals and assumptions for a robot that is there already."""
+
+from random import Random
+
+import msgspec
+
+from robosc.expressions import Binary, BooleanType, EnumType, EnumValue, Expression, StateTest, Unary, VariableRead
+from robosc.model.structure import Assumption, Goal, GoalForm, Model
+
+
+def with_random_goals(model: Model, dice: Random) -> Model:
+    """Return a robot with one to three goals and up to two assumptions."""
+
+    def item(kind: type[Goal] | type[Assumption], forms: list[GoalForm]) -> Goal | Assumption:
+        form = dice.choice(forms)
+        trigger = _condition(model, dice) if form is GoalForm.LEADS_TO else None
+        return kind(form, _condition(model, dice), trigger)
+
+    goals = tuple(item(Goal, list(GoalForm)) for _ in range(dice.randint(1, 3)))
+    owed = [GoalForm.ALWAYS_EVENTUALLY, GoalForm.LEADS_TO]
+    assumptions = tuple(item(Assumption, owed) for _ in range(dice.randint(0, 2)))
+    return msgspec.structs.replace(model, goals=goals, assumptions=assumptions)
+
+
+def _condition(model: Model, dice: Random) -> Expression:
+    found = _test(model, dice)
+    if dice.random() < 0.3:
+        found = Unary("not", found)
+    return Binary(dice.choice(("and", "or")), found, _test(model, dice)) if dice.random() < 0.3 else found
+
+
+def _test(model: Model, dice: Random) -> Expression:
+    component = dice.choice([item for item in model.components if item.behaviour])
+    assert component.behaviour
+    variables = [item for item in component.behaviour.variables if item.is_synthesis]
+    if variables and dice.random() < 0.3:
+        variable = dice.choice(variables)
+        read = VariableRead(component.name, variable.name)
+        if isinstance(variable.type, BooleanType):
+            return read
+        if isinstance(variable.type, EnumType):
+            return Binary("=", read, EnumValue(variable.type.name, dice.choice(variable.type.values)))
+    return StateTest(component.name, dice.choice(component.behaviour.states).name)

@@ -13,6 +13,7 @@ from functools import cached_property
 
 import msgspec
 
+from robosc.automata.goal_memory import Obligations, obligations, remembering
 from robosc.automata.lowering import cancel_condition, to_automata
 from robosc.automata.plants import PLANT_LOCATIONS, communication_plant, is_blocking
 from robosc.automata.structure import System
@@ -138,6 +139,16 @@ class ExecutableSystem:
         if all(mine is given for mine, given in zip(components, self.model.components, strict=True)):
             return self.automata
         return to_automata(msgspec.structs.replace(self.model, components=components), self.deployment)
+
+    @cached_property
+    def obligations(self) -> Obligations:
+        """The goals and assumptions of the model, with the memory that judging them needs."""
+        return obligations(self)
+
+    @cached_property
+    def remembering_automata(self) -> System:
+        """The executed automata with that memory beside them."""
+        return remembering(self.executed_automata, self.obligations.places)
 
     @cached_property
     def events(self) -> Mapping[str, ExecutableEvent]:

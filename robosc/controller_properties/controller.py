@@ -173,7 +173,7 @@ class Controller:
             if mask and mask & ~goal.holding(state):
                 target = self.after(state, goal.cancel)
                 if target is not None:
-                    yield goal.cancel, (target, self._forget(target, held))
+                    yield goal.cancel, (target, self.forgotten(target, held))
         for event in self.silent:
             target = self.after(state, event)
             # A tau that would change nothing is not taken.
@@ -229,12 +229,12 @@ class Controller:
         for event in self.requests:
             target = self.after(state, event)
             if target is not None and target != state:
-                yield (event,), True, (target, self._forget(target, held))
+                yield (event,), True, (target, self.forgotten(target, held))
         for batch in self.batches:
             for target, (events, is_whole) in sorted(
                 self._joint_targets(state, batch).items(), key=lambda item: item[0]
             ):
-                yield events, is_whole, (target, self._forget(target, held))
+                yield events, is_whole, (target, self.forgotten(target, held))
 
     def _joint_targets(self, state: State, batch: tuple[str, ...]) -> dict[State, tuple[tuple[str, ...], bool]]:
         """Return the states that the events of a batch lead to, each with the events and True if those are all."""
@@ -289,7 +289,7 @@ class Controller:
         found.pop(state, None)
         return found
 
-    def _forget(self, state: State, held: Held) -> Held:
+    def forgotten(self, state: State, held: Held) -> Held:
         """Return the remembered bits, without those of goals that do not run."""
         if not any(held):
             return held

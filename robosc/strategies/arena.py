@@ -13,10 +13,9 @@ from collections.abc import Sequence
 from typing import Any
 
 from robosc.automata import ExecutableSystem
+from robosc.automata.goal_memory import MEMORY, Cancel, Place
 from robosc.automata.state import Subject
-from robosc.automata.structure import System
 from robosc.expressions import Expression
-from robosc.strategies.memory import MEMORY, Cancel, Place, memory_automaton
 from robosc.supervisor import AddedCondition
 from robosc.synthesis.diagrams import predicate_of
 from robosc.synthesis.encoding import Encoding
@@ -24,22 +23,6 @@ from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import FixedPoint, Problem, safe_states
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.transitions import Steps, transition_of
-
-
-def remembering(system: System, places: Sequence[Place]) -> System:
-    """Return a system with a memory beside it, which no event moves."""
-    return System(
-        name=system.name,
-        events=system.events,
-        automata=(*system.automata, memory_automaton(tuple(places))),
-        inputs=system.inputs,
-        conditions=system.conditions,
-        invariants=system.invariants,
-        initial=system.initial,
-        marker=system.marker,
-        plant_conditions=system.plant_conditions,
-        plant_invariants=system.plant_invariants,
-    )
 
 
 class ControllerArena:

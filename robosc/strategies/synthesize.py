@@ -9,9 +9,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from robosc.automata import ExecutableSystem
-from robosc.strategies.arena import ControllerArena, remembering
+from robosc.strategies.arena import ControllerArena
 from robosc.strategies.gr1 import Solution, solve
-from robosc.strategies.memory import Obligations, obligations
 from robosc.supervisor import AddedCondition, Choice, Strategy
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.engines import EngineOptions
@@ -62,18 +61,15 @@ def synthesize_strategy(
         UnknownEngineError: There is no such engine.
         UnsupportedModelError: A condition would be too large.
     """
-    owed = obligations(executable)
-    system = remembering(executable.executed_automata, owed.places)
-    with workspace(system, engine, should_stop, on_progress) as place:
-        return StrategySynthesis(executable, added, owed, place).result()
+    with workspace(executable.remembering_automata, engine, should_stop, on_progress) as place:
+        return StrategySynthesis(executable, added, place).result()
 
 
 class StrategySynthesis:
     """One synthesis: its manager is its own."""
 
-    def __init__(
-        self, executable: ExecutableSystem, added: Sequence[AddedCondition], owed: Obligations, place: Workspace
-    ) -> None:
+    def __init__(self, executable: ExecutableSystem, added: Sequence[AddedCondition], place: Workspace) -> None:
+        owed = executable.obligations
         self._encoding = place.encoding
         self._manager = place.encoding.manager
         self._monitor: ProgressMonitor = place.monitor

@@ -1,18 +1,19 @@
 """Strategies of random robots against an explicit game, which is solved and checked another way."""
 
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from random import Random
 from typing import Any
 
 import pytest
 
 from robosc.automata import ExecutableSystem
+from robosc.automata.goal_memory import Obligations
+from robosc.controller_properties.goals import check_strategy
 from robosc.model.structure import Deployment, Model
-from robosc.strategies.arena import remembering
 from robosc.strategies.gr1 import solve
-from robosc.strategies.memory import Obligations, obligations
 from robosc.strategies.synthesize import StrategySynthesis
+from robosc.supervisor import Strategy
 from robosc.supervisor.predicates import state_predicate
 from robosc.synthesis.workspace import workspace
 from support.goal_twin import LOST, Game, Position, game_of, unfair_goal, winning_positions
@@ -51,10 +52,9 @@ def compare(seed: int, engine: str, met: Counter[str]) -> None:
     if game is None:
         return
     won = winning_positions(game)
-    owed = obligations(executable)
-    system = remembering(executable.executed_automata, owed.places)
+    owed, system = executable.obligations, executable.remembering_automata
     with workspace(system, engine, lambda: False, lambda progress: None) as place:
-        synthesis = StrategySynthesis(executable, supervisor.added, owed, place)
+        synthesis = StrategySynthesis(executable, supervisor.added, place)
         false = place.encoding.manager.false
         winning = solve(synthesis.arena, synthesis.assumptions, synthesis.goals, false=false).winning
         for position in game.choices:
@@ -71,6 +71,8 @@ def compare(seed: int, engine: str, met: Counter[str]) -> None:
         return
     modes = [[(item.event, state_predicate(system, item.condition)) for item in mode] for mode in strategy.modes]
     met["with requests"] += any(modes)
+    check = check_strategy(executable, supervisor.added, strategy)
+    assert check.result == "passed", (seed, check)
 
     def decide(position: Position, mode: int) -> tuple[str | None, int]:
         number = next_mode(game, position, mode)
@@ -80,6 +82,29 @@ def compare(seed: int, engine: str, met: Counter[str]) -> None:
         return next((event for event, condition in modes[number] if condition(values)), None), number
 
     assert unfair_goal(game, decide) is None, seed
+    # A strategy that was damaged is judged alike: some requests are forgotten, or chosen for another goal.
+    dice = Random(seed)
+    kept = [[item for item in mode if dice.random() < 0.6] for mode in strategy.modes]
+    dice.shuffle(kept)
+    damaged = Strategy(tuple(map(tuple, kept)))
+    if damaged == strategy:
+        return
+    modes = [[(item.event, state_predicate(system, item.condition)) for item in mode] for mode in damaged.modes]
+    enabled = all(request in game.choices[position] for position, request in _chosen(game, decide))
+    if enabled:
+        is_missed = unfair_goal(game, decide) is not None
+        found = check_strategy(executable, supervisor.added, damaged)
+        assert found.result == ("failed" if is_missed else "passed"), seed
+        met["damaged, missed" if is_missed else "damaged, still reached"] += 1
+
+
+def _chosen(game: Game, decide: Callable[[Position, int], tuple[str | None, int]]) -> Iterator[tuple[Position, str]]:
+    """Yield every request that may be chosen somewhere, with the position."""
+    for position in game.choices:
+        for mode in range(len(game.goals)):
+            request, _ = decide(position, mode)
+            if request is not None:
+                yield position, request
 
 
 @pytest.mark.parametrize("first", range(0, 2_400, 400))

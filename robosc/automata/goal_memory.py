@@ -4,13 +4,16 @@ Each place of it is a truth value. In every stable state it becomes a function o
 executor and the game observe it at the same moments.
 """
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
-from robosc.automata import ExecutableSystem
-from robosc.automata.structure import Automaton, DiscreteVariable
+from robosc.automata.structure import Automaton, DiscreteVariable, System
 from robosc.expressions import TRUE, Binary, BooleanType, Expression, StateTest, Unary, VariableRead
 from robosc.model.structure import Assumption, EventKind, Goal, GoalForm
+
+if TYPE_CHECKING:
+    from robosc.automata.executable import ExecutableSystem
 
 MEMORY = "goal memory"
 """Name of the automaton whose variables are the memory: no component can be called so."""
@@ -99,7 +102,7 @@ class Cancel:
         return self.running if fallen is None else Binary("and", self.running, fallen)
 
 
-def own_cancels(executable: ExecutableSystem) -> Iterator[Cancel]:
+def own_cancels(executable: "ExecutableSystem") -> Iterator[Cancel]:
     """Yield the cancels that the executor may issue, in its order."""
     for event in executable.events.values():
         if event.kind is not EventKind.CANCEL or not event.moves or not event.communication:
@@ -121,10 +124,11 @@ def _held(name: str, running: Expression, condition: Expression) -> Place:
     return Place(name, Binary("and", running, Binary("or", VariableRead(MEMORY, name), condition)))
 
 
-def memory_automaton(places: tuple[Place, ...]) -> Automaton:
-    """Return the automaton whose variables are the memory; no event moves it."""
+def remembering(system: System, places: Sequence[Place]) -> System:
+    """Return a system with a memory beside it, which no event moves."""
     variables = tuple(DiscreteVariable(place.name, BooleanType(), (False,)) for place in places)
-    return Automaton(MEMORY, ("only",), ("only",), frozenset({"only"}), frozenset(), (), variables)
+    memory = Automaton(MEMORY, ("only",), ("only",), frozenset({"only"}), frozenset(), (), variables)
+    return replace(system, automata=(*system.automata, memory))
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +148,7 @@ class Obligations:
     places: tuple[Place, ...]
 
 
-def obligations(executable: ExecutableSystem) -> Obligations:
+def obligations(executable: "ExecutableSystem") -> Obligations:
     """Return the goals and assumptions of an executable system's model."""
     cancels = tuple(own_cancels(executable))
     model = executable.model

@@ -114,8 +114,8 @@ def own_cancels(executable: "ExecutableSystem") -> Iterator[Cancel]:
         running = StateTest(event.moves.plant, location)
         conditions = tuple(holds(item.condition) for item in requirements)
         places = tuple(
-            _held(f"{event.communication.name} {number}", running, condition)
-            for number, condition in enumerate(conditions)
+            _held(f"{event.communication.name} requirement {number}", running, condition)
+            for number, condition in enumerate(conditions, start=1)
         )
         yield Cancel(event.name, running, places, conditions)
 
@@ -152,8 +152,8 @@ def obligations(executable: "ExecutableSystem") -> Obligations:
     """Return the goals and assumptions of an executable system's model."""
     cancels = tuple(own_cancels(executable))
     model = executable.model
-    owed = [judgement(item, f"assumption {number}") for number, item in enumerate(model.assumptions)]
-    wanted = [judgement(item, f"goal {number}") for number, item in enumerate(model.goals)]
+    owed = [judgement(item, f"assumption {number}") for number, item in enumerate(model.assumptions, start=1)]
+    wanted = [judgement(item, f"goal {number}") for number, item in enumerate(model.goals, start=1)]
     judged = (item.place for item in (*owed, *wanted))
     return Obligations(
         tuple(item.condition for item in wanted),

@@ -152,8 +152,8 @@ class _Search:
     """Positions under a strategy, with the moves between them.
 
     Attributes:
-        moves: Where moves of the surroundings lead from each position.
-        turns: Where the controller's turn leads.
+        moves: Targets of the surroundings' moves from each position.
+        turns: Target of the controller's turn in each position.
         lost: A run that ends in silent steps without end or a request that is not enabled, or None.
     """
 

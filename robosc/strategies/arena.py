@@ -146,6 +146,22 @@ class ControllerArena:
         found = self.positions & self._enabled(event) & steps.some(arriving)
         return found if steps.is_deterministic else found & steps.only(arriving)
 
+    def together(self, predicate: Any) -> Any:
+        """Return the positions from which a move of either side can lead into a predicate."""
+        arriving = self.arriving(predicate)
+        found = self.turn(predicate)
+        for batch in self._batches:
+            inside = arriving
+            for steps in reversed(batch):
+                self._monitor.check_stop()
+                inside = inside | steps.some(inside)
+            found = found | (self.positions & inside)
+        return found
+
+    def can_begin(self, predicate: Any) -> bool:
+        """Return True if the first position of the executor is in a predicate, wherever the system begins."""
+        return bool(self.start & ~self.arriving(predicate) == self._manager.false)
+
     @property
     def start(self) -> Any:
         """The initial states; they may not be stable."""

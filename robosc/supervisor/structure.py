@@ -119,6 +119,7 @@ class Certificate(msgspec.Struct, frozen=True, omit_defaults=True):
         states: Reachable states of the controlled system, exact.
         transitions: Transitions between them, or None where they were not counted.
         controller: Properties of the controller, or None where nobody asked.
+        goals: Under the strategy every goal comes true while the assumptions do; None where there is no strategy.
     """
 
     engine_version: str
@@ -132,9 +133,10 @@ class Certificate(msgspec.Struct, frozen=True, omit_defaults=True):
     states: str
     transitions: str | None
     controller: ControllerProperties | None = None
+    goals: CheckResult | None = None
 
 
-class Supervisor(msgspec.Struct, frozen=True, dict=True):
+class Supervisor(msgspec.Struct, frozen=True, dict=True, omit_defaults=True):
     """A synthesized supervisor.
 
     Attributes:
@@ -142,17 +144,25 @@ class Supervisor(msgspec.Struct, frozen=True, dict=True):
         deployment: Deployment that it was synthesized for.
         added: The conditions that synthesis adds, in source order of their events.
         certificate: Record of what was checked.
+        strategy: Strategy that reaches the model's goals; None where it has none, and in a layer.
     """
 
     model: Model
     deployment: Deployment
     added: tuple[AddedCondition, ...]
     certificate: Certificate
+    strategy: Strategy | None = None
 
     @classmethod
-    def supervising(cls, system: ExecutableSystem, added: tuple[AddedCondition, ...], certificate: Certificate) -> Self:
+    def supervising(
+        cls,
+        system: ExecutableSystem,
+        added: tuple[AddedCondition, ...],
+        certificate: Certificate,
+        strategy: Strategy | None = None,
+    ) -> Self:
         """The supervisor of a system that is built already."""
-        made = cls(system.model, system.deployment, added, certificate)
+        made = cls(system.model, system.deployment, added, certificate, strategy)
         # No field: a supervisor's file does not hold it.
         made.__dict__["executable"] = system
         return made

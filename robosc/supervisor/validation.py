@@ -34,6 +34,7 @@ from robosc.model.structure import (
     Communication,
     CommunicationKind,
     Component,
+    Deployment,
     EnumDefinition,
     EventKind,
     Model,
@@ -109,6 +110,7 @@ def validate(supervisor: Supervisor) -> None:
             raise InvalidSupervisorError("the certificate is for another deployment than the supervisor")
         if supervisor.added:
             validate_added(supervisor.added, supervisor.executable.automata)
+        _validate_strategy(supervisor)
 
 
 @contextmanager
@@ -475,6 +477,32 @@ def _validate_certificate(certificate: Certificate) -> None:
         raise InvalidSupervisorError("certificate: the number of states is not a positive decimal number")
     if certificate.transitions is not None and not _COUNT.match(certificate.transitions):
         raise InvalidSupervisorError("certificate: the number of transitions is not a decimal number")
+
+
+def _validate_strategy(supervisor: Supervisor) -> None:
+    """Check that a strategy is there exactly where a controller has goals, and that it chooses among requests."""
+    strategy, goals = supervisor.strategy, supervisor.model.goals
+    is_needed = bool(goals) and supervisor.deployment is Deployment.CONTROLLER
+    if (strategy is not None) is not is_needed:
+        raise InvalidSupervisorError("a strategy belongs to a controller with goals, and to no other supervisor")
+    if (supervisor.certificate.goals is not None) is not is_needed:
+        raise InvalidSupervisorError("the certificate speaks of goals exactly where there is a strategy")
+    if strategy is None:
+        return
+    if len(strategy.modes) != len(goals):
+        raise InvalidSupervisorError("the strategy has not one mode for each goal")
+    requests = set(supervisor.executable.requests)
+    domains = diagram_domains(supervisor.executable.remembering_automata)
+    for number, mode in enumerate(strategy.modes, start=1):
+        seen: set[str] = set()
+        for item in mode:
+            with _at(f"mode {number} of the strategy"):
+                if item.event not in requests:
+                    raise InvalidSupervisorError(f"there is no request {item.event[:80]!a}")
+                if item.event in seen:
+                    raise InvalidSupervisorError(f"{item.event} stands twice")
+                seen.add(item.event)
+                validate_condition(item.condition, domains)
 
 
 def validate_added(added: Iterable[AddedCondition], system: System) -> None:

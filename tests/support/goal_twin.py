@@ -7,7 +7,7 @@ Computer Science 200(1-2), 1998, pp. 135-183.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from robosc.automata import ExecutableSystem
@@ -49,6 +49,10 @@ def _is_true(function: Function) -> Callable[[Any], bool]:
     return lambda state: function(state, NO_DATA) is True
 
 
+NEVER = _Item(GoalForm.ALWAYS_EVENTUALLY, lambda state: False, lambda state: False)
+"""A goal that is never true."""
+
+
 @dataclass
 class Game:
     """The explicit game of a controller.
@@ -64,6 +68,29 @@ class Game:
     successors: dict[Position, set[Any]] = field(default_factory=dict)
     choices: dict[Position, dict[str, Any]] = field(default_factory=dict)
     first: Any = None
+    asked: tuple[list[_Item], list[_Item]] | None = None
+
+    def asking(self, assumptions: list[_Item], goals: list[_Item]) -> "Game":
+        """Return the same game about other assumptions and goals, of those that it keeps account of."""
+        return replace(self, asked=(assumptions, goals))
+
+    def holds(self, position: Position, item: _Item) -> bool:
+        """Return True if an assumption or a goal counts as come true in a position."""
+        (state, _), marks = position
+        place = next((place for place, kept in enumerate((*self.assumptions, *self.goals)) if kept is item), None)
+        return item.holds(place is not None and marks[place], state)
+
+    def can_meet_again_and_again(self, goals: Iterable[int]) -> bool:
+        """Return True if both sides together can make goals true again and again."""
+        following = {
+            position: {*self.successors[position], *self.choices[position].values(), position} - {LOST}
+            for position in self.choices
+        }
+        # Each position can be waited in: a turn at which a goal is true is a turn in its component.
+        return any(
+            all(any(self.holds(position, self.goals[item]) for position in component) for item in goals)
+            for component in _components(list(following), following.__getitem__)
+        )
 
     def holding(self, position: Position, items: list[_Item]) -> tuple[bool, ...]:
         (state, _), marks = position
@@ -151,7 +178,8 @@ def _vertices(game: Game) -> tuple[dict[Any, set[Any]], dict[Any, int], dict[Any
 def _counted(game: Game, position: Position, owed: int, wanted: int) -> tuple[int, int, int]:
     """Return the two counters after a turn, and the priority of it."""
     priority = 0
-    assumptions, goals = game.holding(position, game.assumptions), game.holding(position, game.goals)
+    wanting = game.asked or (game.assumptions, game.goals)
+    assumptions, goals = (tuple(game.holds(position, item) for item in items) for items in wanting)
     # One more assumption, that there are turns at all, is true at each.
     if (*assumptions, True)[owed]:
         owed = (owed + 1) % (len(assumptions) + 1)

@@ -17,9 +17,19 @@ def with_random_goals(model: Model, dice: Random) -> Model:
         return kind(form, _condition(model, dice), trigger)
 
     goals = tuple(item(Goal, list(GoalForm)) for _ in range(dice.randint(1, 3)))
+    if dice.random() < 0.5:
+        # What has to be in one state again and again, and in another one, must move.
+        goals = _rounds(model, dice)
     owed = [GoalForm.ALWAYS_EVENTUALLY, GoalForm.LEADS_TO]
     assumptions = tuple(item(Assumption, owed) for _ in range(dice.randint(0, 2)))
     return msgspec.structs.replace(model, goals=goals, assumptions=assumptions)
+
+
+def _rounds(model: Model, dice: Random) -> tuple[Goal, ...]:
+    component = dice.choice([item for item in model.components if item.behaviour])
+    assert component.behaviour
+    states = dice.sample([state.name for state in component.behaviour.states], 2)
+    return tuple(Goal(GoalForm.ALWAYS_EVENTUALLY, StateTest(component.name, state)) for state in states)
 
 
 def _condition(model: Model, dice: Random) -> Expression:

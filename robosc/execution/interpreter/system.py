@@ -7,6 +7,7 @@ from typing import Any
 from robosc.automata.plants import communication_plant_name
 from robosc.execution.interpreter.description import describe
 from robosc.execution.interpreter.functions import Data, Place, function_of, holds, no_data
+from robosc.execution.interpreter.goals import GoalsOfSystem
 from robosc.execution.interpreter.received import Reader
 from robosc.execution.interpreter.rules import (
     EventRule,
@@ -15,6 +16,7 @@ from robosc.execution.interpreter.rules import (
     WhenRule,
     event_rules,
     initial_state,
+    place_domains,
     provided_function,
 )
 from robosc.execution.runtime.protocol import MATCHES, Match, Reading, batches, requesting
@@ -83,11 +85,16 @@ class InterpretedSystem:
         self.changes = 0
         self._request_events = tuple(info.name + ".request" for info in requesting(self.description.communications))
         self._batches = batches(self.description.communications)
+        self._goals = None
+        if supervisor.strategy is not None:
+            self._goals = GoalsOfSystem(model, supervisor.strategy, self._request_events, place_domains(model))
 
     def restart(self) -> None:
         """Back to the initial state."""
         self.changes += 1
         self._state = self._initial
+        if self._goals is not None:
+            self._goals.restart()
 
     def enabled(self, event: str) -> bool:
         """Return True if a controllable event is allowed now (KeyError if there is no such event)."""
@@ -178,6 +185,15 @@ class InterpretedSystem:
     def location(self, communication: str) -> str:
         """Location of a communication's plant (KeyError if there is no such service or action)."""
         return str(self._state[communication_plant_name(self._model.communication(communication)), None])
+
+    def observe(self) -> None:
+        """Take in a stable state, for what the strategy remembers."""
+        if self._goals is not None:
+            self._goals.observe(self._state)
+
+    def choose(self) -> int | None:
+        """Number of the request that the strategy chooses in this stable state, or None if it waits."""
+        return None if self._goals is None else self._goals.choose(self._state)
 
     def state(self) -> dict[str, dict[str, Any]]:
         """State and variables of every component with a behaviour."""

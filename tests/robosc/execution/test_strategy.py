@@ -11,6 +11,7 @@ from robosc.automata.state import subjects
 from robosc.controller_properties import StrategyRun
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.settings import Settings, SettingsError
+from robosc.expressions import Value
 from robosc.model.structure import Deployment
 from robosc.strategies import synthesize_strategy
 from robosc.supervisor import Supervisor
@@ -46,7 +47,7 @@ def walk(supervisor: Supervisor, dice: Random, met: Counter[str]) -> None:
         ((item.automaton, item.variable), system.automaton(item.automaton).locations[0]) for item in subjects(system)
     ]
 
-    def state() -> tuple[object, ...]:
+    def state() -> tuple[Value, ...]:
         return tuple(world.system._state.get(place, only) for place, only in places)
 
     memory, mode = run.observed(state(), run.memory), 0

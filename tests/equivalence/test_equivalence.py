@@ -1,5 +1,6 @@
 """Every target does what the reference executor does: the same runs, compared step by step."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 from random import Random
@@ -26,6 +27,7 @@ from support.equivalence.worlds import WORLDS, live, robot_supervisor
 from support.generated import load_module, loaded_file
 from support.models import model_of
 from support.random_controllers import random_controller, random_robot
+from support.random_goals import strategic_controller
 from support.random_supervisors import CERTIFICATE, random_supervisor
 
 ROBOTS = sorted(WORLDS)
@@ -120,6 +122,23 @@ def test_random_robots_in_c(tmp_path_factory: pytest.TempPathFactory, seed: int)
     except UnsupportedModelError:
         return  # The random models hold what C cannot keep, too: received texts.
     compare(target, scenario, observe(supervisor, scenario))
+
+
+def _strategic(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
+    """Yield random robots whose strategies choose requests, with a run of each under its strategy."""
+    for seed in range(first, first + 500):
+        supervisor = strategic_controller(seed)
+        if supervisor is not None and supervisor.strategy and any(supervisor.strategy.modes):
+            yield supervisor, random_scenario(supervisor, seed, 80)
+
+
+def test_strategies_in_python() -> None:
+    requests = 0
+    for supervisor, scenario in _strategic(0):
+        expected = observe(supervisor, scenario)
+        compare(generated_python(supervisor, load_module(supervisor)), scenario, expected)
+        requests += sum(len(item.issued) for item in expected)
+    assert requests > 50
 
 
 TWO_WHEELS = """robot TwoWheels {

@@ -4,8 +4,31 @@ from random import Random
 
 import msgspec
 
+from robosc.automata import ExecutableSystem
 from robosc.expressions import Binary, BooleanType, EnumType, EnumValue, Expression, StateTest, Unary, VariableRead
-from robosc.model.structure import Assumption, Goal, GoalForm, Model
+from robosc.model.structure import Assumption, Deployment, Goal, GoalForm, Model
+from robosc.strategies import synthesize_strategy
+from robosc.supervisor import Supervisor
+from support.random_controllers import random_controller
+
+
+def strategic_controller(seed: int) -> Supervisor | None:
+    """Return the supervisor of a random robot with goals that can be reached, or None if they cannot.
+
+    It may keep its assumptions from coming true.
+    """
+    supervisor = random_controller(seed)
+    if supervisor is None:
+        return None
+    model = with_random_goals(supervisor.model, Random(seed))
+    allowed = tuple(msgspec.structs.replace(item, is_allowed=True) for item in model.assumptions)
+    model = msgspec.structs.replace(model, assumptions=allowed)
+    executable = ExecutableSystem(model, Deployment.CONTROLLER)
+    strategy = synthesize_strategy(executable, supervisor.added).strategy
+    if strategy is None:
+        return None
+    certificate = msgspec.structs.replace(supervisor.certificate, goals="not checked")
+    return msgspec.structs.replace(supervisor, model=model, strategy=strategy, certificate=certificate)
 
 
 def with_random_goals(model: Model, dice: Random) -> Model:

@@ -58,10 +58,11 @@ class Diagrams(ABC):
 
     def added(self, diagram: DecisionDiagram) -> Condition:
         """Return a condition of the supervisor: a formula where it is short, else functions that share nodes."""
-        words, code = self._diagram(diagram)
+        words, code = self.described(diagram)
         return f"added by the supervisor: {words}", code
 
-    def _diagram(self, diagram: DecisionDiagram) -> Condition:
+    def described(self, diagram: DecisionDiagram) -> Condition:
+        """Return a condition over the state with its formula, or with its size where that is not short."""
         expression = self._formulas.formula(diagram)
         if expression is not None:
             return in_words(expression, self._names), self._scope.truth(expression)

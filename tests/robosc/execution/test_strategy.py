@@ -3,35 +3,18 @@
 from collections import Counter
 from random import Random
 
-import msgspec
 import pytest
 
-from robosc.automata import ExecutableSystem
 from robosc.automata.state import subjects
 from robosc.controller_properties import StrategyRun
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.settings import Settings, SettingsError
 from robosc.expressions import Value
-from robosc.model.structure import Deployment
-from robosc.strategies import synthesize_strategy
 from robosc.supervisor import Supervisor
 from support.controller_twin import World
 from support.execution import Bench
-from support.random_controllers import random_controller, random_robot
-from support.random_goals import with_random_goals
-
-
-def strategic(seed: int) -> Supervisor | None:
-    """Return the supervisor of a random robot with goals that can be reached, or None."""
-    supervisor = random_controller(seed)
-    if supervisor is None:
-        return None
-    model = with_random_goals(supervisor.model, Random(seed))
-    allowed = tuple(msgspec.structs.replace(item, is_allowed=True) for item in model.assumptions)
-    model = msgspec.structs.replace(model, assumptions=allowed)
-    executable = ExecutableSystem(model, Deployment.CONTROLLER)
-    strategy = synthesize_strategy(executable, supervisor.added).strategy
-    return strategy and msgspec.structs.replace(supervisor, model=model, strategy=strategy)
+from support.random_controllers import random_robot
+from support.random_goals import strategic_controller
 
 
 def walk(supervisor: Supervisor, dice: Random, met: Counter[str]) -> None:
@@ -77,7 +60,7 @@ def walk(supervisor: Supervisor, dice: Random, met: Counter[str]) -> None:
 def test_the_executor_issues_what_the_strategy_chooses() -> None:
     met: Counter[str] = Counter()
     for seed in range(1_500):
-        supervisor = strategic(seed)
+        supervisor = strategic_controller(seed)
         if supervisor is not None:
             walk(supervisor, Random(seed), met)
             met["robots"] += 1
@@ -92,5 +75,5 @@ def test_a_strategy_that_is_not_there_is_refused() -> None:
 
 
 def test_another_policy_may_be_used_all_the_same() -> None:
-    supervisor = next(found for seed in range(700) if (found := strategic(seed)) is not None)
+    supervisor = next(found for seed in range(700) if (found := strategic_controller(seed)) is not None)
     assert Bench(InterpretedSystem(supervisor), policy="fair").executor.settings.policy == "fair"

@@ -141,6 +141,18 @@ def test_strategies_in_python() -> None:
     assert requests > 50
 
 
+@needs_gcc
+def test_strategies_in_c(tmp_path: Path) -> None:
+    requests = 0
+    for number, (supervisor, scenario) in enumerate(_strategic(500)):
+        expected = observe(supervisor, scenario)
+        # Some with sanitizers, which take the compiler three times as long.
+        options = () if number % 4 == 0 else ("-O0",)
+        compare(C99Target(supervisor, tmp_path / str(number), *options), scenario, expected)
+        requests += sum(len(item.issued) for item in expected)
+    assert requests > 30
+
+
 TWO_WHEELS = """robot TwoWheels {
     interface twist use Vector3 from geometry_msgs
     datatype object Speed { x: double }

@@ -16,7 +16,7 @@ from robosc.execution.runtime.decision import AnyRequest
 from robosc.execution.runtime.executor import Executor
 from robosc.execution.runtime.protocol import DataDoesNotFit
 from robosc.execution.runtime.runner import Status
-from robosc.execution.runtime.settings import Settings
+from robosc.execution.runtime.settings import POLICIES, Settings
 from robosc.expressions import (
     ArrayType,
     BooleanType,
@@ -405,7 +405,7 @@ class Reference:
 def settings_words(layout: Layout, settings: Settings) -> list[object]:
     """The command that makes generated code begin with settings, which are spelled out."""
     numbers = {name: number for number, name in enumerate(layout.communications)}
-    words: list[object] = ["n", ("fair", "priority", "random").index(settings.policy), len(settings.priority)]
+    words: list[object] = ["n", POLICIES.index(settings.policy or "fair"), len(settings.priority)]
     words += [numbers[name] for name in settings.priority]
     words += [settings.seed, int(settings.every == "event")]
     words += [("default", "keep", "fault").index(settings.on_unknown)]

@@ -83,7 +83,7 @@ def make_kernel(folder: Path, module: Path) -> str:
     command = [compiler, *_OPTIONS, defined, f"-I{include}", *sources, "-o", str(unfinished)]
     done = subprocess.run(command, capture_output=True, text=True, check=False)
     if done.returncode:
-        said = done.stderr.strip().splitlines() or ["no reason is told"]
+        said = done.stderr.strip().splitlines() or ["it gives no reason"]
         return f"{compiler} refuses it: {next((line for line in said if 'error' in line), said[0])}"
     unfinished.replace(module)
     return ""

@@ -11,8 +11,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.sax.saxutils import escape
 
+from robosc_bridge.assembly import EXCHANGE_S
 from robosc_bridge.configuration.structure import Execution
-from robosc_bridge.daemon.assembly import EXCHANGE_S
 
 PICTURE = Path(__file__).parents[1] / "docs" / "pictures" / "scan-to-wheel.svg"
 
@@ -60,7 +60,7 @@ HOPS = (
     Hop(LOOP, "robosc_bridge.daemon.loop:Daemon.cycle", "woken by the inbox"),
     Hop(LOOP, "robosc_bridge.safety.layer:SafetyLayer.loop_cycled", "the loop is at work"),
     Hop(LOOP, "robosc_bridge.daemon.robot.adapter:RobotAdapter.on_scan", "for all that is mapped to scanner"),
-    Hop(LOOP, "robosc_bridge.daemon.robot.channel_data:scan_data", "as sensor_msgs/LaserScan"),
+    Hop(LOOP, "robosc_bridge.daemon.channel_data:scan_data", "as sensor_msgs/LaserScan"),
     Hop(LOOP, "robosc.execution.runtime.runner:Runner.receive", "an event of the model: its state is another"),
     Hop(
         LOOP,

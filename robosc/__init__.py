@@ -46,7 +46,7 @@ if TYPE_CHECKING:
     from robosc.pipeline.findings import Findings
     from robosc.pipeline.generating import generate
     from robosc.pipeline.loading import LoadedAutomata, LoadedModel, load
-    from robosc.pipeline.manual_run import EventNotPossibleError, Step, UnknownEventError
+    from robosc.pipeline.manual_run import EventNotPossibleError, UnknownEventError
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.received_data import DataError
     from robosc.pipeline.results import (
@@ -60,12 +60,13 @@ if TYPE_CHECKING:
         VerificationStatus,
     )
     from robosc.pipeline.simulation import Run, simulate
+    from robosc.pipeline.steps import Step
     from robosc.pipeline.supervisors import Supervisor
     from robosc.pipeline.synthesis import Synthesis, synthesize
     from robosc.pipeline.system_runs import ChoiceError, SystemRun
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
     from robosc.pipeline.verifying import verify
-    from robosc.pipeline.walking import Trouble, TroubleKind
+    from robosc.pipeline.walking import WalkFinding, WalkFindingKind
     from robosc.synthesis import UnknownEngineError
     from robosc.targets import GenerateOptions, OverwriteError, UnknownTargetError
 
@@ -99,7 +100,7 @@ _HOMES = {
     "RoboscError": "errors",
     "Run": "pipeline.simulation",
     "Severity": "errors",
-    "Step": "pipeline.manual_run",
+    "Step": "pipeline.steps",
     "Summary": "pipeline.results",
     "Supervisor": "pipeline.supervisors",
     "Synthesis": "pipeline.synthesis",
@@ -109,8 +110,6 @@ _HOMES = {
     "SystemRun": "pipeline.system_runs",
     "SystemSupervisor": "pipeline.systems",
     "SystemSynthesis": "pipeline.systems",
-    "Trouble": "pipeline.walking",
-    "TroubleKind": "pipeline.walking",
     "UnknownCodeError": "diagnostics",
     "UnknownEngineError": "synthesis",
     "UnknownEventError": "pipeline.manual_run",
@@ -119,6 +118,8 @@ _HOMES = {
     "UnsupportedModelError": "errors",
     "Verification": "pipeline.results",
     "VerificationStatus": "pipeline.results",
+    "WalkFinding": "pipeline.walking",
+    "WalkFindingKind": "pipeline.walking",
     "check": "pipeline.checking",
     "explain": "pipeline.explaining",
     "explore": "pipeline.exploring",
@@ -169,8 +170,6 @@ __all__ = [
     "SystemRun",
     "SystemSupervisor",
     "SystemSynthesis",
-    "Trouble",
-    "TroubleKind",
     "UnknownCodeError",
     "UnknownEngineError",
     "UnknownEventError",
@@ -179,6 +178,8 @@ __all__ = [
     "UnsupportedModelError",
     "Verification",
     "VerificationStatus",
+    "WalkFinding",
+    "WalkFindingKind",
     "__version__",
     "check",
     "explain",

@@ -1,4 +1,4 @@
-"""Puts small faults into the code, one at a time, and tells which of them the tests find.
+"""Puts small faults into the code, one at a time, and prints which of them the tests find.
 
     python soak/faults.py --number 50 --seed 1
     python soak/faults.py --number 0 --only bridge/robosc_bridge/safety
@@ -188,11 +188,11 @@ class Trial:
             start_new_session=True,
         )
         try:
-            told, _ = program.communicate(timeout=LIMIT_S)
+            output, _ = program.communicate(timeout=LIMIT_S)
         except subprocess.TimeoutExpired:
             os.killpg(program.pid, signal.SIGKILL)
             return 1, "FAILED (the tests hung)"
-        return program.returncode, told
+        return program.returncode, output
 
     def reach(self, mutants: Sequence[Mutant]) -> tuple[int, str, dict[tuple[str, str], set[str]]]:
         """Run all tests; return pytest's exit status, what it printed, and the tests that enter each function."""
@@ -204,13 +204,13 @@ class Trial:
         given = {"FUNCTIONS": json.dumps(functions), "ROOT": f"{self.copy}/", "NOTES": str(notes)}
         values = "".join(f"{name} = {value!r}\n" for name, value in given.items())
         (site / "sitecustomize.py").write_text(values + NOTING)
-        status, told = self.run(self.tests, site=site)
+        status, output = self.run(self.tests, site=site)
         reached: dict[tuple[str, str], set[str]] = {function: set() for function in functions}
         for file in notes.iterdir():
             for line in file.read_text().splitlines():
                 test, path, name = json.loads(line)
                 reached[path, name].add(test)
-        return status, told, reached
+        return status, output, reached
 
     def finds(self, mutant: Mutant, tests: set[str]) -> str:
         """Return the test that finds a change, or an empty text."""
@@ -221,12 +221,12 @@ class Trial:
             ordered = sorted(tests)
             random.Random(0).shuffle(ordered)
             for part in (ordered[:FIRST], ordered[FIRST:]):
-                status, told = self.run(part, ["-x"]) if part else (0, "")
+                status, output = self.run(part, ["-x"]) if part else (0, "")
                 if status == USAGE_ERROR:
-                    raise RuntimeError(f"pytest does not take the tests that it has run before:\n{told}")
+                    raise RuntimeError(f"pytest does not take the tests that it has run before:\n{output}")
                 if status not in {0, NO_TESTS}:
-                    failed = [line for line in told.splitlines() if line.startswith(("FAILED", "ERROR"))]
-                    return failed[0] if failed else (told.splitlines() or ["ended"])[-1]
+                    failed = [line for line in output.splitlines() if line.startswith(("FAILED", "ERROR"))]
+                    return failed[0] if failed else (output.splitlines() or ["ended"])[-1]
         finally:
             file.write_text(whole)
         return ""
@@ -265,8 +265,8 @@ def main(words: Sequence[str] | None = None) -> int:
     mutants = [mutant for mutant in mutants if (root / mutant.file).read_text().count(mutant.before) == 1]
 
     trial = Trial(root, choice.tests, choice.workers, choice.python)
-    status, told, reached = trial.reach(mutants)
-    print("\n".join(told.splitlines()[-20:]), file=sys.stderr)
+    status, output, reached = trial.reach(mutants)
+    print("\n".join(output.splitlines()[-20:]), file=sys.stderr)
     if status:
         print("Tests fail without a change: fix them first.", file=sys.stderr)
         return 2

@@ -42,7 +42,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--seed", type=int, default=0, help="seed of what is tried: the same tries the same (default: 0)"
     )
     parser.add_argument("--failures", type=Path, default=Path("out/fuzz"), metavar="DIR", help="folder for failures")
-    parser.add_argument("--replay", type=Path, metavar="FILE", help="run one saved input and tell what happens")
+    parser.add_argument("--replay", type=Path, metavar="FILE", help="run one saved input and print what happens")
     arguments = parser.parse_args(argv)
     if arguments.minutes <= 0:
         parser.error("--minutes takes a number above 0")
@@ -71,7 +71,7 @@ class Fuzzer:
     def run(self, seconds: float) -> int:
         """Try inputs for some time; 0 if nothing failed."""
         child = Child()
-        begin = told = time.monotonic()
+        begin = reported = time.monotonic()
         while (now := time.monotonic()) - begin < seconds:
             text = mutated(self._dice.choice(self._seeds), self._seeds, self._dice)
             fault, took = child.run(text)
@@ -83,8 +83,8 @@ class Fuzzer:
                 self._save(text, fault)
                 child.close()
                 child = Child()
-            if now - told > 10:
-                told = now
+            if now - reported > 10:
+                reported = now
                 print(f"{now - begin:6.0f} s: {self._line()}", flush=True)
         child.close()
         print(f"done: {self._line()}, {self._counts['inputs'] / seconds:.0f} inputs a second")

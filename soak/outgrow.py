@@ -6,7 +6,7 @@
 Three servers, PostgreSQL and a Dask cluster of four workers run on this machine, under one proxy (haproxy). Callers
 submit jobs of mixed size; meanwhile a worker, a server, the scheduler or the database is killed with SIGKILL every
 `--kill-every` seconds on average, and started again a second later. Every result is compared with what this program
-works out for the same model without a server. The ledger tells how many jobs were accepted, answered, wrong, lost or
+works out for the same model without a server. The ledger records how many jobs were accepted, answered, wrong, lost or
 ended twice. A job that has lost its worker or its server too often fails, as documented, since it may be the cause; it
 is counted as given up and submitted again under another key.
 
@@ -58,7 +58,7 @@ GIVE_UP_S = 300.0
 
 _MESSAGE = 100
 PAUSE_S = 0.5
-TELL_S = 10.0
+REPORT_S = 10.0
 SAMPLE_S = 0.1
 TICKS = os.sysconf("SC_CLK_TCK")
 
@@ -184,7 +184,7 @@ class Chaos:
             await asyncio.to_thread(note_ends, psycopg_url(made.database))
             self._answered_at = begun_at = time.monotonic()
             before = cpu_seconds(made)
-            background = [asyncio.create_task(self._tell(made, begun_at))]
+            background = [asyncio.create_task(self._report(made, begun_at))]
             if self.kill_every_s:
                 dice = random.Random(f"kills {self.seed}")
                 background.append(asyncio.create_task(made.kill_at_random(self.kill_every_s, dice)))
@@ -279,10 +279,10 @@ class Chaos:
                 self._answered_at = time.monotonic()
                 return answer
 
-    async def _tell(self, made: Site, begun_at: float) -> None:
-        """Tell how far it is, now and again."""
+    async def _report(self, made: Site, begun_at: float) -> None:
+        """Print the progress every `REPORT_S`."""
         while True:
-            await asyncio.sleep(TELL_S)
+            await asyncio.sleep(REPORT_S)
             seconds = time.monotonic() - begun_at
             kills = ", ".join(f"{number} {kind}" for kind, number in sorted(made.kills.items())) or "none"
             sys.stderr.write(

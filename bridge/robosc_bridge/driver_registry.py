@@ -51,14 +51,14 @@ class DriverFeatures:
         knows_turtlebot3: True if its argument `robot` is a `devices.robots.Robot` for a TurtleBot3, and a `Body` for
             any other robot, of which its options say the rest.
         revolution_s: Time that a revolution of a range scanner takes, in seconds; None: that is not known.
-        torque_on_s: Time within which motors that are told to hold do so and report it, in seconds; None: as the
-            safety layer has it.
-        astray_s: Longest time that a wheel may be off its goal, in seconds; None: as the safety layer has it.
-        astray_m_s: Difference from its goal up to which a wheel is not off it, in m/s; None: as above.
-        battery_v: Voltages at and below which a person is warned and the robot stops, as of the pack that it is made
-            for; None: they go by its motors, or by what it tells itself.
+        torque_on_s: Time within which the motors report torque after it was switched on, in seconds; None: the
+            safety layer's own limit.
+        astray_s: Longest time that a wheel may be off its goal, in seconds; None: the safety layer's own limit.
+        astray_m_s: Difference from its goal up to which a wheel is not off it, in m/s; None: the safety layer's own.
+        battery_v: Voltages at and below which a person is warned and the robot stops, for the battery pack that the
+            device is made for; None: they follow from its motors, or from what the device reports.
         has_own_controls: True if the device has controls of its own that move the wheels while torque is on, such as
-            buttons of a board; an operator's stop switches torque off then, unless it is told not to.
+            buttons of a board; an operator's stop switches torque off then, unless the configuration forbids that.
     """
 
     buttons: tuple[str, ...] = ()
@@ -150,7 +150,7 @@ _BUILT_IN: dict[Kind, dict[str, tuple[str, str, DriverFeatures | None]]] = {
             DriverFeatures(revolution_s=0.1),
         ),
         "mavlink-rover": (
-            "the obstacles that a MAVLink rover tells of, also on the line of its drive base",
+            "the obstacles that a MAVLink rover reports, also on the line of its drive base",
             "robosc_bridge.devices.mavlink_drivers:make_obstacles",
             None,
         ),

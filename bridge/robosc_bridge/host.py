@@ -14,9 +14,9 @@ from robosc.execution.runtime.clock import Clock
 
 
 def monotonic() -> float:
-    """Return this computer's time in seconds; it goes on while the computer is suspended, where its system tells that.
+    """Return this computer's monotonic time in seconds; it includes the time in suspension where the system has that.
 
-    Else scans and commands of before would be as fresh as ever when it wakes up.
+    Without it, scans and commands from before a suspension would look fresh after it.
     """
     return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()
 

@@ -22,14 +22,13 @@ from robosc.model.check import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import Deployment, Model
 from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
+from robosc_bridge.assembly import assemble, check_settings, safety_limits
 from robosc_bridge.captures.commands import add_commands as add_capture_commands
 from robosc_bridge.captures.commands import add_recording, make_recorder
 from robosc_bridge.captures.recorder import RecordingHost
 from robosc_bridge.configuration import init, load, map_channels, schema
 from robosc_bridge.configuration.structure import TURTLEBOTS
 from robosc_bridge.configuration.template import PORTS, UDEV_RULES, DriveDriver, ScannerDriver
-from robosc_bridge.daemon.assembly import assemble, check_settings, safety_limits
-from robosc_bridge.daemon.endpoints import make_endpoints
 from robosc_bridge.daemon.keyboard import Keyboard
 from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.supervisors import (
@@ -44,6 +43,7 @@ from robosc_bridge.daemon.supervisors import (
 )
 from robosc_bridge.daemon.view_settings import ADDRESS as VIEW_ADDRESS
 from robosc_bridge.driver_registry import Kind, available_drivers
+from robosc_bridge.endpoints import make_endpoints
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.first_drive.commands import add_commands as add_first_drive_commands
 from robosc_bridge.first_drive.ports import stable_name
@@ -59,7 +59,7 @@ UDEV_FOLDERS = tuple(map(Path, ("/etc/udev/rules.d", "/run/udev/rules.d", "/usr/
 
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
-_EPILOG = "exit status: 0 all is well, or the bridge was told to end; 1 a fault stopped it; 2 wrong use or files"
+_EPILOG = "exit status: 0 all is well, or the bridge was ended by a signal; 1 a fault stopped it; 2 wrong use or files"
 
 
 def main(argv: Sequence[str] | None = None) -> int:
@@ -118,11 +118,11 @@ def make_parser() -> Parser:
     run.add_argument(
         "--dry",
         action="store_true",
-        help="everything but motion: torque stays off, and the velocities are told instead; the supervisor is shown "
-        "the motion that would have been",
+        help="everything but motion: torque stays off, and the velocities are logged instead; the supervisor gets the "
+        "readings that the motion would have given",
     )
     add_recording(run)
-    run.add_argument("--verbose", action="store_true", help="tell more")
+    run.add_argument("--verbose", action="store_true", help="log more")
     run.set_defaults(run=_run)
 
     checked = commands.add_parser("check", help="check a configuration against a model", epilog=_EPILOG)

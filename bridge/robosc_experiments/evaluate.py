@@ -41,7 +41,7 @@ supervisor, the robot's motion against the requirements, times of a control cycl
 _EPILOG = """\
 exit status:
   0  every experiment was run, and nothing was wrong
-  1  something was wrong, or an experiment could not be run; the report tells
+  1  something was wrong, or an experiment could not be run; the report says what
   2  wrong use
 """
 
@@ -171,7 +171,7 @@ def run(arguments: argparse.Namespace) -> int:
     progress = ProgressLine()
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        # However it is told to end, no server, bridge or robot runs on.
+        # No server, bridge or robot runs on, whichever signal ends this program.
         with interruptible():
             report = evaluated(
                 [EXPERIMENTS[name] for name in names],

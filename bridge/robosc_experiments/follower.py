@@ -1,8 +1,8 @@
 """`python -m robosc_experiments.follower`: an existing line follower, which cares for nothing but its line.
 
 It attaches to a bridge over gRPC as the caller of a supervision layer, hears the corrections of its camera and asks for
-velocities, again and again: before an obstacle, without a line and after the stop button, too. What the layer holds
-back of that, it is told and counts. It ends when the bridge does, with a line of its counts, or by SIGTERM.
+velocities, again and again: before an obstacle, without a line and after the stop button, too. It counts the requests
+that the layer reports as held back. It ends when the bridge does, with a line of its counts, or by SIGTERM.
 """
 
 import argparse
@@ -77,7 +77,7 @@ def _velocity(linear_m_s: float, angular_rad_s: float) -> pb.AttachRequest:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Run the command; 0: it was told to end, or the bridge has ended; 1: the bridge does not let it ask."""
+    """Run the command; 0: a signal ended it, or the bridge has ended; 1: the bridge does not accept its requests."""
     parser = argparse.ArgumentParser(
         prog="python -m robosc_experiments.follower",
         description="Drive along a line through a supervision layer, without a care for anything else.",

@@ -15,7 +15,7 @@ from robosc_experiments.processes import Program, finish
 from robosc_experiments.scenario import Outcome, Say, ScenarioError
 from robosc_experiments.serial import EXAMPLES, Rig, Setting, running, scene_of
 from robosc_experiments.tail import LineCount
-from robosc_experiments.watch import Watch
+from robosc_experiments.watch import RobotWatch
 from robosc_simulated.motion import Motion
 from robosc_simulated.motion_checks import check_line
 from robosc_simulated.scene import Scene
@@ -67,7 +67,7 @@ def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
                 rig.require()
                 follower.require()
 
-            watch = Watch(setting.motion, LineCount(setting.event_log).poll, check, say, step_s=LIMIT_S)
+            watch = RobotWatch(setting.motion, LineCount(setting.event_log).poll, check, say, step_s=LIMIT_S)
             try:
                 _play(rig, watch)
             except (RefusedError, UnreachableError) as error:
@@ -81,7 +81,7 @@ def run_line(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
     return setting.outcome("line", "serial", faults, {**figures, **line_figures(place, motion), **counts})
 
 
-def _play(rig: Rig, watch: Watch) -> None:
+def _play(rig: Rig, watch: RobotWatch) -> None:
     """Let the events happen to the robot, one after the other; after the first fault, nothing is waited for."""
     send = rig.simulator.send
     with BridgeClient(rig.address, Credentials()) as operator:

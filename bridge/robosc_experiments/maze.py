@@ -6,7 +6,7 @@ from robosc.model.structure import Deployment
 from robosc_experiments.scenario import Outcome, Say, ScenarioError
 from robosc_experiments.serial import EXAMPLES, Rig, Setting, running, scene_of
 from robosc_experiments.tail import LineCount
-from robosc_experiments.watch import Watch
+from robosc_experiments.watch import RobotWatch
 from robosc_simulated.motion import Motion
 from robosc_simulated.motion_checks import check_maze
 
@@ -59,7 +59,7 @@ def run_maze(folder: Path, scene: str | Path, *, speed: float, say: Say, seed: i
 
 def _wait_until_out(rig: Rig, say: Say) -> None:
     """Wait until the robot is there, or has had time enough."""
-    watch = Watch(rig.setting.motion, LineCount(rig.setting.event_log).poll, rig.require, say, step_s=LIMIT_S)
+    watch = RobotWatch(rig.setting.motion, LineCount(rig.setting.event_log).poll, rig.require, say, step_s=LIMIT_S)
     for now in watch.samples("in the maze", LIMIT_S):
         if rig.simulator.ask("goal") != "not yet" or now.world_s > WORLD_LIMIT_S:
             return

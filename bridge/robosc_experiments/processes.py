@@ -1,7 +1,8 @@
 """Programs of a scenario as processes: each in a session of its own, stopped in order, none left behind.
 
-A terminal sends Ctrl-C to every process of its session; theirs are others, so that whoever runs the scenario brings
-them to rest one after the other. Where that process is killed, each is told to end by the kernel.
+A terminal sends Ctrl-C to every process of its session. The programs have other sessions, so that the process which
+runs the scenario can stop them one after the other. If that process is killed, the kernel ends each program by a
+signal.
 """
 
 import os
@@ -223,7 +224,7 @@ class Program:
         """
         end_s = time.monotonic() + limit_s
         while True:
-            # Before the look: what it has told just before its end counts.
+            # The status is read before the output, so that lines written just before the end of the program count.
             has_ended = self.status is not None
             output = self.log.read_text(encoding="utf-8", errors="replace")
             # The last line may be half of one as long as the program lives.
@@ -234,7 +235,7 @@ class Program:
             if has_ended:
                 self.require()
             if time.monotonic() > end_s:
-                raise ScenarioError(f"{self.name} did not tell {pattern!r} in {limit_s:g} s:\n{self.output()}")
+                raise ScenarioError(f"{self.name} did not print {pattern!r} in {limit_s:g} s:\n{self.output()}")
             time.sleep(_POLL_S)
 
     def send(self, command: str) -> None:

@@ -53,7 +53,7 @@ class Recorded:
         return found[0]
 
     def read_motion(self) -> Motion:
-        """Return the motion of the robot; raises ScenarioError if nobody can tell."""
+        """Return the motion of the robot; raises ScenarioError if its record cannot be read."""
         try:
             return read_motion(self.motion)
         except MotionError as error:

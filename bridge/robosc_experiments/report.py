@@ -316,7 +316,7 @@ def _bars(sizes: Mapping[str, Sequence[CodeSize]]) -> bytes:
     from matplotlib.figure import Figure
 
     names = list(dict.fromkeys(size.name for members in sizes.values() for size in members))
-    # Tones that colour-blind readers tell apart, with hatching beside them.
+    # Tones that colour-blind readers can tell apart, with hatching beside them.
     styles = (("#0072B2", ""), ("#E69F00", "//"))
     width = 0.8 / max(len(sizes), 1)
     with mpl.rc_context({"font.family": "DejaVu Sans", "font.size": 9}):

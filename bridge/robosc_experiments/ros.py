@@ -26,7 +26,7 @@ from robosc_experiments.records import Recorded
 from robosc_experiments.scenario import Connection, Outcome, Say, ScenarioError
 from robosc_experiments.serial import EXAMPLES, scene_of
 from robosc_experiments.tail import LineCount
-from robosc_experiments.watch import FREE_M, Watch
+from robosc_experiments.watch import FREE_M, RobotWatch
 from robosc_simulated.motion_checks import SETTLE_S, check_line, check_maze
 from robosc_simulated.scene import scene_names
 
@@ -353,7 +353,7 @@ def run_line(
     return setting.outcome("line", setting.middleware.connection, faults, {**figures, **line_figures(place, motion)})
 
 
-def _watch(stage: Stage, say: Say) -> Watch:
+def _watch(stage: Stage, say: Say) -> RobotWatch:
     setting = stage.setting
     # The node makes its log when it has started.
     counts: list[LineCount] = []
@@ -363,7 +363,7 @@ def _watch(stage: Stage, say: Say) -> Watch:
             counts.extend(LineCount(path) for path in setting.events.glob("*.jsonl"))
         return sum(count.poll() for count in counts)
 
-    return Watch(setting.motion, events, stage.require, say, step_s=STEP_LIMIT_S, settle_s=setting.settle_s)
+    return RobotWatch(setting.motion, events, stage.require, say, step_s=STEP_LIMIT_S, settle_s=setting.settle_s)
 
 
 def _setting(

@@ -232,7 +232,7 @@ def _simulator(stack: ExitStack, setting: Setting) -> tuple[Program, dict[str, s
     for expected in ("base", "scanner", *(["camera"] if setting.scene.line is not None else [])):
         name, _, path = program.answer(_BRIDGE_LIMIT_S).partition(" ")
         if name != expected:
-            raise ScenarioError(f"the simulator tells of {name!r} where its {expected} was to come")
+            raise ScenarioError(f"the simulator printed {name!r} where {expected!r} was expected")
         ports[name] = path
     return program, ports
 

@@ -18,7 +18,7 @@ HELD_S = 2.0
 _LOOK_S = 0.02
 
 
-class Watch:
+class RobotWatch:
     """Watch over what the robot does.
 
     Args:

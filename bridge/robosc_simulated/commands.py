@@ -14,9 +14,9 @@ from robosc_simulated.values import angle, coordinate, number, voltage, whole_nu
 from robosc_simulated.world import World
 
 WORLD_HELP = """\
-pose [X Y HEADING]                          tell where the robot is, or put it there (m, rad)
-collisions                                  tell how often it came to a wall or an obstacle
-goal                                        tell `reached S`, in seconds of the world, or `not yet`
+pose [X Y HEADING]                          print where the robot is, or put it there (m, rad)
+collisions                                  print how often it came to a wall or an obstacle
+goal                                        print `reached S`, in seconds of the world, or `not yet`
 obstacle NAME X Y                           put a round thing somewhere (m)
 obstacle NAME away|back                     take it away, or put it back to where it was"""
 
@@ -55,7 +55,7 @@ def obey_input(obey: Callable[[str], str]) -> None:
     """Obey the lines of standard input to its end, or until it cannot be read; answers are printed.
 
     Args:
-        obey: Function that does what a line says, and returns what there is to tell, as `execute`.
+        obey: Function that carries out a line and returns the answer, as `execute` does.
     """
     with contextlib.suppress(ValueError, OSError):
         for line in sys.stdin:
@@ -75,7 +75,7 @@ def execute(robot: SimulatedTurtleBot3, line: str) -> str:
         line: A command; an empty one does nothing.
 
     Returns:
-        What there is to tell; else nothing.
+        The answer to print; empty if there is none.
 
     Raises:
         UnknownCommandError: It is not known, or cannot be done.
@@ -100,7 +100,7 @@ def execute_in_world(world: World, words: list[str]) -> str:
         words: A command of `WORLD_HELP`.
 
     Returns:
-        What there is to tell; else nothing.
+        The answer to print; empty if there is none.
 
     Raises:
         UnknownCommandError: It is not known, or not with such values.

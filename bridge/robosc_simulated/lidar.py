@@ -25,7 +25,7 @@ from robosc_simulated.world import Looks, World
 
 # A thread that was late sends what was missed, but not for longer than this.
 _BACKLOG_S = 0.5
-# Of the speed of a motor that begins to rotate: below that, it sends nothing that could be told from silence.
+# Least share of its full speed that a starting motor has: slower, its frames would be too rare to differ from silence.
 _SLOWEST_SHARE = 0.2
 _LOOKS = tuple(Look)
 _DARK, _GLASS = _LOOKS.index(Look.DARK), _LOOKS.index(Look.GLASS)
@@ -301,7 +301,7 @@ class Lds02(Lidar):
 
 
 class Lds03(Lidar):
-    """LDS-03 (COIN-D4): idle until it is told to start; tells its identity then.
+    """LDS-03 (COIN-D4): idle until a command starts it; it sends its identity then.
 
     Which speeds its two exposures have is not documented: 6 and 10 revolutions a second.
     """

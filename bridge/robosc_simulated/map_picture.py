@@ -108,8 +108,8 @@ def outlined(samples: Sequence[Sample], radius_m: float) -> list[Sample]:
 
     Args:
         samples: Samples of the way; at least one.
-        radius_m: Radius of the robot: two that are drawn are at least five of it apart along the way, and as far as
-            makes them few enough to be told apart. Before the last one there may be less.
+        radius_m: Radius of the robot: two drawn robots are at least five radii apart along the way, and farther on a
+            long way, so that they can be told apart. The last one may be closer.
     """
     way_m, ways_m = 0.0, [0.0]
     for before, after in itertools.pairwise(samples):

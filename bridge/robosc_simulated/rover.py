@@ -50,7 +50,7 @@ class Rover:
         mode: Mode in which it is.
         is_armed: True if its motors have power.
         has_origin: True if its estimator knows where it is; without, it reports no place and follows no target.
-        tells_motion: True if it knows the message ODOMETRY; else only place and attitude.
+        reports_motion: True if it knows the message ODOMETRY; else it reports only its position and attitude.
         obstacles: `ring`, `north ring`, `sensors`, or nothing.
         battery_v: Voltage of its battery.
         charge_state: Judgement of its own failsafe on the battery: 1 ok, 2 low, 3 critical.
@@ -81,7 +81,7 @@ class Rover:
         self.mode = MANUAL
         self.is_armed = False
         self.has_origin = True
-        self.tells_motion = True
+        self.reports_motion = True
         self.obstacles = "ring"
         self.battery_v = 12.0
         self.charge_state = 1
@@ -194,7 +194,7 @@ class Rover:
             self._target = None
 
     def _drive(self) -> None:
-        """Tell the wheels."""
+        """Set the velocity of the wheels."""
         linear_m_s = angular_rad_s = 0.0
         if self.is_armed and self.mode == MANUAL:
             linear_m_s, angular_rad_s = self._remote
@@ -257,7 +257,7 @@ class Rover:
 
     def _after_interval(self, number: int, interval_s: float) -> int:
         known = {layout.number for layout in BY_NAME.values()}
-        if number not in known or (number == 331 and not self.tells_motion) or interval_s <= 0:
+        if number not in known or (number == 331 and not self.reports_motion) or interval_s <= 0:
             return UNSUPPORTED
         self._interval_s[number] = interval_s
         self._due_s[number] = self._time.now_s()

@@ -4,9 +4,9 @@ Each wall is met by the rays between the directions of its two ends and by no ot
 and a ray are computed: in a maze a few for each wall, where all pairs are hundreds of times as many. In the laser's own
 axes the rays are always the same; it is the ends of the walls that are turned. With its ends a and b, a wall is met by
 the ray d at the length t with 1/t = (d x (b - a)) / (a x b), which is linear in d: the greatest is the nearest wall.
-Who is in line with a wall sees its near end, if a ray goes there; who is on one sees nothing else.
+A robot in line with a wall sees the near end of the wall, if a ray goes there; a robot on a wall sees nothing else.
 
-`Walls.cast` and `Discs.cast` tell the same for any rays, pair by pair.
+`Walls.cast` and `Discs.cast` return the same distances for any rays, pair by pair.
 """
 
 import math

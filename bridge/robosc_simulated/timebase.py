@@ -54,7 +54,7 @@ class Timebase:
         self._waited_s = 0.0
         self._heard_s: float | None = None
         self._silence_s = 0.0
-        self._told_s = _SILENCE_S / 2
+        self._reported_s = _SILENCE_S / 2
         self._unread: set[object] = set()
         self._members: list[Callable[[], None]] = []
 
@@ -87,15 +87,15 @@ class Timebase:
                 self._limit_s = self.world_s() + self._patience_s
 
     def new_silence_s(self) -> float | None:
-        """Return for how long a fast world has not heard its host, in its seconds, if that is to be told a person.
+        """Return the longest time without a sign of the host, in seconds of a fast world; None: nothing new to report.
 
-        A world that passes no faster than the clock, or that waits, has none; a longer silence is told when it is twice
-        as long as the last one.
+        A world that passes no faster than the clock, or that waits, reports none; a longer silence is reported when it
+        is twice as long as the last one that was.
         """
         with self.lock:
-            if self.factor <= 1.0 or self._silence_s < 2 * self._told_s:
+            if self.factor <= 1.0 or self._silence_s < 2 * self._reported_s:
                 return None
-            self._told_s = self._silence_s
+            self._reported_s = self._silence_s
             return self._silence_s
 
     def record_work(self, seconds: float, since_s: float) -> None:

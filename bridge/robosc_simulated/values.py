@@ -64,7 +64,7 @@ def seed(text: str) -> int:
 
 
 def option[T](read: Callable[[str], T]) -> Callable[[str], T]:
-    """A reader for `argparse`, which tells what is needed."""
+    """A reader for `argparse`, whose errors say which value is needed."""
 
     def read_option(text: str) -> T:
         try:

@@ -102,7 +102,8 @@ class VirtualHost(Closing):
 
         Raises:
             VirtualTimeError: Nothing will ever happen any more, or the time of the thread that has made the host is
-                long over. It is told to that one: nobody looks at what ends another thread.
+                long over. The error is raised in the thread that has made the host, since errors that end other
+                threads are not seen by anybody.
         """
         if self._is_closed:
             raise _Ended

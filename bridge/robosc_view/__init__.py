@@ -1,9 +1,9 @@
-"""The live view: a web page that shows a robot under its supervisor, as it works or as a log tells it.
+"""The live view: a web page that shows a robot under its supervisor, while it works or from its log.
 
-Sources (a bridge in this process or over gRPC, the topic `/state` of a ROS 2 node, an event log) tell what happens in
-one form; a server hands it to all pages that are open. The page itself lies in the folder `page`. aiohttp and igraph
-come with the extra `view`; they are imported only where a page is served. The names here are imported on use, so that
-the command line can tell of the command without loading any of it.
+Sources (a bridge in this process or over gRPC, the topic `/state` of a ROS 2 node, an event log) report in one form
+what happens; a server sends it to all pages that are open. The page itself lies in the folder `page`. aiohttp and
+igraph come with the extra `view`; they are imported only where a page is served. The names here are imported on use,
+so that the command line can list this command without loading any of it.
 """
 
 from typing import TYPE_CHECKING

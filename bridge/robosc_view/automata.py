@@ -10,8 +10,8 @@ from robosc.certification.supervisor_file import StateInWords
 from robosc.explanation.notation import value_text
 from robosc.expressions import TRUE
 from robosc.expressions.text import expression_text
-from robosc.pipeline.manual_run import Step
 from robosc.pipeline.received_data import data_field
+from robosc.pipeline.steps import Step
 from robosc.pipeline.systems import SystemSupervisor
 from robosc.source import visible
 from robosc_view.definition import (
@@ -170,7 +170,7 @@ def distinct_initial_states(system: System, states: Sequence[StateInWords]) -> t
 
 
 def distinguishing_parts(states: Sequence[StateInWords]) -> tuple[str, ...]:
-    """Some states, each by what tells it apart from the others, as `robosc simulate` takes it."""
+    """Some states, each by the values that tell it apart from the others, as `robosc simulate` takes it."""
     parts = [state.parts for state in states]
     varying = [name for name in parts[0] if len({item[name] for item in parts}) > 1] if parts else []
     return tuple(", ".join(f"{name} = {value_text(item[name])}" for name in varying) for item in parts)

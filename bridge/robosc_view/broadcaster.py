@@ -305,7 +305,7 @@ class Broadcaster:
             try:
                 self._send_update()
             except Exception:
-                _log.exception("an update of the live view cannot be told")
+                _log.exception("an update of the live view could not be sent")
             await asyncio.sleep(UPDATE_S)
 
     def _send_update(self) -> None:

@@ -79,7 +79,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         type=Path,
         metavar="FILE",
         help="with --log or --ros2: the model (.rscd), which is synthesized, or its supervisor (.rsup); without it the "
-        "page of a node cannot tell which requests are enabled. Alone it is the same as MODEL",
+        "page of a node cannot show which requests are enabled. Alone it is the same as MODEL",
     )
     add_given_supervisor_options(parser, "stands")
     scene = parser.add_argument(
@@ -220,7 +220,7 @@ def run(arguments: argparse.Namespace) -> int:
     if arguments.log is not None and arguments.model is None:
         raise UsageError("--log needs --model: the model that the log is of")
     if arguments.model is not None and arguments.bridge is not None:
-        raise UsageError("--model goes with --log or --ros2, or alone: a bridge tells its model itself")
+        raise UsageError("--model goes with --log or --ros2, or alone: a bridge sends its model itself")
     if arguments.model is not None and is_automata(arguments.model):
         _refuse_for_automata(arguments)
     if arguments.motion is not None and arguments.log is None:

@@ -1,6 +1,6 @@
 """The definition of a robot by its source: components, automata, communications; foreign ones are checked.
 
-The topic `/state` of generated nodes and the bridge's service tell it in the same words (semantics 3.10).
+The topic `/state` of generated nodes and the bridge's service send the definition in the same words (semantics 3.10).
 """
 
 import json
@@ -191,7 +191,7 @@ def robot_of(
 
 
 def communications_of(shape: Shape) -> tuple[CommunicationInfo, ...]:
-    """The communications that a definition names; which way messages go, its transitions tell."""
+    """The communications that a definition names; the direction of messages follows from its transitions."""
     received = {
         transition.communication
         for component in shape.components

@@ -59,7 +59,7 @@ class _WithoutMatplotlib(MetaPathFinder):
 
 
 def _load_igraph() -> Any:
-    """Import igraph, when something is drawn: without the extra `view` only who wants a drawing is told so.
+    """Import igraph only when something is drawn, so that without the extra `view` only drawings raise an error.
 
     igraph would import Matplotlib where it is installed, which looks through all fonts of a new machine first: a page
     would wait many seconds for what it does not need.
@@ -114,7 +114,7 @@ class _Box:
 
 
 def layout(nodes: Sequence[Node], arrows: Sequence[Arrow]) -> dict[str, Any] | None:
-    """The drawing, in pixels, as the page is told it; None: the automaton is too large for one.
+    """The drawing, in pixels, as the page receives it; None: the automaton is too large for one.
 
     The place of a state or label is its middle; the points of an edge go from border to border.
     """

@@ -137,7 +137,7 @@ class MessageBuilder:
         """Return the events that may be requested, those that may not and why, and any notices about that."""
         events = self._robot.requests
         if not status.components:
-            # A robot without any behaviour has no components to tell of, executed or not.
+            # A robot without any behaviour has no components to show, executed or not.
             has_behaviour = any(item.behaviour for item in self._robot.shape.components)
             if has_behaviour:
                 return [], [{"event": event, "why": [NOT_EXECUTED]} for event in events], []
@@ -211,7 +211,7 @@ class TransitionTracker:
         """Components and numbers of the transitions of an entry."""
         kind = entry.get("kind")
         if "transitions" in entry:
-            # Told with the entry: only the bridge's own sources do that; in a log anything may stand.
+            # Numbers come with the entry only from the bridge's own sources; in a log they may be anything.
             numbers = entry["transitions"]
             for number in numbers if isinstance(numbers, list | tuple) else ():
                 if isinstance(number, int) and number in self._component:
@@ -299,7 +299,7 @@ def run_text(run: "ManualRun", entries: int, report: RunReport, beginning: int =
         run: The run.
         entries: Number of its entries in the event log.
         report: Report of what was done.
-        beginning: Number of the state that it has begun in, of those that the definition tells.
+        beginning: Number of the state that it has begun in, among those that the definition lists.
     """
     blocked = run.blocked()
     undone = run.undone

@@ -1,7 +1,7 @@
 """The source for a model that nothing executes: whoever opens a page steps it by hand, each a run of its own.
 
-The run is that of `robosc simulate`: events with data, undo and redo, walks by chance and until there is trouble, kept
-as an event log or a test. Of automata it is also chosen where to begin, and which of several outcomes an event has.
+The run is that of `robosc simulate`: events with data, undo and redo, walks by chance and until there is a finding,
+kept as an event log or a test. For automata, a person also chooses the initial state and the outcome of an event.
 When the model's file is saved, what was done so far is done again on the new model.
 """
 
@@ -19,10 +19,10 @@ from typing import Any, cast
 from robosc.certification.supervisor_file import StateInWords
 from robosc.errors import RoboscError
 from robosc.pipeline.event_scripts import parse_event
-from robosc.pipeline.manual_run import Step, changes_text, event_text
 from robosc.pipeline.received_data import NO_DATA
 from robosc.pipeline.saved_runs import ModelOfTest, entries_of, event_log, pytest_module, state_by_component
 from robosc.pipeline.simulation import Run
+from robosc.pipeline.steps import Step, changes_text, event_text
 from robosc.pipeline.system_runs import ChoiceError, SystemRun
 from robosc.pipeline.systems import SystemSupervisor
 from robosc_bridge.daemon.states import OperatorCommand
@@ -136,7 +136,7 @@ class Playground:
     ) -> None:
         self._watched = watched
         self._kept = kept
-        # Name of the page; empty: it has not told it.
+        # Name of the page; empty: the page has not sent it.
         self._page = ""
         self._file = file
         self._make = make
@@ -161,7 +161,7 @@ class Playground:
         self._entries: list[list[dict[str, Any]]] = []
 
     async def run(self, sink: Sink) -> None:
-        """Do what is wanted, and tell what it leads to, until cancelled."""
+        """Carry out what pages ask for, and send the results to the sink, until cancelled."""
         async with self._watched.listened(self._changed):
             if not self._is_begun or (self._own is None and self._made is not self._watched.made):
                 await self._begin(self._watched.made)
@@ -239,12 +239,12 @@ class Playground:
             case Restart():
                 run.restart()
                 await self._show(sink, RunReport("step", ("back in the initial state",)))
-            case Walk(steps=steps, seed=seed, until_trouble=True):
+            case Walk(steps=steps, seed=seed, until_finding=True):
                 self._require_room(steps)
                 before_count = len(run)
-                trouble = await asyncio.to_thread(run.walk_until_trouble, steps, seed)
-                none = f"no trouble in {len(run) - before_count} steps"
-                await self._show(sink, RunReport("trouble", (str(trouble),)) if trouble else RunReport("step", (none,)))
+                finding = await asyncio.to_thread(run.walk_until_finding, steps, seed)
+                none = f"no finding in {len(run) - before_count} steps"
+                await self._show(sink, RunReport("finding", (str(finding),)) if finding else RunReport("step", (none,)))
             case Walk(steps=steps, seed=seed):
                 self._require_room(steps)
                 taken = await asyncio.to_thread(run.walk, steps, seed)
@@ -289,7 +289,7 @@ class Playground:
             raise RefusedError("a run of automata is not saved: event logs and tests are of robots")
         name = self._run.supervisor.model.name.lower()
         if form is Form.LOG:
-            return f"{name}.jsonl", event_log(self._run)
+            return f"{name}.jsonl", event_log(self._run.history)
         file = self._file if self._own is None else None
         # Seen from the folder of the model, where the test is expected to go.
         model = ModelOfTest(Path(f"{name}.rscd")) if file is None else file
@@ -388,7 +388,7 @@ class Playground:
     async def _show(self, sink: Sink, report: RunReport) -> None:
         run = self._run
         history = run.history
-        # A trouble that is as it was when it was reported before is not reported again.
+        # A finding that is the same as when it was reported before is not reported again.
         same = 0
         while same < min(len(history), len(self._entries)) and self._reported[same] is history[same]:
             same += 1
@@ -429,7 +429,7 @@ class Playground:
 
 
 def _run_of(made: SynthesizedModel, beginning: int) -> tuple[Run | SystemRun, EdgesTaken | None]:
-    """Return a run of a model, and what tells the edges that its events take, of automata."""
+    """Return a run of a model; for automata, also the object that finds the edges which its events take."""
     if not isinstance(made.supervisor, SystemSupervisor):
         return Run(made.supervisor), None
     parts = made.beginnings[beginning].parts

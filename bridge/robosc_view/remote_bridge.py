@@ -39,7 +39,7 @@ from robosc_view.sources import (
 _log = logging.getLogger(__name__)
 
 RATE_HZ = 25.0
-"""Most responses of the bridge a second; what it tells is at most so old."""
+"""Most responses of the bridge a second; its inverse is the greatest age of what is shown."""
 
 FOLLOW_S = 0.5
 """A stop that was not answered for so long is followed by the next one; before, they would only crowd the way."""
@@ -65,7 +65,7 @@ class RemoteBridge:
         self._stop_to_send: asyncio.Task[None] | None = None
 
     async def run(self, sink: Sink) -> None:
-        """Tell what the bridge tells, until cancelled.
+        """Pass on the responses of the bridge to the sink, until cancelled.
 
         Raises:
             SourceLostError: It cannot be reached any more.

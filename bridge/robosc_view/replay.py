@@ -1,7 +1,7 @@
 """The source for an event log: any of its moments, and all of it again as it happened, at any speed.
 
-The log tells the state of the components after each event. Where services and actions are follows from the events:
-each leads to one location of its protocol, wherever it comes from.
+The log states the state of the components after each event. The states of services and actions follow from the events:
+each event leads to one location of the protocol, whatever the location before.
 """
 
 import asyncio
@@ -242,7 +242,7 @@ class Replay:
         self._commands: list[ReplayCommand] = []
 
     async def run(self, sink: Sink) -> None:
-        """Tell where the log is, until cancelled."""
+        """Send the state of the robot at the position of the replay to the sink, until cancelled."""
         loop = asyncio.get_running_loop()
         player = self._player
         await sink.define(self._recording.robot)
@@ -296,7 +296,7 @@ class Replay:
         return count
 
     def _go_on(self, sink: Sink, shown: int) -> int:
-        """Tell what happened since the last step."""
+        """Send the entries since the last step to the sink."""
         count = self._recording.count(self._player.time_s)
         if count > shown:
             first = max(shown, count - MOST_AT_ONCE)

@@ -122,7 +122,7 @@ class RunReport:
     """Report of what was just done with a run that is stepped by hand.
 
     Attributes:
-        kind: `step`, `unknown`, `trouble`, `changed` (the model), `wrong` or `choose`; empty: nothing was done.
+        kind: `step`, `unknown`, `finding`, `changed` (the model), `wrong` or `choose`; empty: nothing was done.
         lines: Sentences about it.
         choice: Choice that an event leaves open; None: none.
     """
@@ -139,7 +139,7 @@ class Choice:
     Attributes:
         event: The event.
         line: The event with its data, as it was wanted.
-        ways: States that it can lead to, by what tells them apart.
+        ways: States that it can lead to, each by the values in which it differs from the others.
     """
 
     event: str

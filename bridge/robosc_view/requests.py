@@ -79,7 +79,7 @@ class Restart:
     """Begin a run that is stepped by hand again.
 
     Attributes:
-        beginning: Number of the state to begin in, of those that the definition tells; None: the same as before.
+        beginning: Number of the state to begin in, among those that the definition lists; None: the same as before.
     """
 
     beginning: int | None
@@ -92,12 +92,12 @@ class Walk:
     Attributes:
         steps: Most events to take.
         seed: Seed of the chance.
-        until_trouble: True if the first trouble ends it.
+        until_finding: True if the first finding ends it.
     """
 
     steps: int
     seed: int
-    until_trouble: bool
+    until_finding: bool
 
 
 class Form(StrEnum):
@@ -197,7 +197,7 @@ def parse_request(text: str) -> PageRequest:
             return Restart(_choice(document, "beginning"))
         case "walk":
             steps, seed = (int(_number(document, name, low, high)) for name, low, high in _OF_WALKS)
-            return Walk(steps, seed, document.get("until_trouble") is True)
+            return Walk(steps, seed, document.get("until_finding") is True)
         case "save" if document.get("form") in tuple(Form):
             return Save(Form(document["form"]))
         case "resume":

@@ -43,7 +43,7 @@ class RunningBridge:
         )
 
     async def run(self, sink: Sink) -> None:
-        """Tell what the daemon shows, until cancelled."""
+        """Pass on the snapshots of the daemon to the sink, until cancelled."""
         await sink.define(self.robot)
         caller = _Caller(asyncio.get_running_loop())
         subscription = self._operations.feed.subscribe(caller.call)

@@ -42,7 +42,7 @@ def scene_start(source: str | None, seed: int = 0) -> tuple[float, float, float]
 
 
 def scene_from_start(scene: Scene) -> Mapping[str, Any]:
-    """A scene as `scene_map` tells it."""
+    """A scene in the form that `scene_map` returns."""
     begin_x_m, begin_y_m, heading_rad = scene.start
     cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
 

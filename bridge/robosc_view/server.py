@@ -312,7 +312,7 @@ class ViewServer:
         return self._strangers.total() < places and self._strangers[host] < VIEWERS_OF_HOST
 
     async def _places(self, request: web.Request) -> web.StreamResponse:
-        """Tell a page whose stream did not open whether there is a place: it cannot read the answer to the stream."""
+        """Answer a page whose stream did not open whether there is a place: it cannot read the answer to the stream."""
         assert self._access is not None  # noqa: S101
         is_known = self._access.is_token(request.query.get("token"))
         if not self._has_place(str(request.remote), is_known=is_known):

@@ -16,7 +16,7 @@ class ViewError(BridgeError):
 
 
 class SourceLostError(Exception):
-    """A source tells nothing any more; one sentence for a person. It is tried again."""
+    """A source sends nothing any more; one sentence for a person. It is tried again."""
 
 
 class SourceWrongError(Exception):
@@ -28,7 +28,7 @@ class RefusedError(Exception):
 
 
 class Sink(Protocol):
-    """Is told what a source has; used in the event loop of the server alone."""
+    """Receiver of what a source reports; used in the event loop of the server alone."""
 
     async def define(self, robot: Robot) -> None:
         """Define the robot; called first, and again where it has become another."""
@@ -46,7 +46,7 @@ class Sink(Protocol):
         """A revolution of the LiDAR; the latest alone counts."""
 
     def replay_jumped(self) -> None:
-        """The replay of a log is elsewhere; all there is to tell of the place follows."""
+        """The replay of a log has jumped to another position; everything about that position follows."""
 
     def show_position(self, time_s: float, speed: float, *, is_playing: bool) -> None:
         """Receive the position of the replay of a log."""
@@ -89,10 +89,10 @@ ReplayCommand = Seek | Play | Pause
 
 
 class Source(Protocol):
-    """Tells what a robot does. Lives in the event loop of the server; what waits does so elsewhere."""
+    """Source that reports what a robot does, in the event loop of the server; blocking work is done in threads."""
 
     async def run(self, sink: Sink) -> None:
-        """Tell all there is, until cancelled.
+        """Report everything to the sink, until cancelled.
 
         Raises:
             SourceLostError: It is gone.

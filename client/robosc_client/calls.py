@@ -10,6 +10,7 @@ from typing import Any
 
 import grpc
 
+from robosc.certification.progress import OnProgress, ignored
 from robosc_api.v1 import jobs_pb2
 from robosc_client.convert import jobs
 from robosc_client.convert.failures import Failure, failure_of
@@ -17,7 +18,6 @@ from robosc_client.convert.requests import list_request
 from robosc_client.convert.response_readers import MAXIMUM_BYTES, ResponseReader, UnaryReader
 from robosc_client.errors import malformed
 from robosc_client.jobs import Job, JobState, TaskKind
-from robosc_client.results import Progress
 from robosc_client.retry import Attempts, RetryPolicy
 
 KEEPALIVE_MS = 60_000
@@ -49,12 +49,6 @@ WATCH_INTERRUPTED = Failure(grpc.StatusCode.UNAVAILABLE, "the watch ended before
 
 _EMPTY_PAGES = 100
 
-type OnProgress = Callable[[Progress], None]
-
-
-def ignore_progress(progress: Progress) -> None:
-    """Ignore the progress."""
-
 
 @dataclass(frozen=True, slots=True)
 class Operation[Result]:
@@ -66,7 +60,7 @@ class Operation[Result]:
         reader: Function that makes the reader of a response; each attempt needs a new one.
         is_stream: True if the answer is a stream of messages.
         is_about_jobs: True if the method is of the service for jobs.
-        deadline_s: Seconds for all attempts together; None: any number.
+        deadline_s: Time limit for all attempts together, in seconds; None: no limit.
         on_progress: Callback that receives the progress.
     """
 
@@ -76,7 +70,7 @@ class Operation[Result]:
     is_stream: bool = False
     is_about_jobs: bool = False
     deadline_s: float | None = None
-    on_progress: OnProgress = ignore_progress
+    on_progress: OnProgress = ignored
 
 
 class RetriedCall[Result]:
@@ -186,7 +180,7 @@ class JobPages:
         )
 
     def take(self, page: tuple[tuple[Job, ...], str]) -> tuple[Job, ...]:
-        """The jobs of a page.
+        """Return the jobs of a page.
 
         Raises:
             ServiceError: The list does not end.
@@ -223,10 +217,10 @@ class JobWatch:
         return Operation("WatchJob", request, lambda: UnaryReader(self.take), is_stream=True, is_about_jobs=True)
 
     def take(self, message: jobs_pb2.WatchJobResponse) -> Job:
-        """The job as it is now.
+        """Return the present state of the job.
 
         Raises:
-            ServiceError: It is another job, or nothing has changed.
+            ServiceError: The message is about another job, or about no change.
         """
         job = job_reader(self._job_id)(message)
         # The server sends a job that has ended even if nothing has changed.

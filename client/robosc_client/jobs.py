@@ -31,7 +31,7 @@ class Job:
     """A job, without its request and result.
 
     Attributes:
-        id: Its id.
+        id: Id of the job.
         owner: Owner of the job.
         kind: Kind of its task.
         state: State of the job.
@@ -45,8 +45,8 @@ class Job:
         attempts: Number of times that a worker has begun.
         progress: Progress of the work, or None.
         failure: Reason why it has failed, or None.
-        from_store: True if the result is an earlier one of the same request.
-        waiting_before: Jobs that wait before it.
+        from_store: True if the result is that of an earlier equal request.
+        waiting_before: Number of jobs ahead of it in the queue.
     """
 
     id: str
@@ -73,7 +73,7 @@ class Submission:
 
     Attributes:
         job: The job.
-        existed: True if it was there before, by its idempotency key.
+        existed: True if a job with the idempotency key existed already.
     """
 
     job: Job
@@ -109,7 +109,7 @@ class ServiceLoad:
 
     Attributes:
         time: Time of the answer, by the clock of the server.
-        callers: Load of each caller, of those with the most to do first.
+        callers: Load of each caller, the largest first.
         workers: Number of tasks that workers can be busy with at once; 0: there is no worker.
         running_tasks: Number of tasks of all callers that workers are busy with for the server that has answered.
         waiting_tasks: Number of tasks of all callers that wait at that server.

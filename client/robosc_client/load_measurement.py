@@ -31,12 +31,12 @@ class Load:
     Attributes:
         method: Full name of the method, such as `/robosc_api.v1.SynthesisService/Check`.
         is_stream: True if it answers with a stream.
-        request: The serialized request of the call of a number.
-        concurrency: Callers, each with one call at a time.
+        request: Function that returns the serialized request of a call, by its number.
+        concurrency: Number of callers, each with one call at a time.
         count: Total number of calls; None: limited only by the duration.
         duration_s: Seconds after which no more calls start; None: unlimited.
-        channels: Connections that the callers share.
-        timeout_s: Seconds that one call may take.
+        channels: Number of connections that the callers share.
+        timeout_s: Time limit of one call, in seconds.
     """
 
     method: str
@@ -69,11 +69,11 @@ class Measured:
 
     @property
     def calls_per_second(self) -> float:
-        """Successful calls per second."""
+        """Number of successful calls per second."""
         return len(self.times_s) / self.seconds if self.seconds else 0.0
 
     def percentile_s(self, percent: float) -> float | None:
-        """The time within which so many of a hundred calls were answered (nearest rank); None without any."""
+        """Return a percentile of the durations of calls (nearest rank); None: there were no calls."""
         if not self.times_s:
             return None
         rank = -(-len(self.times_s) * percent // 100)

@@ -18,7 +18,7 @@ from robosc_client.commands.connection import EPILOG, connect
 
 
 def make_parser() -> Parser:
-    """The parser of the whole command line."""
+    """Return the parser of the whole command line."""
     parser = Parser(
         prog="robosc-client",
         description="Check models, synthesize supervisors and generate packages on a RoboSC server.",

@@ -10,16 +10,17 @@ from collections.abc import Callable, Sequence
 from typing import Any, get_args
 
 import robosc
-from robosc.pipeline.files import given_path, read_bounded
+from robosc.certification.progress import OnProgress, ignored
+from robosc.pipeline.files import FileName, given_path, read_bounded
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import FileName, ModelLike, loaded, property_file
+from robosc.pipeline.loading import ModelLike, loaded, property_file
 from robosc.source import SourceFile
 from robosc.supervisor import Supervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES, encode
 from robosc.targets import GenerateOptions, TargetInfo
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_client.calls import JobPages, JobWatch, OnProgress, Operation, ignore_progress, job_reader
+from robosc_client.calls import JobPages, JobWatch, Operation, job_reader
 from robosc_client.convert import jobs, response_fields
 from robosc_client.convert.requests import request_of, submit_request
 from robosc_client.convert.response_readers import (
@@ -66,7 +67,7 @@ type SupervisorLike = Supervisor | bytes | FileName
 
 
 def check(model: ModelLike, *, deadline_s: float | None = None) -> Operation[Findings]:
-    """Every finding about a model, library or automata, sorted by place."""
+    """Return every finding about a model, library or automata, sorted by place."""
     texts = loaded(model)
     return Operation("Check", request_of(Check(texts)), lambda: check_reader(texts), deadline_s=deadline_s)
 
@@ -77,7 +78,7 @@ def synthesize(
     *,
     is_modular: bool = False,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignore_progress,
+    on_progress: OnProgress = ignored,
 ) -> Operation[Synthesis]:
     """Synthesize and certify a supervisor; `is_modular` synthesizes automata in modules."""
     task = Synthesize(loaded(model), options, is_modular)
@@ -92,7 +93,7 @@ def generate(
     *,
     initial: str | None = None,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignore_progress,
+    on_progress: OnProgress = ignored,
 ) -> Operation[Generation]:
     """Synthesize a supervisor and generate the files of a target around it.
 
@@ -115,7 +116,7 @@ def explore(
     *,
     maximum_states: int | None = None,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignore_progress,
+    on_progress: OnProgress = ignored,
 ) -> Operation[Exploration]:
     """Explore the robot, or automata, under their supervisor, up to a maximum number of states."""
     task = Explore(loaded(model), options, maximum_states)
@@ -132,7 +133,7 @@ def verify(
     maximum_states: int | None = None,
     is_strict: bool = False,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignore_progress,
+    on_progress: OnProgress = ignored,
 ) -> Operation[Verification]:
     """Check a supervisor against its model, or verify properties of the robot under its supervisor.
 
@@ -140,8 +141,8 @@ def verify(
         model: The model and its libraries, or the path of a model; or a task with all other arguments.
         properties: A property in the property language, or several.
         property_files: Files with a property on each line.
-        supervisor: The supervisor to check: itself, the path of its file or its bytes; None: one is made of the model.
-        options: Options for making the supervisor, and the deployment that one must be for; None: as it says.
+        supervisor: The supervisor to check, or the path or the bytes of its file; None: it is made from the model.
+        options: Options for making the supervisor, and the deployment that a given one must have; None: its own.
         maximum_states: States up to which a given supervisor is searched one by one; None: 1,000,000.
         is_strict: True if a given supervisor passes only if permissiveness was checked, too.
         deadline_s: See the class.
@@ -188,7 +189,7 @@ def explain(
     state: str | None = None,
     after: str | None = None,
     deadline_s: float | None = None,
-    on_progress: OnProgress = ignore_progress,
+    on_progress: OnProgress = ignored,
 ) -> Operation[Explained]:
     """Explain what synthesis does to a model: what restricts its events, or what is to blame for no supervisor.
 
@@ -255,7 +256,7 @@ def submit(
     Args:
         task: Task to be done.
         label: Name of the job in lists.
-        idempotency_key: The same key again gives the same job; None: a new key.
+        idempotency_key: Key for which a repeated submission returns the same job; None: a new key.
         retention_s: Time for which the job is kept after its end; None: as long as the server keeps jobs.
         deadline_s: See the class; it is about the submission, not about the task.
     """
@@ -302,9 +303,9 @@ def list_jobs(
     """List jobs page by page, newest first.
 
     Args:
-        states: Only jobs in these; empty: in any.
-        kind: Only jobs of this kind; None: of any.
-        all_owners: True if those of other callers are wanted, too; for a token with the scope `admin`.
+        states: States of the listed jobs; empty: all states.
+        kind: Kind of the listed jobs; None: all kinds.
+        all_owners: True to list the jobs of other callers, too; needs a token with the scope `admin`.
         page_size: Number of jobs per call.
         deadline_s: See the class; for each page.
     """
@@ -312,10 +313,10 @@ def list_jobs(
 
 
 def get_load(*, all_callers: bool = False, deadline_s: float | None = None) -> Operation[ServiceLoad]:
-    """Return what the service does now, caller by caller.
+    """Return the present load of the service, caller by caller.
 
     Args:
-        all_callers: True if the load of other callers is wanted, too; for a token with the scope `admin`.
+        all_callers: True to return the load of other callers, too; needs a token with the scope `admin`.
         deadline_s: See the class.
     """
     return _job_call("GetLoad", jobs_pb2.GetLoadRequest(all_callers=all_callers), jobs.load_of, deadline_s)

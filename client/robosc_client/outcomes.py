@@ -42,15 +42,15 @@ from robosc_client.results import (
 
 
 def outcome_from_response(result: Synthesis | Generation | Exploration, content: bytes = b"") -> SynthesisOutcome:
-    """Return what the server made.
+    """Return the outcome of a synthesis on the server.
 
     Args:
         result: Result of a synthesis.
-        content: The supervisor's file; empty: there is none.
+        content: The supervisor's file; empty: there is no supervisor.
 
     Raises:
         UnsupportedModelError: The model is correct, but cannot be handled.
-        ServiceError: The server's supervisor is no valid one.
+        ServiceError: The server's supervisor is invalid.
     """
     if result.status is SynthesisStatus.UNSUPPORTED_MODEL:
         raise UnsupportedModelError(result.reason)
@@ -64,7 +64,7 @@ def outcome_from_response(result: Synthesis | Generation | Exploration, content:
 
 
 def decoded(content: bytes) -> Supervisor:
-    """The supervisor in a file that a server has made.
+    """Return the supervisor in a file that a server has made.
 
     Raises:
         ServiceError: It is not valid.
@@ -76,7 +76,7 @@ def automata_synthesis_of(found: Synthesis, model: LoadedAutomata) -> SystemSynt
     """Return the synthesis of automata that the server made.
 
     Raises:
-        ServiceError: The supervisor is no valid one, or of other automata.
+        ServiceError: The supervisor is invalid, or belongs to other automata.
     """
     supervisor = automata_supervisor_of(found.supervisor) if found.supervisor else None
     if supervisor is not None and supervisor.system != check_automata_file(model).system:
@@ -87,7 +87,7 @@ def automata_synthesis_of(found: Synthesis, model: LoadedAutomata) -> SystemSynt
 
 
 def automata_supervisor_of(content: bytes) -> SystemSupervisor:
-    """The supervisor of automata in a file that a server has made.
+    """Return the supervisor of automata in a file that a server has made.
 
     Raises:
         ServiceError: It is not valid.
@@ -180,10 +180,10 @@ class _NoReport(msgspec.Struct):
 
 
 def require_automata_report(found: Verification) -> Verification:
-    """A verification of automata, whose report is one.
+    """Return a verification of automata, with a reason that is harmless on a terminal, if its report is valid.
 
     Raises:
-        ServiceError: It is another one.
+        ServiceError: The report is invalid.
     """
     if found.status is VerificationStatus.UNSUPPORTED_MODEL:
         return found
@@ -205,7 +205,7 @@ def require_made_for(supervisor: Supervisor, bundle: Bundle, deployment: Deploym
     A signature proves the origin of a supervisor, not its purpose: supervisors of other robots are signed as well.
 
     Raises:
-        ServiceError: It was made of others, or for another.
+        ServiceError: It was made of other texts, or for another deployment.
     """
     if supervisor.certificate.bundle_sha256 != bundle.digest:
         raise ServiceError("the server's supervisor is refused: it was made from other files")
@@ -216,14 +216,14 @@ def require_deployment(supervisor: Supervisor, deployment: Deployment) -> None:
     """Do nothing if a supervisor was made for this deployment.
 
     Raises:
-        ServiceError: It was made for another.
+        ServiceError: It was made for another deployment.
     """
     if {supervisor.certificate.deployment, supervisor.deployment} != {deployment}:
         raise ServiceError(f"the server's supervisor is refused: it was made for another deployment than {deployment}")
 
 
 def graph_of(found: StateGraph, bundle: Bundle, deployment: Deployment) -> Graph:
-    """The server's graph of a model's robot.
+    """Return the server's graph of a model's robot.
 
     Raises:
         ServiceError: It is a graph of another robot.
@@ -290,10 +290,10 @@ class _Recheck(msgspec.Struct):
 
 
 def require_recheck(report: Mapping[str, Any]) -> Mapping[str, Any]:
-    """A report, which is about a supervisor that was given.
+    """Return a report about a given supervisor, if it is valid.
 
     Raises:
-        ServiceError: It is another one.
+        ServiceError: The report is invalid.
     """
     try:
         document = msgspec.convert(report, type=_Recheck)
@@ -313,17 +313,17 @@ def verdicts_of(
     texts: Sequence[SourceFile],
     listings: Sequence[SourceFile],
 ) -> tuple[tuple[Verdict, ...], System, Model]:
-    """Return the server's verdicts about properties, and what they are about.
+    """Return the server's verdicts about properties, and the properties.
 
     Args:
-        report: Its report.
+        report: Report of the server.
         bundle: The model and its libraries.
-        deployment: Place where the supervisor stands.
+        deployment: Deployment of the supervisor.
         texts: Properties, one each.
         listings: Files of properties.
 
     Raises:
-        ServiceError: They are of other properties, or of another robot.
+        ServiceError: The verdicts are about other properties, or another robot.
     """
     model = _model(bundle)
     system = to_automata(model, deployment)

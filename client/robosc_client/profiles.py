@@ -35,14 +35,14 @@ _PATHS = ("ca", "certificate", "key", "token_file")
 
 @dataclass(frozen=True, slots=True, kw_only=True)
 class Profile:
-    """Way to reach a server.
+    """Address and credentials of a server.
 
     Attributes:
         server: HOST:PORT.
-        tls: True to use TLS, believing the usual certificate authorities; a CA or certificate implies TLS.
-        ca: Certificates (PEM) that are believed instead.
-        certificate: Own chain of certificates (PEM).
-        key: Its private key.
+        tls: True to use TLS with the usual certificate authorities; a CA or certificate implies TLS.
+        ca: Authorities (PEM) that are trusted instead.
+        certificate: Own certificate chain (PEM).
+        key: Private key of the certificate.
         token_file: File with a token.
     """
 
@@ -87,10 +87,10 @@ def profiles_file() -> Path:
 
 
 def read_profiles() -> Profiles:
-    """The user's profiles; none where there is no file.
+    """Return the user's profiles; none if there is no file.
 
     Raises:
-        UsageError: The file cannot be read, or says what no profile is.
+        UsageError: The file cannot be read, or has an invalid profile.
     """
     file = profiles_file()
     text = _text(file)
@@ -142,10 +142,10 @@ def add_profile(name: str, profile: Profile, *, token: str | None = None, is_def
 
 
 def remove_profile(name: str) -> None:
-    """Remove a profile, and the token that was kept for it.
+    """Remove a profile, and the token that was stored for it.
 
     Raises:
-        UsageError: There is none of that name, or a file cannot be written.
+        UsageError: There is no profile of that name, or a file cannot be written.
     """
     known = read_profiles()
     require_profile(known, name)
@@ -161,10 +161,10 @@ def remove_profile(name: str) -> None:
 
 
 def require_profile(known: Profiles, name: str) -> Profile:
-    """The profile of a name.
+    """Return the profile of a name.
 
     Raises:
-        UsageError: There is none.
+        UsageError: There is no such profile.
     """
     if name not in known.by_name:
         there = f"; there are {', '.join(known.by_name)}" if known.by_name else ""

@@ -25,9 +25,9 @@ class Statistics:
 
     Attributes:
         engine: Engine for decision diagrams that was used.
-        state_bits: Boolean variables that encode a state.
-        iterations: Rounds of the fixed point.
-        peak_nodes: Most nodes that a set of states took at the end of a round.
+        state_bits: Number of Boolean variables that encode a state.
+        iterations: Number of iterations of the fixed point.
+        peak_nodes: Largest number of nodes of a set of states at the end of an iteration.
     """
 
     engine: str
@@ -44,10 +44,10 @@ class Synthesis(Outcome):
         status: Outcome of the synthesis.
         diagnostics: Every finding about the model, sorted by place.
         reason: Reason why there is no supervisor, in one sentence; empty where there is one.
-        supervisor: The supervisor's file (`.rsup`), as the server meant it: its digest was checked; empty where there
-            is none. Untrusted: decode it with `robosc.supervisor.decode`, which validates it, or read that of automata
-            with `robosc.SystemSupervisor.read`.
-        summary: The supervisor in figures and words, or None where there is none.
+        supervisor: The supervisor's file (`.rsup`) as the server sent it, with its digest checked; empty if there is no
+            supervisor. Untrusted: decode it with `robosc.supervisor.decode`, which validates it, or read that of
+            automata with `robosc.SystemSupervisor.read`.
+        summary: Summary of the supervisor in numbers and texts, or None if there is no supervisor.
         statistics: Figures of the work, or None where there was no synthesis.
         explanation: Explanation of why no supervisor exists, or None where there is nothing to explain.
         signature: Content of the file's signature (`.rsup.sig`), as the server made it; empty where it signs nothing.
@@ -129,7 +129,7 @@ class Formatted:
     """A text in its canonical layout.
 
     Attributes:
-        text: The text, which differs from the one given in its layout alone; None where that has syntax errors.
+        text: The text, which differs from the given one only in its layout; None: the given one has syntax errors.
         diagnostics: The syntax errors.
     """
 
@@ -139,19 +139,19 @@ class Formatted:
 
 @dataclass(frozen=True, slots=True)
 class ServerLimits:
-    """Limits of what a server takes and gives.
+    """Limits of a server's requests, tasks and results.
 
     Attributes:
-        bundle_bytes: Bytes of all names and texts of a bundle.
-        bundle_files: Files of a bundle.
-        task_seconds: Seconds by the clock, of one task.
-        task_cpu_seconds: Seconds of a processor's time, of one task.
-        task_memory_bytes: Bytes of memory, of one task.
-        task_nodes: Nodes of decision diagrams, of one task.
-        result_bytes: Bytes of one result.
-        waiting_tasks: Tasks that may wait, of all callers together.
-        waiting_tasks_per_caller: Tasks that may wait, of one caller.
-        retention_seconds: Seconds that a job and its result are kept after its end.
+        bundle_bytes: Maximum size of all names and texts of a bundle.
+        bundle_files: Maximum number of files of a bundle.
+        task_seconds: Maximum wall-clock time of one task, in seconds.
+        task_cpu_seconds: Maximum CPU time of one task, in seconds.
+        task_memory_bytes: Maximum memory of one task, in bytes.
+        task_nodes: Maximum number of decision diagram nodes of one task.
+        result_bytes: Maximum size of one result, in bytes.
+        waiting_tasks: Maximum number of waiting tasks of all callers.
+        waiting_tasks_per_caller: Maximum number of waiting tasks of one caller.
+        retention_seconds: Time for which a job and its result are stored after its end, in seconds.
     """
 
     bundle_bytes: int
@@ -173,7 +173,7 @@ class ServerInfo:
     Attributes:
         version: Version of RoboSC.
         engines: Engines for decision diagrams, the fastest first.
-        limits: Limits of what it takes and gives.
+        limits: Limits of the server.
     """
 
     version: str

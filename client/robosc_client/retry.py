@@ -50,12 +50,12 @@ class RetryPolicy:
     Attributes:
         attempts: Maximum number of calls, the first included; 1: no retries.
         watch_attempts: The same for a watch, counted from its last message.
-        first_s: The first delay, before it is scattered between a half and the whole of it.
+        first_s: The first delay, in seconds; the actual delay is random, between a half and the whole of it.
         factor: Ratio of each delay to the one before: from 1 to 10.
         longest_s: The longest delay.
         longest_asked_s: Maximum delay that a server may request; a longer request raises its error.
-        scatter: Random numbers from 0 to 1.
-        clock: Seconds, as `time.monotonic`.
+        scatter: Function that returns random numbers from 0 to 1.
+        clock: Monotonic clock, in seconds.
     """
 
     attempts: int = 4

@@ -12,7 +12,7 @@ DEFAULT_GENERATION = GenerateOptions()
 
 @dataclass(frozen=True, slots=True)
 class Check:
-    """Find everything that is wrong with a model or library."""
+    """Check a model or library: report every finding."""
 
     model: Bundle
 
@@ -52,7 +52,7 @@ class Explore:
     """Explore everything that the robot may do under its supervisor.
 
     Attributes:
-        maximum_states: States beyond which it is given up; None: 100,000.
+        maximum_states: Number of states beyond which the exploration is given up; None: 100,000.
     """
 
     model: Bundle
@@ -68,8 +68,8 @@ class Verify:
 
     Attributes:
         model: The model and its libraries.
-        supervisor: A supervisor's file (`.rsup`), of which nothing is believed; empty: one is made of the model.
-        deployment: Place where the supervisor is to stand; None: as its file says, and a controller without one.
+        supervisor: A supervisor's file (`.rsup`), which is not trusted; empty: the supervisor is made from the model.
+        deployment: Deployment of the supervisor; None: that of its file, or a controller if there is no file.
         properties: Properties in the property language.
         property_files: Texts with a property on each line.
         engine: As in SynthesisOptions.

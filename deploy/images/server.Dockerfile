@@ -42,7 +42,7 @@ ENV PATH=/opt/robosc/bin:$PATH \
     ROBOSC_SERVER_HOST=0.0.0.0 \
     ROBOSC_SERVER_LOG_FORMAT=json \
     ROBOSC_SERVER_STATE_DIR=/var/lib/robosc
-# A number, since Kubernetes can tell from no name that it is not root.
+# A number, since Kubernetes cannot check by a name that the user is not root.
 USER 10001:10001
 WORKDIR /var/lib/robosc
 # All that is ever written: the root may be read-only.

@@ -16,10 +16,9 @@ from robosc.editing.outline import Part, outline
 from robosc.errors import Diagnostic, LanguageError, Severity
 from robosc.interfaces import shipped_types
 from robosc.language import load_bundle, parse, read_source, syntax
-from robosc.language.bundle import SUFFIX
+from robosc.language.bundle import SUFFIX, declared_libraries
 from robosc.language.interfaces import INTERFACE_KINDS, interface_folders
 from robosc.language.parser import Parsed
-from robosc.language.scan import declared_libraries
 from robosc.model.check import Checked, Inspected, inspect
 from robosc.source import Bundle, Location, SourceFile
 from robosc_lsp.texts import Text

@@ -1,5 +1,6 @@
-"""Progress of long work."""
+"""Progress of long work, and how whoever waits for it follows and stops it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 
@@ -14,3 +15,19 @@ class Progress:
 
     stage: str
     message: str
+
+
+type OnProgress = Callable[[Progress], None]
+"""Function that is called with the progress."""
+
+type ShouldStop = Callable[[], bool]
+"""Function that is called again and again; once it returns true, the work ends."""
+
+
+def ignored(progress: Progress) -> None:
+    """Ignore where the work is."""
+
+
+def never() -> bool:
+    """Return False: the work goes on to its end."""
+    return False

@@ -8,12 +8,12 @@ if TYPE_CHECKING:
     from collections.abc import Callable
     from pathlib import Path
 
+    from robosc.certification.progress import OnProgress
     from robosc.pipeline.exploring import Exploration
     from robosc.pipeline.findings import Findings
     from robosc.pipeline.loading import LoadedAutomata
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.results import Explained, Generation, Verification
-    from robosc.pipeline.synthesis import OnProgress
     from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis
     from robosc.targets import GenerateOptions
 

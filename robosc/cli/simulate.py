@@ -3,30 +3,30 @@
 import argparse
 import json
 import sys
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robosc.cli import automata
 from robosc.cli.arguments import add_engine_options, add_model_arguments
 from robosc.cli.output import ESCAPED, CommandError, ExitCode, UsageError, has_unicode_output
+from robosc.cli.simulation_steps import parts_text, state_lines, step_lines, take_event, write_lines
 from robosc.cli.supervisor_argument import supervisor_of_arguments
 from robosc.model.structure import Deployment
 from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.certification.supervisor_file import StateInWords
-    from robosc.pipeline.manual_run import ManualRun, Step
+    from robosc.pipeline.manual_run import ManualRun
     from robosc.pipeline.saved_runs import ModelOfTest
     from robosc.pipeline.simulation import Run
+    from robosc.pipeline.steps import Step
     from robosc.pipeline.system_runs import SystemRun
-    from robosc.pipeline.walking import Trouble
-
-DEFAULT_STEPS = 1000
+    from robosc.pipeline.walking import WalkFinding
 
 _DESCRIPTION = """\
 Step the robot under its supervisor by hand: you play the world, and choose among what the controller may do. Events
-come from a file (--events), by chance (--random, --until-trouble), or as commands that are typed: 'help' lists them.
+come from a file (--events), by chance (--random, --until-finding), or as commands that are typed: 'help' lists them.
 With none of these options commands are read from standard input; on a terminal with a prompt, a history and completion.
 For automata (FILE.cif, .gen, .wmod), you play the plants.
 """
@@ -40,7 +40,7 @@ a file of events has one a line, with its data as JSON or as name=value; what is
   take -> Buffer = full                of automata, which of several states it leads to
 An event log (.jsonl) is taken as well: its events happen again.
 
-trouble, for --trouble and until-trouble:
+kinds of findings, for --finding and until-finding:
   deadlock  no event at all can happen, in a state that is not marked
   waiting   nothing is allowed and no service or action is under way, in a state that is not marked
   blocked   the behaviours could do a request that requirements or the supervisor forbid
@@ -48,7 +48,7 @@ trouble, for --trouble and until-trouble:
 
 exit status:
   0  done
-  1  an event of the file, or a command, is not possible; --until-trouble found trouble; there is no supervisor
+  1  an event of the file, or a command, is not possible; --until-finding found something; there is no supervisor
   2  wrong use; a file that cannot be read or written
 """
 
@@ -75,14 +75,14 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     )
     group.add_argument("--random", type=_count, metavar="N", help="then N events by chance")
     group.add_argument(
-        "--until-trouble", type=_count, metavar="N", help="then events by chance, at most N, until there is trouble"
+        "--until-finding", type=_count, metavar="N", help="then events by chance, at most N, until there is a finding"
     )
     group.add_argument("--seed", type=int, default=0, metavar="SEED", help="seed of the chance (default: 0)")
     group.add_argument(
-        "--trouble",
+        "--finding",
         action="append",
         choices=["deadlock", "waiting", "blocked", "unknown"],
-        help="kind of trouble that --until-trouble looks for (may be repeated; default: all)",
+        help="kind of finding that --until-finding looks for (may be repeated; default: all)",
     )
     parser.add_argument(
         "--initial",
@@ -122,11 +122,11 @@ def run(arguments: argparse.Namespace) -> int:
     for file in arguments.save:
         if file.suffix not in (".jsonl", ".py"):
             raise UsageError(f"{file}: the name of a saved run ends in .jsonl (an event log) or .py (a test)")
-    if arguments.trouble and arguments.until_trouble is None:
-        raise UsageError("--trouble says what --until-trouble looks for: it needs that")
-    is_scripted = arguments.events is not None or arguments.random or arguments.until_trouble
+    if arguments.finding and arguments.until_finding is None:
+        raise UsageError("--finding says what --until-finding looks for: it needs that")
+    is_scripted = arguments.events is not None or arguments.random or arguments.until_finding
     if not is_scripted and (arguments.json or arguments.save):
-        raise UsageError("--json and --save need events: --events, --random or --until-trouble")
+        raise UsageError("--json and --save need events: --events, --random or --until-finding")
     if automata.is_given(arguments):
         return _run_automata(arguments, is_scripted=bool(is_scripted))
     if arguments.initial is not None:
@@ -163,43 +163,11 @@ def _run_automata(arguments: argparse.Namespace, *, is_scripted: bool) -> int:
         initial = None if arguments.initial is None else state_parts(made.supervisor.system, arguments.initial)
         run_ = SystemRun(made.supervisor, initial)
     except ChoiceError as error:
-        choose = f"; choose one: --initial '{_parts_text(error.example)}'" if error.example else ""
+        choose = f"; choose one: --initial '{parts_text(error.example)}'" if error.example else ""
         raise CommandError(f"{error.problem}{choose}", ExitCode.FAILED) from error
     except UnknownNameError as error:
         raise UsageError(f"--initial: {error}") from error
     return _script(arguments, run_) if is_scripted else Shell(run_, None).loop(sys.stdin)
-
-
-def _parts_text(parts: Mapping[str, object]) -> str:
-    from robosc.explanation.notation import value_text
-
-    return ", ".join(f"{name} = {value_text(value)}" for name, value in parts.items())  # type: ignore[arg-type]
-
-
-def take_event(run_: "Run | SystemRun", name: str, data: object, target: str) -> "Step":
-    """Take an event as a person wrote it.
-
-    Args:
-        run_: The run.
-        name: Name of the event.
-        data: Data that it carries; NO_DATA for none.
-        target: Parts of the state that it is to lead to; of automata.
-
-    Raises:
-        RoboscError: It cannot happen so.
-    """
-    from robosc.pipeline.received_data import NO_DATA
-    from robosc.pipeline.simulation import Run
-    from robosc.pipeline.system_runs import ChoiceError, state_parts
-
-    event, given = run_.event_called(name), () if data is NO_DATA else (data,)
-    if isinstance(run_, Run):
-        return run_.step(event, *given)
-    try:
-        return run_.step(event, *given, to=state_parts(run_.supervisor.system, target) if target else None)
-    except ChoiceError as error:
-        choose = f"; choose one: {name} -> {_parts_text(error.example)}" if error.example else ""
-        raise ChoiceError(f"{error.problem}{choose}") from error
 
 
 def model_of_test(arguments: argparse.Namespace) -> "ModelOfTest":
@@ -218,20 +186,20 @@ def _script(arguments: argparse.Namespace, run_: "Run | SystemRun") -> int:
     """Have happen what the options say, and report it."""
     from robosc.errors import RoboscError
     from robosc.pipeline.simulation import Run
-    from robosc.pipeline.walking import ALL_TROUBLE, TroubleKind
+    from robosc.pipeline.walking import ALL_FINDINGS, WalkFindingKind
 
     report = _JsonReport(run_) if arguments.json else _TextReport(run_)
-    trouble, problem = None, ""
+    finding, problem = None, ""
     try:
         if arguments.events is not None:
             problem = _take_events(arguments.events, run_, report.step)
         if not problem and arguments.random:
             for step in run_.walk(arguments.random, arguments.seed):
                 report.step(step)
-        if not problem and arguments.until_trouble:
-            kinds = frozenset(map(TroubleKind, arguments.trouble or ())) or ALL_TROUBLE
+        if not problem and arguments.until_finding:
+            kinds = frozenset(map(WalkFindingKind, arguments.finding or ())) or ALL_FINDINGS
             before = len(run_)
-            trouble = run_.walk_until_trouble(arguments.until_trouble, arguments.seed, kinds)
+            finding = run_.walk_until_finding(arguments.until_finding, arguments.seed, kinds)
             for step in run_.history[before:]:
                 report.step(step)
         if isinstance(run_, Run):
@@ -241,11 +209,11 @@ def _script(arguments: argparse.Namespace, run_: "Run | SystemRun") -> int:
         raise UsageError(str(error)) from error
     except RoboscError as error:
         problem = str(error)
-    report.end(trouble, problem)
+    report.end(finding, problem)
     if problem:
         sys.stdout.flush()
         sys.stderr.write(f"robosc: {visible(problem)}\n")
-    return ExitCode.FAILED if problem or trouble is not None else ExitCode.OK
+    return ExitCode.FAILED if problem or finding is not None else ExitCode.OK
 
 
 def _take_events(name: str, run_: "Run | SystemRun", report: Callable[["Step"], None]) -> str:
@@ -297,8 +265,8 @@ class _TextReport:
         write_lines(step_lines(self._count, step, self._state))
         self._state = step.state
 
-    def end(self, trouble: "Trouble | None", problem: str) -> None:
-        write_lines([*([] if trouble is None else [str(trouble)]), *state_lines(self._run)])
+    def end(self, finding: "WalkFinding | None", problem: str) -> None:
+        write_lines([*([] if finding is None else [str(finding)]), *state_lines(self._run)])
 
 
 class _JsonReport:
@@ -323,14 +291,14 @@ class _JsonReport:
             }
         )
 
-    def end(self, trouble: "Trouble | None", problem: str) -> None:
+    def end(self, finding: "WalkFinding | None", problem: str) -> None:
         run_ = self._run
         disabled = [event for event in run_.events if run_.is_controllable(event) and event not in run_.enabled]
         _print_line(
             {
-                "status": "not possible" if problem else "trouble" if trouble is not None else "done",
-                "message": problem or (str(trouble) if trouble is not None else ""),
-                "trouble": None if trouble is None else trouble_json(trouble),
+                "status": "not possible" if problem else "finding" if finding is not None else "done",
+                "message": problem or (str(finding) if finding is not None else ""),
+                "finding": None if finding is None else finding_json(finding),
                 "steps": self._count,
                 "state": state_json(run_.state),
                 "marked": run_.is_marked,
@@ -339,11 +307,6 @@ class _JsonReport:
                 "possible": list(run_.possible),
             }
         )
-
-
-def write_lines(lines: Iterable[str]) -> None:
-    """Write lines to standard output, as a terminal can show them."""
-    sys.stdout.write("".join(visible(line) + "\n" for line in lines))
 
 
 def _print_line(document: Mapping[str, Any]) -> None:
@@ -362,28 +325,6 @@ def state_json(state: "StateInWords") -> dict[str, object]:
     }
 
 
-def trouble_json(trouble: "Trouble") -> dict[str, object]:
-    """Trouble as JSON values."""
-    return {"kind": str(trouble.kind), "event": trouble.event, "why": list(trouble.why), "steps": trouble.steps}
-
-
-def step_lines(number: int, step: "Step", before: "StateInWords") -> list[str]:
-    """A step in lines: the event with its data, what it changed, what a request sends, and what was unknown."""
-    from robosc.pipeline.manual_run import changes_text, event_text
-
-    lines = [f"{number:4}  {': '.join(filter(None, (event_text(step), changes_text(before, step.state))))}"]
-    if step.provided is not None:
-        lines.append(f"      sends {json.dumps(step.provided, default=str)}")
-    lines += [f"      unknown: {item}" for item in step.unknown]
-    lines += [f"      unknown: {item} keeps its value" for item in step.skipped]
-    return lines
-
-
-def state_lines(run_: "ManualRun") -> list[str]:
-    """Return the state and what can happen in it, in lines."""
-    others = [event for event in run_.possible if not run_.is_controllable(event)]
-    return [
-        f"now       {run_.state}{' (marked)' if run_.is_marked else ''}",
-        f"allowed   {', '.join(run_.enabled) or 'nothing'}",
-        f"can come  {', '.join(others) or 'nothing'}",
-    ]
+def finding_json(finding: "WalkFinding") -> dict[str, object]:
+    """WalkFinding as JSON values."""
+    return {"kind": str(finding.kind), "event": finding.event, "why": list(finding.why), "steps": finding.steps}

@@ -7,16 +7,16 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from robosc.cli.output import ExitCode
-from robosc.cli.simulate import DEFAULT_STEPS, state_lines, step_lines, take_event, write_lines
+from robosc.cli.simulation_steps import state_lines, step_lines, take_event, write_lines
 from robosc.errors import RoboscError
 from robosc.pipeline.event_scripts import parse_event, target_split
 from robosc.pipeline.received_data import DataField
 from robosc.source import visible
 
 if TYPE_CHECKING:
-    from robosc.pipeline.manual_run import Step
     from robosc.pipeline.saved_runs import ModelOfTest
     from robosc.pipeline.simulation import Run
+    from robosc.pipeline.steps import Step
     from robosc.pipeline.system_runs import SystemRun
 
 PROMPT = "> "
@@ -30,7 +30,7 @@ undo [N], redo [N]         take back the last events; take them again
 history                    the events so far
 restart                    begin again in the initial state
 random N [SEED]            N events by chance
-until-trouble [N] [SEED]   events by chance until there is trouble: a deadlock, a blocked request, something unknown
+until-finding [N] [SEED]   events by chance until there is a finding: a deadlock, a blocked request, something unknown
 save FILE                  the events so far, as an event log (.jsonl) or a test for pytest (.py)
 help, quit
 """
@@ -39,6 +39,7 @@ AUTOMATA_HELP = """\
 EVENT [DATA] [-> STATE]    an event: press, sensor true, take -> Buffer = full where it can lead to several states
 """ + "".join(line for line in HELP.splitlines(keepends=True)[1:] if not line.startswith("save"))
 
+_DEFAULT_STEPS = 1000
 _MOST = 1_000_000
 _MOST_TOLD = 20
 """Steps of a walk that are reported at once."""
@@ -69,7 +70,7 @@ class Shell:
             "history": self._history,
             "restart": self._restart,
             "random": self._random,
-            "until-trouble": self._until_trouble,
+            "until-finding": self._until_finding,
             "save": self._save,
             "help": self._help,
         }
@@ -186,13 +187,13 @@ class Shell:
         ended = ["nothing more can happen"] if len(taken) < count else []
         write_lines([*ended, f"seed {seed}", *state_lines(self._run)])
 
-    def _until_trouble(self, words: Sequence[str]) -> None:
-        count, seed = _numbers("until-trouble", words, (DEFAULT_STEPS, self._walks))
+    def _until_finding(self, words: Sequence[str]) -> None:
+        count, seed = _numbers("until-finding", words, (_DEFAULT_STEPS, self._walks))
         self._walks += 1
         before = len(self._run)
-        trouble = self._run.walk_until_trouble(count, seed)
+        finding = self._run.walk_until_finding(count, seed)
         self._print_walk(before)
-        write_lines([str(trouble) if trouble is not None else f"no trouble in {len(self._run) - before} steps"])
+        write_lines([str(finding) if finding is not None else f"no finding in {len(self._run) - before} steps"])
         write_lines([f"seed {seed}", *state_lines(self._run)])
 
     def _save(self, words: Sequence[str]) -> None:

@@ -14,13 +14,14 @@ if TYPE_CHECKING:
         EmptyExplanation,
         Explanation,
         document,
+        empty_text,
+        explanation_text,
         from_text,
         to_text,
         whole_from_text,
     )
     from robosc.explanation.requests import RequestError
     from robosc.explanation.subjects import ModelWords, SystemWords
-    from robosc.explanation.text import empty_text, explanation_text
 
 _HOMES = {
     "EmptyExplanation": "explanations",
@@ -29,10 +30,10 @@ _HOMES = {
     "RequestError": "requests",
     "SystemWords": "subjects",
     "document": "explanations",
-    "empty_text": "text",
+    "empty_text": "explanations",
     "explain_empty": "blame",
     "explain_synthesis": "explain",
-    "explanation_text": "text",
+    "explanation_text": "explanations",
     "from_text": "explanations",
     "to_text": "explanations",
     "whole_from_text": "explanations",

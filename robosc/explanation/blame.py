@@ -7,7 +7,8 @@ from typing import Any
 from robosc.explanation.analysis import Analysis
 from robosc.explanation.conflict import minimal_conflict, minimal_removal
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
-from robosc.explanation.explanations import Blamed, CounterexampleReport, EmptyExplanation, Path, StateValues
+from robosc.explanation.explanations import EmptyExplanation
+from robosc.explanation.parts import Blamed, CounterexampleReport, Path, StateValues
 from robosc.explanation.problems import Problems
 from robosc.explanation.reports import Reporter
 from robosc.explanation.subjects import Words

@@ -11,8 +11,9 @@ from robosc.errors import InternalError
 from robosc.explanation.analysis import Analysis, BlockingCause, BlockingCauseKind
 from robosc.explanation.blame import explain_problem
 from robosc.explanation.conflict import minimal_conflict
-from robosc.explanation.explanations import EventHere, EventReport, Explanation, Reason, Remark, StateReport, Stopped
+from robosc.explanation.explanations import Explanation
 from robosc.explanation.notation import events_text
+from robosc.explanation.parts import EventHere, EventReport, Reason, Remark, StateReport, Stopped
 from robosc.explanation.problems import Problems
 from robosc.explanation.reports import Reporter
 from robosc.explanation.requests import MAXIMUM_SHOWN, RequestError

@@ -1,135 +1,33 @@
-"""Explanations as values: what commands print, services send and programs read; `document` makes JSON values of them.
+"""Explanations: what commands print, services send and programs read; `document` makes JSON values of them.
 
-They travel from a service to its client, so they are frozen values of plain types that msgspec can validate.
+Their texts are for a terminal: a thought a line, places as `file:line:column`.
 """
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
 import msgspec
 
-from robosc.expressions import Value
-from robosc.source import Location
+from robosc.explanation.notation import events_text, value_text
+from robosc.explanation.parts import (
+    Blamed,
+    CounterexampleReport,
+    EventHere,
+    EventReport,
+    Part,
+    Path,
+    Reason,
+    Remark,
+    StateReport,
+    StateValues,
+    Stopped,
+)
+from robosc.source import visible
 from robosc.tables import html_text
 
-
-@dataclass(frozen=True, slots=True)
-class Part:
-    """A part of the model.
-
-    Attributes:
-        kind: `requirement`, `invariant`, `condition`, `range`, `marking`; `component`, `communication`, `state`; of
-            automata that are no model's also `plant`.
-        text: Description of the part, in the model's words.
-        location: Place of the part.
-    """
-
-    kind: str
-    text: str
-    location: Location | None
-
-
-@dataclass(frozen=True, slots=True)
-class StateValues:
-    """One state, as `robosc explore` names it.
-
-    Attributes:
-        components: State of every component with a behaviour.
-        variables: Value of every synthesis variable, by `Component.variable`.
-        communications: Location of every service and action; of one that is called like a component, by
-            `service name` or `action name`.
-    """
-
-    components: dict[str, str]
-    variables: dict[str, Value]
-    communications: dict[str, str]
-
-
-@dataclass(frozen=True, slots=True)
-class Path:
-    """A run, and where it ends.
-
-    Attributes:
-        events: Its events.
-        is_shortest: True if it is known that no run is shorter.
-        state: Its last state.
-    """
-
-    events: tuple[str, ...]
-    is_shortest: bool
-    state: StateValues
-
-
-@dataclass(frozen=True, slots=True)
-class Reason:
-    """Reason why an event cannot happen in some state.
-
-    Attributes:
-        kind: `behaviour`, `range`, `requirement` or `supervisor`.
-        message: Reason in one sentence.
-        part: The part of the model, or None where it is the supervisor.
-        way: A shortest run to a state where it is so, or None where the state is given.
-        trouble: Counterexample that would follow, where the supervisor forbids it.
-    """
-
-    kind: str
-    message: str
-    part: Part | None
-    way: Path | None = None
-    trouble: "CounterexampleReport | None" = None
-
-
-@dataclass(frozen=True, slots=True)
-class Stopped:
-    """A way to some goal by the behaviours alone, and where it is stopped.
-
-    Attributes:
-        events: Events of the whole way.
-        stopped_at: Place of the event, from 0, that must not happen.
-        state: The state before that event.
-        reasons: Reasons why it must not happen; none where it is uncontrollable and leads into trouble.
-    """
-
-    events: tuple[str, ...]
-    stopped_at: int
-    state: StateValues
-    reasons: tuple[Reason, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class CounterexampleReport:
-    """A run into trouble.
-
-    Attributes:
-        kind: `bad`, where an invariant, a range or a condition is broken at the end; `blocking`, where no marked state
-            can be reached from there; `nowhere`, where no run begins, since there is no initial state.
-        way: The run.
-        is_forced: True if nothing can prevent it: all of its events are uncontrollable.
-        messages: Sentences that say what the trouble is.
-        parts: Parts of the model that are broken.
-        stopped: Way that the behaviours would have to a marked state, for a state that blocks; None where they have
-            none, or finding one takes too long, which is then one of the messages.
-    """
-
-    kind: str
-    way: Path
-    is_forced: bool
-    messages: tuple[str, ...]
-    parts: tuple[Part, ...]
-    stopped: Stopped | None = None
-
-
-@dataclass(frozen=True, slots=True)
-class Blamed:
-    """A part of the model that is to blame.
-
-    Attributes:
-        part: The part.
-        suffices: True if there is a supervisor without this part alone; None where that was not found out.
-    """
-
-    part: Part
-    suffices: bool | None
+MAXIMUM_VALUES = 30
+"""Values of a state that are shown."""
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -157,79 +55,10 @@ class EmptyExplanation:
         return f"<no supervisor: {len(self.blamed) + self.left_out} parts of the model are to blame>"
 
     def __str__(self) -> str:
-        from robosc.explanation.text import empty_text
-
         return empty_text(self).rstrip()
 
     def _repr_html_(self) -> str:
         return html_text(str(self))
-
-
-@dataclass(frozen=True, slots=True)
-class EventReport:
-    """Report on what restricts an event.
-
-    Attributes:
-        event: The event.
-        is_controllable: True if the supervisor may disable it.
-        status: `free`, where it can happen wherever the behaviours let it; `restricted`; `never`, where it can happen
-            nowhere.
-        reasons: Reasons that keep it from happening, each with a shortest run to a state where it does.
-        stopped: Way to where the behaviours would let it happen, for an event that they never let happen, and why
-            that is stopped.
-        unfound: Sentence in place of that way, where finding one takes too long; else empty.
-    """
-
-    event: str
-    is_controllable: bool
-    status: str
-    reasons: tuple[Reason, ...]
-    stopped: Stopped | None = None
-    unfound: str = ""
-
-
-@dataclass(frozen=True, slots=True)
-class EventHere:
-    """Report on whether an event can happen in one state, and why not."""
-
-    event: str
-    is_controllable: bool
-    can_happen: bool
-    reasons: tuple[Reason, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class StateReport:
-    """Report on what can happen in one state.
-
-    Attributes:
-        way: A run to it.
-        fitting: Number of states of the controlled system that fit what was asked, as a decimal number.
-        events: The events asked for.
-    """
-
-    way: Path
-    fitting: str
-    events: tuple[EventHere, ...]
-
-
-@dataclass(frozen=True, slots=True)
-class Remark:
-    """A remark on the controlled system for its author.
-
-    Attributes:
-        kind: `never-enabled`, `unused-requirement`, `unreachable-state`, `only-uncontrollable` or `deadlock`.
-        message: One sentence.
-        location: Place in the text, or None where it is about no single part.
-        way: A shortest run to such a state, where there is one.
-        stopped: Way that the behaviours would have to a state that is not reachable, and where it is stopped.
-    """
-
-    kind: str
-    message: str
-    location: Location | None
-    way: Path | None = None
-    stopped: Stopped | None = None
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -258,8 +87,6 @@ class Explanation:
         return f"<explanation: {len(self.events)} events, {len(self.remarks)} remarks>"
 
     def __str__(self) -> str:
-        from robosc.explanation.text import explanation_text
-
         return explanation_text(self).rstrip()
 
     def _repr_html_(self) -> str:
@@ -300,3 +127,168 @@ def _from_text[Kind](text: str, kind: type[Kind]) -> Kind:
         return msgspec.json.decode(text, type=kind)
     except (msgspec.MsgspecError, RecursionError) as error:
         raise ValueError(f"no explanation: {error}") from error
+
+
+def explanation_text(explanation: Explanation) -> str:
+    """Return the text on what synthesis did to a model or to automata."""
+    return _joined(_Text(is_of_automata=explanation.is_of_automata).explained(explanation))
+
+
+def empty_text(explanation: EmptyExplanation) -> str:
+    """Return the text on why there is no supervisor."""
+    return _joined(_Text(is_of_automata=explanation.is_of_automata).empty(explanation))
+
+
+def _joined(lines: Iterator[str]) -> str:
+    return "".join(f"{visible(line)}\n" for line in lines)
+
+
+class _Text:
+    """Lines about one explanation.
+
+    Args:
+        is_of_automata: True if it is about automata that are no model's.
+    """
+
+    def __init__(self, *, is_of_automata: bool) -> None:
+        self._plants = "plants" if is_of_automata else "behaviours"
+        # Automata may have several.
+        self._initial = "an initial state" if is_of_automata else "the initial state"
+        self._free_way = f"the {self._plants} would have the way"
+        self._statuses = {
+            "free": f"free: it can happen wherever the {self._plants} let it",
+            "restricted": "restricted",
+            "never": "can never happen",
+        }
+
+    def explained(self, item: Explanation) -> Iterator[str]:
+        """Yield the lines about what synthesis did."""
+        if item.empty is not None:
+            yield from self.empty(item.empty)
+        if item.state is not None:
+            yield from self._state_report(item.state)
+        for event in item.events:
+            yield from self._event(event)
+        for remark in item.remarks:
+            yield from self._remark(remark)
+
+    # No supervisor
+
+    def empty(self, item: EmptyExplanation) -> Iterator[str]:
+        """Yield the lines about why there is no supervisor."""
+        yield "trouble:"
+        if item.trouble.kind == "nowhere":
+            yield from _indented(iter(item.trouble.messages))
+            return
+        yield from _indented(self._trouble(item.trouble, f"from {self._initial}", f"in {self._initial} already"))
+        if not item.blamed:
+            return
+        if not item.is_minimal:
+            yield "to blame is something among these (the search for the least of them was given up):"
+        elif len(item.blamed) == 1:
+            yield "to blame: this alone leaves no supervisor"
+        else:
+            yield "to blame: these together leave no supervisor, and each of them is needed for that"
+        for blamed in item.blamed:
+            yield f"  {_part(blamed.part)}"
+        if item.left_out:
+            yield f"  and {item.left_out} more"
+        if item.is_minimal and all(blamed.suffices for blamed in item.blamed):
+            yield f"there is a supervisor without {'it' if len(item.blamed) == 1 else 'any one of them'}"
+        elif item.removal:
+            yield "there is a supervisor without:"
+            for part in item.removal:
+                yield f"  {_part(part)}"
+
+    def _trouble(self, item: CounterexampleReport, start: str, here: str) -> Iterator[str]:
+        """Yield the lines about a run into trouble.
+
+        Args:
+            item: The trouble.
+            start: Place where a run begins, in words.
+            here: The place where there is no run, in words.
+        """
+        if not item.way.events:
+            yield f"{here}:"
+        elif item.is_forced:
+            yield f"{start} {events_text(item.way.events)} can follow, and nothing can prevent it"
+        else:
+            yield f"{start} every way on to a marked state is closed by trouble such as after {_run(item.way)}"
+        yield f"  there: {_state(item.way.state)}"
+        for message in item.messages:
+            yield f"  {message}"
+        if item.stopped is not None:
+            yield from _indented(self._stopped(item.stopped, self._free_way))
+
+    def _stopped(self, item: Stopped, what: str) -> Iterator[str]:
+        event = item.events[item.stopped_at]
+        if len(item.events) == 1:
+            yield f"{what} {event}, but it must not happen:"
+        else:
+            before = f" after {events_text(item.events[: item.stopped_at])}" if item.stopped_at else ""
+            yield f"{what} {events_text(item.events)}, but {event} must not happen{before}:"
+        for reason in item.reasons:
+            yield from _indented(self._reason(reason))
+        if not item.reasons:
+            yield "  it leads into trouble"
+
+    def _reason(self, item: Reason) -> Iterator[str]:
+        place = f" ({item.part.location})" if item.part is not None and item.part.location is not None else ""
+        when = ""
+        if item.way is not None:
+            when = f"; for instance after {_run(item.way)}" if item.way.events else f"; for instance in {self._initial}"
+        yield f"{item.message}{place}{when}"
+        if item.trouble is not None:
+            yield from _indented(self._trouble(item.trouble, "then", "it leads into trouble at once"))
+
+    # With a supervisor
+
+    def _event(self, item: EventReport) -> Iterator[str]:
+        kind = "" if item.is_controllable else " (uncontrollable)"
+        yield f"{item.event}{kind}: {self._statuses[item.status]}"
+        for reason in item.reasons:
+            yield from _indented(self._reason(reason))
+        if item.unfound:
+            yield f"  {item.unfound}"
+        if item.stopped is not None:
+            yield from _indented(self._stopped(item.stopped, self._free_way))
+
+    def _state_report(self, item: StateReport) -> Iterator[str]:
+        where = f"after {_run(item.way)}" if item.way.events else f"in {self._initial}"
+        more = "" if item.fitting == "1" else f" (one of {item.fitting} states that fit)"
+        yield f"{where}{more}:"
+        yield f"  {_state(item.way.state)}"
+        for event in item.events:
+            yield from self._here(event)
+
+    def _here(self, item: EventHere) -> Iterator[str]:
+        kind = "" if item.is_controllable else " (uncontrollable)"
+        yield f"{item.event}{kind}: {'can happen' if item.can_happen else 'cannot happen'}"
+        for reason in item.reasons:
+            yield from _indented(self._reason(reason))
+
+    def _remark(self, item: Remark) -> Iterator[str]:
+        place = "" if item.location is None else f"{item.location}: "
+        yield f"{place}warning: {item.message} [{item.kind}]"
+        if item.way is not None:
+            yield f"  {_state(item.way.state)}"
+        if item.stopped is not None:
+            yield from _indented(self._stopped(item.stopped, self._free_way))
+
+
+def _part(part: Part) -> str:
+    return part.text if part.location is None else f"{part.location}: {part.text}"
+
+
+def _run(way: Path) -> str:
+    return events_text(way.events) + ("" if way.is_shortest else " (perhaps not the shortest way)")
+
+
+def _state(state: StateValues) -> str:
+    parts = [f"{name} is {value}" for name, value in (*state.components.items(), *state.communications.items())]
+    parts += [f"{name} = {value_text(value)}" for name, value in state.variables.items()]
+    return ", ".join(parts[:MAXIMUM_VALUES]) + (", ..." if len(parts) > MAXIMUM_VALUES else "")
+
+
+def _indented(lines: Iterator[str]) -> Iterator[str]:
+    return (f"  {line}" for line in lines)

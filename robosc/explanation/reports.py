@@ -5,8 +5,8 @@ from typing import Any
 from robosc.automata.compile import State
 from robosc.explanation.analysis import Analysis, BlockingCause, BlockingCauseKind, Counterexample, Detour
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
-from robosc.explanation.explanations import CounterexampleReport, Path, Reason, Stopped
 from robosc.explanation.notation import value_text
+from robosc.explanation.parts import CounterexampleReport, Path, Reason, Stopped
 from robosc.explanation.terms import Terms
 from robosc.synthesis.runs import SystemRun
 

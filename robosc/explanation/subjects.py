@@ -8,7 +8,7 @@ from typing import Protocol
 
 from robosc.automata import System, SystemPlaces
 from robosc.explanation.constraints import relaxable_constraints
-from robosc.explanation.explanations import Remark
+from robosc.explanation.parts import Remark
 from robosc.explanation.requests import ModelQuestionReader, Requests, SystemQuestionReader
 from robosc.explanation.requirement_automata import as_conditions
 from robosc.explanation.system_terms import SystemTerms

@@ -6,7 +6,7 @@ from robosc.automata import System, SystemPlaces
 from robosc.automata.compile import State
 from robosc.automata.state import Subject, whole_names
 from robosc.explanation.constraints import RelaxableConstraint
-from robosc.explanation.explanations import Part, StateValues
+from robosc.explanation.parts import Part, StateValues
 from robosc.explanation.terms import Terms
 from robosc.expressions import Expression, Unary
 from robosc.source import Location

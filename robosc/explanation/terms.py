@@ -13,8 +13,8 @@ from robosc.automata.state import Subject, subject_type, subjects
 from robosc.automata.structure import System
 from robosc.explanation.analysis import BlockingCause, BlockingCauseKind
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
-from robosc.explanation.explanations import Part, StateValues
 from robosc.explanation.notation import MAXIMUM_NAMES, cut, requirement_text, value_text
+from robosc.explanation.parts import Part, StateValues
 from robosc.expressions import TRUE, Expression, Value, type_text
 from robosc.expressions.text import automaton_text, expression_text
 from robosc.model.places import Places

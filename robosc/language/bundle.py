@@ -1,7 +1,10 @@
-"""Finds the files of a run: the model, and the libraries that it imports from (language A.4)."""
+"""Finds the files of a run: the model, and the libraries that it imports from (language A.4).
+
+Libraries of a text are found without reading it by the grammar, so of broken texts, too.
+"""
 
 import os
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
@@ -9,7 +12,7 @@ from types import MappingProxyType
 from robosc.errors import LanguageError
 from robosc.language.interfaces import find_interfaces, nearby_folders
 from robosc.language.reading import MAXIMUM_BYTES, decode_source, read_source
-from robosc.language.scan import declared_libraries, imported_libraries
+from robosc.language.tokens import Kind, is_open_comment, tokenize_broken
 from robosc.source import Bundle, SourceFile
 
 SUFFIX = ".rscd"
@@ -130,3 +133,26 @@ def _relative_name(path: Path, model: Path) -> str:
 def _printable(name: str) -> str:
     r"""A file's name as text; bytes of it that are no UTF-8 are shown as `\xNN`."""
     return os.fsencode(name).decode("utf-8", errors="backslashreplace")
+
+
+def declared_libraries(text: str) -> frozenset[str]:
+    """The libraries that a text declares, be it sound or broken."""
+    return frozenset(name for word, name, _ in _triples(text, "library") if word)
+
+
+def imported_libraries(text: str) -> tuple[str, ...]:
+    """The libraries that a text imports from, in the order of the text."""
+    return tuple(dict.fromkeys(name for word, name, following in _triples(text, "from") if following == "import"))
+
+
+def _triples(text: str, word: str) -> Iterator[tuple[str, str, str]]:
+    """Every use of `word` with a name behind it, and what follows."""
+    if word not in text:
+        return
+    texts, kinds, _ = tokenize_broken(text)
+    for index, token in enumerate(texts):
+        if token == word and kinds[index + 1] in (Kind.NAME, Kind.WORD):
+            yield token, texts[index + 1].removeprefix("^"), texts[index + 2]
+        elif kinds[index] == Kind.OTHER and is_open_comment(token):
+            # There is no end of a comment in it: without their begins, there are none.
+            yield from _triples(token.replace("/*", "  "), word)

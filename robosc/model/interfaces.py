@@ -1,7 +1,7 @@
 """Communications against the definitions of their middleware types (language A.5).
 
 Whatever a generated node would refuse at its start is reported here, and is an error for the ROS packages with such
-nodes (`robosc.targets.ros.errors`): a supervisor can be made all the same, for whatever runs without ROS. That holds
+nodes (`robosc.targets.ros.package`): a supervisor can be made all the same, for whatever runs without ROS. That holds
 for definitions of the user's own, too, which say for certain that a node would not start: what a model means does not
 depend on the packages that are installed where it is read.
 """

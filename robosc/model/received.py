@@ -2,7 +2,8 @@
 
 from collections.abc import Iterator
 
-from robosc.expressions import EnumType, Expression, ObjectType, PathStep, Received, Type, leaves
+from robosc.errors import InternalError
+from robosc.expressions import ArrayType, EnumType, Expression, ObjectType, PathStep, Received, Type, leaves
 from robosc.model.structure import EventKind, Model, is_tau
 
 Path = tuple[PathStep, ...]
@@ -46,3 +47,22 @@ def _enums_in(model: Model, type_: Type, path: Path) -> Iterator[Path]:
         case ObjectType(name=name):
             for item in model.object(name).properties:
                 yield from _enums_in(model, item.type, (*path, item.name))
+
+
+def path_text(path: Path) -> str:
+    """A path as a user writes it: `value.ranges[0]`."""
+    return "value" + "".join(f"[{step}]" if isinstance(step, int) else f".{step}" for step in path)
+
+
+def path_type(model: Model, root: Type, path: Path) -> Type:
+    """The type at the end of a path."""
+    type_ = root
+    for step in path:
+        match type_, step:
+            case ObjectType(name=name), str():
+                type_ = next(item.type for item in model.object(name).properties if item.name == step)
+            case ArrayType(element=element), int():
+                type_ = element
+            case _:
+                raise InternalError(f"{path_text(path)} does not fit its type")
+    return type_

@@ -6,7 +6,7 @@ from itertools import count
 
 from robosc.errors import RelatedPlace
 from robosc.language import Parsed, parse, syntax
-from robosc.language.scan import declared_libraries
+from robosc.language.bundle import declared_libraries
 from robosc.model.findings import Findings
 from robosc.source import Bundle, Location, SourceFile
 

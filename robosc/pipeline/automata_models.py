@@ -15,7 +15,7 @@ from robosc.pipeline.results import NoSupervisor, SynthesisStatus, Verification,
 from robosc.pipeline.systems import SystemSupervisor, SystemSynthesis, synthesize_system, verify_system
 
 if TYPE_CHECKING:
-    from robosc.pipeline.synthesis import OnProgress, ShouldStop
+    from robosc.certification.progress import OnProgress, ShouldStop
     from robosc.verification import Limits
 
 _OF_ROBOTS = ("deployment", "allow_livelock", "verified_states")

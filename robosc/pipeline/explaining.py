@@ -5,6 +5,7 @@ from typing import overload
 
 from robosc.automata import System, check_system
 from robosc.certification import Progress, SynthesisOutcome, SynthesisProblem, prepare
+from robosc.certification.progress import OnProgress, ShouldStop, ignored, never
 from robosc.diagnostics import Page, page
 from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.explanation import (
@@ -19,7 +20,7 @@ from robosc.pipeline.findings import Findings
 from robosc.pipeline.loading import LoadedAutomata, ModelLike, loaded
 from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import Explained, NoSupervisor, SynthesisStatus
-from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, never
+from robosc.pipeline.synthesis import Unsupported, findings_of
 from robosc.source import Bundle
 from robosc.synthesis import EngineOptions
 

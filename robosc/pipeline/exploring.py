@@ -5,6 +5,7 @@ from pathlib import Path
 
 from robosc.automata import System
 from robosc.certification import Progress, SynthesisOutcome
+from robosc.certification.progress import OnProgress, ShouldStop, ignored, never
 from robosc.errors import UnsupportedModelError
 from robosc.explanation import EmptyExplanation
 from robosc.exploration import DEFAULT_LIMIT, Graph
@@ -12,13 +13,13 @@ from robosc.exploration import explore as explore_system
 from robosc.graphviz import FORMATS, drawn
 from robosc.json_documents import json_text
 from robosc.pipeline.automata_models import automata_synthesis
-from robosc.pipeline.files import FileAccessError, given_path, write_whole
+from robosc.pipeline.files import FileAccessError, FileName, given_path, write_whole
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import FileName, LoadedAutomata, ModelLike, loaded
+from robosc.pipeline.loading import LoadedAutomata, ModelLike, loaded
 from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, NothingGeneratedError, Outcome, SynthesisStatus
 from robosc.pipeline.supervisors import Supervisor
-from robosc.pipeline.synthesis import OnProgress, ShouldStop, findings_of, ignored, make, never, status_of, why_not
+from robosc.pipeline.synthesis import findings_of, make, status_of, why_not
 from robosc.pipeline.systems import SystemSupervisor
 from robosc.supervisor import Supervisor as CoreSupervisor
 from robosc.supervisor.predicates import state_predicates

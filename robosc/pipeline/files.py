@@ -6,12 +6,15 @@ from pathlib import Path
 
 from robosc.errors import RoboscError
 
+type FileName = str | os.PathLike[str]
+"""Name of a file or folder."""
+
 
 class FileAccessError(RoboscError, OSError):
     """A file or folder that is not there, or cannot be read or written."""
 
 
-def given_path(name: str | os.PathLike[str]) -> Path:
+def given_path(name: FileName) -> Path:
     """A file or folder that a caller names.
 
     Raises:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 from robosc.automata import System
 from robosc.certification import OutcomeStatus, Progress, SynthesisOutcome
+from robosc.certification.progress import OnProgress, ShouldStop, ignored, never
 from robosc.errors import UnsupportedModelError
 from robosc.explanation import EmptyExplanation
 from robosc.pipeline.automata_models import automata_synthesis
@@ -12,7 +13,7 @@ from robosc.pipeline.loading import LoadedAutomata, ModelLike, loaded
 from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import Generation, SynthesisStatus
 from robosc.pipeline.supervisors import Supervisor
-from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, make, never, status_of
+from robosc.pipeline.synthesis import Unsupported, findings_of, make, status_of
 from robosc.pipeline.systems import SystemSupervisor
 from robosc.supervisor import Supervisor as CoreSupervisor
 from robosc.targets import GenerateOptions, TargetRefusal, generate_automata, generate_or_refuse, require_generatable

@@ -5,11 +5,8 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from robosc.pipeline.automata_files import is_automata, load_automata_file
-from robosc.pipeline.files import FileAccessError, given_path
+from robosc.pipeline.files import FileAccessError, FileName, given_path
 from robosc.source import Bundle, SourceFile
-
-type FileName = str | os.PathLike[str]
-"""Name of a file or folder."""
 
 TEXT_NAME = "model.rscd"
 """Name of a model that is given as a text, in findings about it."""

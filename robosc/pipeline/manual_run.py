@@ -2,18 +2,17 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping
-from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
 from robosc.certification.supervisor_file import StateInWords
 from robosc.errors import RoboscError, UnknownNameError
 from robosc.pipeline.conditions import unknown_event
-from robosc.pipeline.files import FileAccessError, given_path, write_whole
-from robosc.pipeline.loading import FileName
-from robosc.pipeline.received_data import NO_DATA, DataField
+from robosc.pipeline.files import FileAccessError, FileName, given_path, write_whole
+from robosc.pipeline.received_data import DataField
 from robosc.pipeline.saved_runs import event_log
-from robosc.pipeline.walking import ALL_TROUBLE, Trouble, TroubleKind, Walker
+from robosc.pipeline.steps import Step, changes_text, event_text
+from robosc.pipeline.walking import ALL_FINDINGS, Walker, WalkFinding, WalkFindingKind
 from robosc.tables import html_table
 
 
@@ -23,35 +22,6 @@ class UnknownEventError(UnknownNameError):
 
 class EventNotPossibleError(RoboscError, ValueError):
     """An event that cannot happen in the current state; the message says why."""
-
-
-@dataclass(frozen=True, slots=True)
-class Step:
-    """One event of a run.
-
-    Attributes:
-        event: The event.
-        data: Data that it carried as the model saw it, by name (`value.front`); None where a part was unknown.
-        state: The state that it led to.
-        provided: Data that a request sends, by the model's `provide`; None where the middleware's default is sent, or
-            where it is unknown.
-        skipped: Variables that kept their value, because what they were to take was unknown.
-        unknown: Descriptions of what was unknown or moved into its range: parts of the data, what a request sends.
-        is_controllable: True if it is one that the controller takes by itself.
-        given: Data as it was given.
-    """
-
-    event: str
-    data: Mapping[str, Any] = field(hash=False)
-    state: StateInWords = field(hash=False)
-    provided: Any = field(default=None, hash=False)
-    skipped: tuple[str, ...] = ()
-    unknown: tuple[str, ...] = ()
-    is_controllable: bool = False
-    given: Any = field(default=NO_DATA, hash=False)
-
-    def __str__(self) -> str:
-        return f"{self.event}: {self.state}"
 
 
 class ManualRun(ABC):
@@ -249,19 +219,19 @@ class ManualRun(ABC):
         """
         return self._walker.walk(steps, seed)
 
-    def walk_until_trouble(
-        self, steps: int = 1000, seed: int = 0, kinds: Collection[TroubleKind] = ALL_TROUBLE
-    ) -> Trouble | None:
-        """Walk by chance until there is trouble, and return it; None if there was none.
+    def walk_until_finding(
+        self, steps: int = 1000, seed: int = 0, kinds: Collection[WalkFindingKind] = ALL_FINDINGS
+    ) -> WalkFinding | None:
+        """Walk by chance until there is a finding, and return it; None if there was none.
 
         What was found stays told: the next walk of this run goes on to something else.
 
         Args:
             steps: Most events to take.
             seed: Seed of the chance.
-            kinds: Kinds of trouble to look for.
+            kinds: Kinds of findings to look for.
         """
-        return self._walker.walk_until_trouble(steps, seed, kinds)
+        return self._walker.walk_until_finding(steps, seed, kinds)
 
     def save(self, file: FileName) -> Path:
         """Write the events so far, an event log (`.jsonl`) whose clock counts them, a second each; returns its path.
@@ -272,7 +242,7 @@ class ManualRun(ABC):
         path = given_path(file)
         if path.suffix != ".jsonl":
             raise FileAccessError(f"{path}: the name of a saved run ends in .jsonl, as event logs do")
-        write_whole(path, event_log(self).encode())
+        write_whole(path, event_log(self.history).encode())
         return path
 
     # Its forms for people
@@ -305,21 +275,3 @@ class ManualRun(ABC):
         for number, step in enumerate(self.history, start=1):
             yield number, (event_text(step), changes_text(before, step.state))
             before = step.state
-
-
-def event_text(step: Step) -> str:
-    """An event with the data that came with it: `level.response (value = 3)`."""
-    data = ", ".join(f"{name} = {_value_text(value)}" for name, value in step.data.items())
-    return f"{step.event} ({data})" if data else step.event
-
-
-def changes_text(before: StateInWords, after: StateInWords) -> str:
-    """Changes between two states: `Base = driving, Base.charges = 2`."""
-    old = before.parts
-    return ", ".join(f"{name} = {_value_text(value)}" for name, value in after.parts.items() if old[name] != value)
-
-
-def _value_text(value: object) -> str:
-    if value is None:
-        return "unknown"
-    return str(value).lower() if isinstance(value, bool) else str(value)

@@ -6,9 +6,8 @@ from enum import StrEnum
 from typing import TYPE_CHECKING, Any
 
 from robosc.errors import Diagnostic, RoboscError
-from robosc.pipeline.files import given_path
+from robosc.pipeline.files import FileName, given_path
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import FileName
 from robosc.source import visible
 from robosc.tables import html_table, html_text
 

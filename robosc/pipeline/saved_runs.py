@@ -4,19 +4,17 @@ import math
 import os
 import pprint
 import textwrap
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any, Protocol
 
+from robosc.certification.supervisor_file import StateInWords
 from robosc.execution.runtime.event_log import json_line
 from robosc.model.structure import Deployment
 from robosc.pipeline.received_data import NO_DATA
-
-if TYPE_CHECKING:
-    from robosc.certification.supervisor_file import StateInWords
-    from robosc.pipeline.manual_run import ManualRun, Step
-    from robosc.pipeline.simulation import Run
+from robosc.pipeline.steps import Step
+from robosc.supervisor import Supervisor
 
 _WIDTH = 112
 
@@ -38,12 +36,42 @@ class ModelOfTest:
     interface_paths: tuple[Path, ...] = ()
 
 
-def event_log(run: "ManualRun") -> str:
-    """Return the text of an event log of a run; its clock counts the events, a second each."""
-    return "".join(json_line(entry) for number, step in enumerate(run, start=1) for entry in entries_of(step, number))
+class ReplayableRun(Protocol):
+    """Run of a robot that a test repeats."""
+
+    @property
+    def supervisor(self) -> Supervisor:
+        """The supervisor of the system."""
+
+    @property
+    def initial(self) -> StateInWords:
+        """The initial state."""
+
+    @property
+    def state(self) -> StateInWords:
+        """The current state."""
+
+    @property
+    def enabled(self) -> tuple[str, ...]:
+        """Controllable events that are allowed now."""
+
+    @property
+    def history(self) -> tuple[Step, ...]:
+        """The events so far."""
+
+    def step(self, event: str, data: object = NO_DATA, /) -> Step:
+        """Take an event."""
+
+    def again(self) -> "ReplayableRun":
+        """Return a run of the same supervisor, from its initial state."""
 
 
-def entries_of(step: "Step", number: int) -> Iterator[dict[str, Any]]:
+def event_log(steps: Iterable[Step]) -> str:
+    """Return the text of an event log of a run's steps; its clock counts the events, a second each."""
+    return "".join(json_line(entry) for number, step in enumerate(steps, start=1) for entry in entries_of(step, number))
+
+
+def entries_of(step: Step, number: int) -> Iterator[dict[str, Any]]:
     """Yield the entries of an event log that tell a step.
 
     Args:
@@ -66,7 +94,7 @@ def entries_of(step: "Step", number: int) -> Iterator[dict[str, Any]]:
         yield {"time": float(number), "kind": "unknown", "event": step.event, "unknown": list(step.skipped)}
 
 
-def state_by_component(state: "StateInWords") -> dict[str, dict[str, Any]]:
+def state_by_component(state: StateInWords) -> dict[str, dict[str, Any]]:
     """The state and variables of each component with a behaviour, as event logs and executors tell them."""
     found: dict[str, dict[str, Any]] = {
         name: {"state": place, "variables": {}} for name, place in state.components.items()
@@ -116,7 +144,7 @@ _SYNTHESIZED = """\
     supervisor = made.supervisor"""
 
 
-def pytest_module(run: "Run", model: ModelOfTest, file: Path) -> str:
+def pytest_module(run: ReplayableRun, model: ModelOfTest, file: Path) -> str:
     """Return the text of a test for pytest that leads a run through the same events.
 
     Args:
@@ -124,9 +152,7 @@ def pytest_module(run: "Run", model: ModelOfTest, file: Path) -> str:
         model: The model that the test loads.
         file: File that the test will stand in: the model is named as seen from there.
     """
-    from robosc.pipeline.simulation import Run
-
-    again = Run(run.supervisor)
+    again = run.again()
     enabled, state = again.enabled, again.initial.parts
     initial, steps = dict(state), list[tuple[Any, ...]]()
     for step in run.history:

@@ -6,6 +6,7 @@ controllable ones are taken where they are allowed.
 
 from collections.abc import Iterator, Mapping
 from pathlib import Path
+from random import Random
 from typing import Any, overload
 
 from robosc.automata.plants import communication_plant, communication_plant_name
@@ -15,11 +16,10 @@ from robosc.execution.runtime.protocol import Reading
 from robosc.explanation.blocked import Requests
 from robosc.expressions import Value
 from robosc.expressions.text import automaton_text, expression_text
-from robosc.model.structure import CommunicationKind
+from robosc.model.structure import CommunicationKind, EventKind, Model, is_tau
 from robosc.pipeline.conditions import unknown_event
-from robosc.pipeline.files import FileAccessError, given_path, write_whole
-from robosc.pipeline.loading import FileName
-from robosc.pipeline.manual_run import ManualRun, Step, UnknownEventError
+from robosc.pipeline.files import FileAccessError, FileName, given_path, write_whole
+from robosc.pipeline.manual_run import ManualRun, UnknownEventError
 from robosc.pipeline.received_data import (
     NO_DATA,
     DataError,
@@ -31,10 +31,11 @@ from robosc.pipeline.received_data import (
     received_type,
 )
 from robosc.pipeline.saved_runs import ModelOfTest, pytest_module
+from robosc.pipeline.steps import Step
 from robosc.pipeline.supervisors import Supervisor, SupervisorLike, supervisor_of
 from robosc.pipeline.system_runs import SystemRun
 from robosc.pipeline.systems import SystemSupervisor
-from robosc.pipeline.walking import ModelWalker, Walker
+from robosc.pipeline.walking import Walker, WalkFinding, WalkFindingKind
 
 
 class Run(ManualRun):
@@ -165,6 +166,10 @@ class Run(ManualRun):
         step = Step(event, data_seen, self.state, provided, skipped, unknown, self._events[event], given)
         return self._take(step, before)
 
+    def again(self) -> "Run":
+        """Return a run of the same supervisor, from its initial state."""
+        return Run(self._supervisor)
+
     def save(self, file: FileName, model: ModelOfTest | None = None) -> Path:
         """Write the events so far, an event log (`.jsonl`) or a test for pytest (`.py`); returns the file's path.
 
@@ -250,6 +255,73 @@ class Run(ManualRun):
             yield "its requirements hold, and a controller cancels only when one of them does not"
         else:
             yield "the supervisor forbids it, because of what can follow"
+
+
+class ModelWalker(Walker):
+    """Walker of a robot's run: takes what an executor could in some world.
+
+    Args:
+        run: The run that it leads.
+        system: The system of that run.
+        model: Its model.
+        data: Data that the environment sends.
+    """
+
+    def __init__(self, run: Run, system: InterpretedSystem, model: Model, data: RandomData) -> None:
+        super().__init__(run)
+        self._run: Run = run
+        self._system = system
+        self._data = data
+        self._identifiers = {event: item.identifier for item in model.communications for event in item.events}
+        self._sensors = {item.identifier for item in model.communications if item.max_age is not None}
+
+    def _candidates(self) -> Iterator[str]:
+        """Yield the events that an executor and its environment could have happen now."""
+        silent = self._system.enabled_silent()
+        if silent is not None:
+            yield silent
+            return
+        is_deaf = self._is_deaf()
+        for event in self._run.possible:
+            if not (is_deaf and _is_request(event)):
+                yield event
+
+    def _is_deaf(self) -> bool:
+        """Return True if a sensor with a `max_age` has told nothing yet."""
+        silent = set(self._sensors)
+        for step in self._run.history if silent else ():
+            silent.discard(self._identifiers.get(step.event, ""))
+            if not silent:
+                break
+        return bool(silent)
+
+    def _forbidden(self) -> Iterator[str]:
+        """Yield the requests that the behaviours could do and that are not enabled."""
+        if self._system.enabled_silent() is None:
+            for event in self._run.events:
+                if _is_request(event) and self._system.is_possible(event) and not self._system.enabled(event):
+                    yield event
+
+    def _is_issued(self, event: str) -> bool:
+        """Return False for a request whose data is unknown."""
+        return not _is_request(event) or self._system.provide(event.partition(".")[0])[0]
+
+    def _take(self, event: str, dice: Random) -> Step:
+        return self._run.step(event, self._data.draw(event, dice))
+
+    def _at_event(self, event: str, count: int) -> WalkFinding | None:
+        if not _is_request(event):
+            return None
+        if not self._system.enabled(event):
+            return WalkFinding(WalkFindingKind.BLOCKED, event, self._run.reasons(event), count)
+        if not self._is_issued(event):
+            why = "what it sends is unknown, so that it is not issued"
+            return WalkFinding(WalkFindingKind.UNKNOWN, event, (why,), count)
+        return None
+
+
+def _is_request(event: str) -> bool:
+    return not is_tau(event) and event.rpartition(".")[2] == EventKind.REQUEST
 
 
 @overload

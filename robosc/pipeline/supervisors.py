@@ -10,9 +10,8 @@ from robosc.conditions.summary import summary_json, summary_text
 from robosc.errors import Diagnostic
 from robosc.model.structure import Deployment, Model
 from robosc.pipeline.conditions import Conditions, conditions_of
-from robosc.pipeline.files import given_path, read_bounded, write_whole
+from robosc.pipeline.files import FileName, given_path, read_bounded, write_whole
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import FileName
 from robosc.pipeline.results import Summary
 from robosc.supervisor import AddedCondition, Certificate
 from robosc.supervisor import Supervisor as CoreSupervisor

@@ -1,11 +1,11 @@
 """Synthesis of supervisors, of models and of automata."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Literal, overload
 
 from robosc.automata import System
-from robosc.certification import Progress, SynthesisOutcome, make_supervisor
+from robosc.certification import SynthesisOutcome, make_supervisor
+from robosc.certification.progress import OnProgress, ShouldStop, ignored, never
 from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.explanation import EmptyExplanation
 from robosc.model.check import check
@@ -18,18 +18,6 @@ from robosc.pipeline.supervisors import Supervisor
 from robosc.pipeline.systems import SystemSynthesis
 from robosc.synthesis import Statistics
 from robosc.verification import DEFAULT_STATES
-
-type OnProgress = Callable[[Progress], None]
-type ShouldStop = Callable[[], bool]
-
-
-def ignored(progress: Progress) -> None:
-    """Ignore where the work is."""
-
-
-def never() -> bool:
-    """Return False: the work goes on to its end."""
-    return False
 
 
 @dataclass(frozen=True, slots=True, repr=False)

@@ -22,10 +22,11 @@ from robosc.expressions.inference import has_type
 from robosc.expressions.text import expression_text
 from robosc.model.findings import did_you_mean
 from robosc.pipeline.conditions import unknown_event
-from robosc.pipeline.manual_run import ManualRun, Step
+from robosc.pipeline.manual_run import ManualRun
 from robosc.pipeline.received_data import NO_DATA, DataError, DataField, data_field, one_datum
+from robosc.pipeline.steps import Step
 from robosc.pipeline.systems import SystemSupervisor
-from robosc.pipeline.walking import Trouble, TroubleKind, Walker
+from robosc.pipeline.walking import Walker, WalkFinding, WalkFindingKind
 from robosc.supervisor.predicates import state_predicates
 
 _MAXIMUM_WAYS = 4
@@ -321,7 +322,7 @@ class _SystemWalker(Walker):
         super().__init__(run)
         self._run: SystemRun = run
 
-    def _in_state(self, count: int) -> Trouble | None:
+    def _in_state(self, count: int) -> WalkFinding | None:
         # Steps that the plants do by themselves are nothing to wait for.
         return None if self._run.possible else super()._in_state(count)
 
@@ -342,6 +343,6 @@ class _SystemWalker(Walker):
     def _take(self, event: str, dice: Random) -> Step:
         return self._run._reach(event, dice.choice(self._run._targets(event, {})), {}, NO_DATA)
 
-    def _at_event(self, event: str, count: int) -> Trouble | None:
+    def _at_event(self, event: str, count: int) -> WalkFinding | None:
         why = self._run.reasons(event)
-        return Trouble(TroubleKind.BLOCKED, event, why, count) if why else None
+        return WalkFinding(WalkFindingKind.BLOCKED, event, why, count) if why else None

@@ -17,9 +17,8 @@ from robosc.certification import Progress
 from robosc.conditions.rendering import Formulas
 from robosc.errors import InvalidSupervisorError, InvalidSystemError, NodeLimitError, UnsupportedModelError
 from robosc.pipeline.conditions import Condition, Conditions, condition_of, conditions_of
-from robosc.pipeline.files import given_path, read_bounded, write_whole
+from robosc.pipeline.files import FileName, given_path, read_bounded, write_whole
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import FileName
 from robosc.pipeline.options import SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus, Verification, VerificationStatus
 from robosc.source import visible

@@ -6,6 +6,7 @@ from typing import overload
 from robosc.automata import System
 from robosc.certification import Progress, SynthesisOutcome
 from robosc.certification.file_report import file_verification_json, file_verification_text, has_passed, malformed_json
+from robosc.certification.progress import OnProgress, ShouldStop, ignored, never
 from robosc.certification.supervisor_file import verify_supervisor_file
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.json_documents import diagnostics_json
@@ -21,12 +22,13 @@ from robosc.model_checking import (
     verify_properties,
 )
 from robosc.pipeline.automata_models import automata_verification
+from robosc.pipeline.files import FileName
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.loading import FileName, LoadedAutomata, LoadedModel, ModelLike, loaded, property_file
+from robosc.pipeline.loading import LoadedAutomata, LoadedModel, ModelLike, loaded, property_file
 from robosc.pipeline.options import DEFAULT_OPTIONS, FOREIGN_STATES, SynthesisOptions
 from robosc.pipeline.results import Verification, VerificationStatus
 from robosc.pipeline.supervisors import SupervisorLike, supervisor_of
-from robosc.pipeline.synthesis import OnProgress, ShouldStop, Unsupported, findings_of, ignored, make, never, status_of
+from robosc.pipeline.synthesis import Unsupported, findings_of, make, status_of
 from robosc.pipeline.systems import SystemSupervisor, verify_system
 from robosc.source import Bundle, SourceFile
 from robosc.supervisor import Supervisor as CoreSupervisor

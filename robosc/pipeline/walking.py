@@ -1,23 +1,18 @@
-"""Walks by chance through the controlled system, and the trouble that they may end in."""
+"""Walks by chance through the controlled system, and the findings that they may end in."""
 
 from abc import ABC, abstractmethod
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Iterable
 from dataclasses import dataclass
 from enum import StrEnum
 from random import Random
-from typing import TYPE_CHECKING
+from typing import Protocol
 
-from robosc.execution.interpreter import InterpretedSystem
-from robosc.model.structure import EventKind, Model, is_tau
-from robosc.pipeline.received_data import RandomData
-
-if TYPE_CHECKING:
-    from robosc.pipeline.manual_run import ManualRun, Step
-    from robosc.pipeline.simulation import Run
+from robosc.certification.supervisor_file import StateInWords
+from robosc.pipeline.steps import Step
 
 
-class TroubleKind(StrEnum):
-    """Kinds of trouble that a walk may end in."""
+class WalkFindingKind(StrEnum):
+    """Kinds of findings that a walk may end in."""
 
     DEADLOCK = "deadlock"
     """No event at all can happen, in a state that is not marked."""
@@ -31,21 +26,21 @@ class TroubleKind(StrEnum):
     update was skipped, or what a request sends is unknown, so that it is not issued."""
 
 
-ALL_TROUBLE = frozenset(TroubleKind)
+ALL_FINDINGS = frozenset(WalkFindingKind)
 
 
 @dataclass(frozen=True, slots=True)
-class Trouble:
-    """Trouble that a walk has ended in.
+class WalkFinding:
+    """Finding that a walk has ended in.
 
     Attributes:
-        kind: Kind of trouble.
+        kind: Kind of the finding.
         event: The event that was blocked, or at which something was unknown; empty: it is about the state.
         why: Sentences that say what is the matter; at least one.
-        steps: Number of events that the walk took before, that of the trouble included.
+        steps: Number of events that the walk took, including the event of the finding.
     """
 
-    kind: TroubleKind
+    kind: WalkFindingKind
     event: str
     why: tuple[str, ...]
     steps: int
@@ -55,6 +50,26 @@ class Trouble:
         return f"{self.kind}{place} after {self.steps} step{'s' if self.steps != 1 else ''}: {'; '.join(self.why)}"
 
 
+class WalkedRun(Protocol):
+    """Run as the walker that leads it sees it."""
+
+    @property
+    def state(self) -> StateInWords:
+        """The current state."""
+
+    @property
+    def is_marked(self) -> bool:
+        """True if the state counts as completed."""
+
+    @property
+    def enabled(self) -> tuple[str, ...]:
+        """Controllable events that are allowed now."""
+
+    @property
+    def possible(self) -> tuple[str, ...]:
+        """Every event that can happen now."""
+
+
 class Walker(ABC):
     """Walker of one run.
 
@@ -62,10 +77,10 @@ class Walker(ABC):
         run: The run that it leads.
     """
 
-    def __init__(self, run: "ManualRun") -> None:
+    def __init__(self, run: WalkedRun) -> None:
         self._run = run
-        # Trouble that was found before.
-        self._reported: set[tuple[TroubleKind, str, tuple[str, ...]]] = set()
+        # Findings that were reported before.
+        self._reported: set[tuple[WalkFindingKind, str, tuple[str, ...]]] = set()
 
     # Parts that differ
 
@@ -82,20 +97,20 @@ class Walker(ABC):
         """Return False for an event that could happen, but would not be taken."""
 
     @abstractmethod
-    def _take(self, event: str, dice: Random) -> "Step":
+    def _take(self, event: str, dice: Random) -> Step:
         """Take an event, with data by chance."""
 
     @abstractmethod
-    def _at_event(self, event: str, count: int) -> Trouble | None:
-        """Trouble with an event that is therefore not taken."""
+    def _at_event(self, event: str, count: int) -> WalkFinding | None:
+        """Finding about an event, which is then not taken."""
 
     def forget(self) -> None:
-        """Begin anew: all trouble is news again."""
+        """Begin anew: every finding is new again."""
         self._reported.clear()
 
-    def walk(self, steps: int, seed: int) -> "tuple[Step, ...]":
+    def walk(self, steps: int, seed: int) -> tuple[Step, ...]:
         """Take events by chance; parameters as of `Run.walk`."""
-        dice, taken = Random(seed), list["Step"]()  # noqa: S311  # the same walk again, no secret
+        dice, taken = Random(seed), list[Step]()  # noqa: S311  # the same walk again, no secret
         while len(taken) < steps:
             candidates = [event for event in self._candidates() if self._is_issued(event)]
             if not candidates:
@@ -103,8 +118,8 @@ class Walker(ABC):
             taken.append(self._take(dice.choice(candidates), dice))
         return tuple(taken)
 
-    def walk_until_trouble(self, steps: int, seed: int, kinds: Collection[TroubleKind]) -> Trouble | None:
-        """Take events until there is trouble; parameters as of `Run.walk_until_trouble`."""
+    def walk_until_finding(self, steps: int, seed: int, kinds: Collection[WalkFindingKind]) -> WalkFinding | None:
+        """Take events until there is a finding; parameters as of `Run.walk_until_finding`."""
         dice = Random(seed)  # noqa: S311  # the same walk again, no secret
         for count in range(steps + 1):
             found = self._in_state(count)
@@ -120,9 +135,11 @@ class Walker(ABC):
                 return found
         return None
 
-    def _chosen(self, dice: Random, count: int, kinds: Collection[TroubleKind]) -> tuple[str | None, Trouble | None]:
-        """An event by chance, with the trouble that there is with it; no event where nothing can happen."""
-        candidates = [*self._candidates(), *(self._forbidden() if TroubleKind.BLOCKED in kinds else ())]
+    def _chosen(
+        self, dice: Random, count: int, kinds: Collection[WalkFindingKind]
+    ) -> tuple[str | None, WalkFinding | None]:
+        """An event by chance, with the finding about it, if there is one; no event where nothing can happen."""
+        candidates = [*self._candidates(), *(self._forbidden() if WalkFindingKind.BLOCKED in kinds else ())]
         while candidates:
             event = dice.choice(candidates)
             found = self._at_event(event, count)
@@ -131,9 +148,9 @@ class Walker(ABC):
             candidates.remove(event)
         return None, None
 
-    # Trouble
+    # Findings
 
-    def _in_state(self, count: int) -> Trouble | None:
+    def _in_state(self, count: int) -> WalkFinding | None:
         run = self._run
         if run.enabled or run.is_marked:
             return None
@@ -141,88 +158,21 @@ class Walker(ABC):
         places = {**run.state.components, **run.state.communications}
         where = ", ".join(f"{name} is {place}" for name, place in places.items())
         if not left:
-            return Trouble(TroubleKind.DEADLOCK, "", (f"nothing can happen while {where}",), count)
+            return WalkFinding(WalkFindingKind.DEADLOCK, "", (f"nothing can happen while {where}",), count)
         if any(place in ("waiting", "executing") for place in run.state.communications.values()):
             return None
         why = f"nothing is allowed while {where}: it can only wait for {', '.join(left)}"
-        return Trouble(TroubleKind.WAITING, "", (why,), count)
+        return WalkFinding(WalkFindingKind.WAITING, "", (why,), count)
 
-    def _at_step(self, step: "Step", count: int) -> Trouble | None:
+    def _at_step(self, step: Step, count: int) -> WalkFinding | None:
         why = (*step.unknown, *(f"{variable} keeps its value: its update is unknown" for variable in step.skipped))
-        return Trouble(TroubleKind.UNKNOWN, step.event, why, count) if why else None
+        return WalkFinding(WalkFindingKind.UNKNOWN, step.event, why, count) if why else None
 
-    def _is_news(self, found: Trouble | None, kinds: Collection[TroubleKind]) -> bool:
-        """Return True if there is trouble of a kind that is looked for, and it was not told before."""
+    def _is_news(self, found: WalkFinding | None, kinds: Collection[WalkFindingKind]) -> bool:
+        """Return True if there is a finding of a kind that is looked for, and it was not reported before."""
         if found is None or found.kind not in kinds:
             return False
         key = (found.kind, found.event, found.why)
         is_news = key not in self._reported
         self._reported.add(key)
         return is_news
-
-
-class ModelWalker(Walker):
-    """Walker of a robot's run: takes what an executor could in some world.
-
-    Args:
-        run: The run that it leads.
-        system: The system of that run.
-        model: Its model.
-        data: Data that the environment sends.
-    """
-
-    def __init__(self, run: "Run", system: InterpretedSystem, model: Model, data: RandomData) -> None:
-        super().__init__(run)
-        self._run: Run = run
-        self._system = system
-        self._data = data
-        self._identifiers = {event: item.identifier for item in model.communications for event in item.events}
-        self._sensors = {item.identifier for item in model.communications if item.max_age is not None}
-
-    def _candidates(self) -> Iterator[str]:
-        """Yield the events that an executor and its environment could have happen now."""
-        silent = self._system.enabled_silent()
-        if silent is not None:
-            yield silent
-            return
-        is_deaf = self._is_deaf()
-        for event in self._run.possible:
-            if not (is_deaf and _is_request(event)):
-                yield event
-
-    def _is_deaf(self) -> bool:
-        """Return True if a sensor with a `max_age` has told nothing yet."""
-        silent = set(self._sensors)
-        for step in self._run.history if silent else ():
-            silent.discard(self._identifiers.get(step.event, ""))
-            if not silent:
-                break
-        return bool(silent)
-
-    def _forbidden(self) -> Iterator[str]:
-        """Yield the requests that the behaviours could do and that are not enabled."""
-        if self._system.enabled_silent() is None:
-            for event in self._run.events:
-                if _is_request(event) and self._system.is_possible(event) and not self._system.enabled(event):
-                    yield event
-
-    def _is_issued(self, event: str) -> bool:
-        """Return False for a request whose data is unknown."""
-        return not _is_request(event) or self._system.provide(event.partition(".")[0])[0]
-
-    def _take(self, event: str, dice: Random) -> "Step":
-        return self._run.step(event, self._data.draw(event, dice))
-
-    def _at_event(self, event: str, count: int) -> Trouble | None:
-        if not _is_request(event):
-            return None
-        if not self._system.enabled(event):
-            return Trouble(TroubleKind.BLOCKED, event, self._run.reasons(event), count)
-        if not self._is_issued(event):
-            why = "what it sends is unknown, so that it is not issued"
-            return Trouble(TroubleKind.UNKNOWN, event, (why,), count)
-        return None
-
-
-def _is_request(event: str) -> bool:
-    return not is_tau(event) and event.rpartition(".")[2] == EventKind.REQUEST

@@ -1,10 +1,11 @@
-"""Plain automata as they are read: with the places of their parts, and names that may be wrong."""
+"""Plain automata: as they are read, with the places of their parts and names that may be wrong; as all of a system."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 from robosc.automata import Automaton, Edge, Event, Role, System, SystemPlaces
-from robosc.expressions import StateTest, Unary
+from robosc.errors import UnsupportedModelError
+from robosc.expressions import TRUE, StateTest, Unary
 from robosc.model.findings import Findings
 from robosc.source import Location
 
@@ -114,3 +115,22 @@ def _automaton(draft: Draft) -> Automaton:
         edges=tuple(dict.fromkeys(Edge(source.text, event.text, target.text) for source, event, target in draft.edges)),
         role=draft.role,
     )
+
+
+def require_plain(system: System) -> None:
+    """Do nothing if a system consists of automata without variables, guards and conditions.
+
+    Raises:
+        UnsupportedModelError: It does not.
+    """
+    has_more = (
+        system.inputs or system.conditions or system.invariants or system.plant_conditions or system.plant_invariants
+    )
+    if has_more or (system.initial, system.marker) != (TRUE, TRUE):
+        raise UnsupportedModelError(f"{system.name} has conditions beside its automata, which no plain automata have")
+    for automaton in system.automata:
+        has_guards = any(edge.guard != TRUE or edge.updates for edge in automaton.edges)
+        if automaton.variables or automaton.monitors or has_guards:
+            raise UnsupportedModelError(
+                f"{automaton.name} has variables, guards or monitors, and is not a plain automaton"
+            )

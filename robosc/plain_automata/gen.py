@@ -14,8 +14,7 @@ from typing import NoReturn
 from robosc.automata import Role, System, SystemPlaces
 from robosc.errors import Diagnostic, LanguageError, Severity, UnsupportedModelError
 from robosc.model.findings import Findings
-from robosc.plain_automata.draft import MAXIMUM_PARTS, Draft, Named, system_of
-from robosc.plain_automata.plain import require_plain
+from robosc.plain_automata.draft import MAXIMUM_PARTS, Draft, Named, require_plain, system_of
 from robosc.source import Location, SourceFile
 
 _TOKEN = re.compile(

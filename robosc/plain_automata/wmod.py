@@ -14,8 +14,7 @@ from xml.parsers import expat
 from robosc.automata import Role, System, SystemPlaces
 from robosc.errors import Diagnostic, LanguageError, Severity
 from robosc.model.findings import Findings
-from robosc.plain_automata.draft import MAXIMUM_PARTS, Draft, Named, system_of
-from robosc.plain_automata.plain import require_plain
+from robosc.plain_automata.draft import MAXIMUM_PARTS, Draft, Named, require_plain, system_of
 from robosc.source import Location, SourceFile
 
 _ACCEPTING, _FORBIDDEN = ":accepting", ":forbidden"

@@ -9,7 +9,7 @@ from robosc.automata.executable import ExecutableEvent, Participant
 from robosc.expressions import FALSE, TRUE, Expression, IntegerType, StateTest, Unary, conjunction
 from robosc.expressions.text import expression_text
 from robosc.model.structure import EventKind, Transition
-from robosc.targets.model_text import requirement_text
+from robosc.targets.text import requirement_text
 
 
 class InOneOf(NamedTuple):

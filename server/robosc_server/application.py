@@ -49,8 +49,7 @@ from robosc_server.tasks.describe import server_limits, targets_response, versio
 from robosc_server.tasks.requests import QUICK_BYTES, RequestLimits, accept_request
 from robosc_server.tasks.task import Result, TaskKind, own_key
 from robosc_server.workers import Workers, WorkersError
-from robosc_server.workers.cluster_check import check_cluster
-from robosc_server.workers.factory import open_workers
+from robosc_server.workers.factory import check_cluster, open_workers
 
 _RULE = Rule(frozenset({Scope.SYNTHESIZE}))
 
@@ -103,7 +102,7 @@ async def running_server(settings: Settings, workers: Workers | None = None) -> 
         workers: Workers that run the tasks, not started yet; None: as configured.
 
     Raises:
-        StartError: It cannot start as configured.
+        StartError: The server cannot start with these settings.
     """
     try:
         async with AsyncExitStack() as stack:

@@ -15,7 +15,7 @@ def entry() -> NoReturn:
 def _load() -> Callable[[], int]:
     if sys.argv[1:2] == ["health"]:
         from robosc.cli.running import guarded
-        from robosc_server import health_check
+        from robosc_server.operations import health_check
 
         return lambda: guarded("robosc-server", lambda: health_check.main(sys.argv[2:]))
     from robosc_server.main import main

@@ -9,8 +9,7 @@ from collections.abc import AsyncIterable, Callable
 from typing import Any
 
 from robosc_api.security import caller_of
-from robosc_server.failures import RefusedError
-from robosc_server.tasks.task import Reason
+from robosc_server.tasks.task import Reason, RefusedError
 
 SMALL_BYTES = 64 * 1024
 """Maximum size of results that are not counted, since the number of open calls bounds them."""
@@ -22,8 +21,8 @@ class ResultSender:
     """Sender of results, which counts unread bytes.
 
     Args:
-        per_caller_bytes: Of one caller's results; one alone may be larger.
-        bytes_in_all: Of all results; one alone may be larger.
+        per_caller_bytes: Limit for the results of one caller; a single result may be larger.
+        bytes_in_all: Limit for all results; a single result may be larger.
     """
 
     def __init__(self, per_caller_bytes: int, bytes_in_all: int) -> None:
@@ -33,7 +32,7 @@ class ResultSender:
 
     @property
     def unread_bytes(self) -> int:
-        """Bytes of the results that are on their way."""
+        """Bytes of results that were sent and are not read yet."""
         return self._unread.total()
 
     async def send_stream(self, context: Any, messages: AsyncIterable[bytes]) -> None:
@@ -41,10 +40,10 @@ class ResultSender:
 
         Args:
             context: Context of the call (of grpc.aio), whose responses are bytes.
-            messages: Serialized, each made when the one before it is on its way.
+            messages: Serialized messages, each made when the one before it has been sent.
 
         Raises:
-            RefusedError: Too much that was sent before is not read yet.
+            RefusedError: Too many bytes that were sent before are not read yet.
         """
         read: Callable[[], None] = _do_nothing
         async for message in messages:
@@ -62,10 +61,10 @@ class ResultSender:
             messages: Serialized messages of the result.
 
         Returns:
-            To be called where it is known sooner that it has been read.
+            Function to call if it becomes known earlier that the result has been read.
 
         Raises:
-            RefusedError: Too much that was sent before is not read yet.
+            RefusedError: Too many bytes that were sent before are not read yet.
         """
         size = sum(map(len, messages))
         if size <= SMALL_BYTES:

@@ -18,10 +18,10 @@ class SigningError(Exception):
 
 
 def read_signing_key(file: Path) -> "Ed25519PrivateKey":
-    """The key in a file.
+    """Return the key in a file.
 
     Raises:
-        SigningError: There is none that can be used.
+        SigningError: The file has no key that can be used.
     """
     try:
         return read_private_key(file)
@@ -32,9 +32,9 @@ def read_signing_key(file: Path) -> "Ed25519PrivateKey":
 
 
 def signed(kind: TaskKind, result: Result, key: "Ed25519PrivateKey") -> Result:
-    """A result with the signature of its supervisor, if it has one.
+    """Return a result with the signature of its supervisor, if it has one.
 
-    What is kept is not signed: the key may be another one when it is sent again.
+    Stored results are not signed, since the key may be another one when they are sent again.
     """
     if kind is not TaskKind.SYNTHESIZE:
         return result

@@ -15,10 +15,9 @@ from google.protobuf.message import DecodeError
 
 from robosc_api.security import caller_of
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.failures import RefusedError
 from robosc_server.result_sender import ResultSender
 from robosc_server.tasks.requests import NOT_A_MESSAGE, QUICK_BYTES, RequestCache, RequestLimits, require_short
-from robosc_server.tasks.task import Reason, Report, Result, Task, TaskKind, own_key
+from robosc_server.tasks.task import Reason, RefusedError, Report, Result, Task, TaskKind, own_key
 
 _SERVICE = pb.DESCRIPTOR.services_by_name["SynthesisService"]
 SERVICE_NAME = _SERVICE.full_name
@@ -44,17 +43,17 @@ class ResultProvider(Protocol):
     """Provider of the results of accepted tasks."""
 
     def cached(self, key: str, caller: str) -> Result | None:
-        """The result of an equal task, if it is in memory.
+        """Return the result of an equal task, if it is in memory.
 
         Raises:
-            RefusedError: The caller has asked for too much.
+            RefusedError: The quota of the caller is used up.
         """
 
     async def result(self, task: Task, caller: str, on_report: OnReport) -> Result:
-        """The result: one that is kept, or what a worker makes; cancelling this ends the work.
+        """Return the result: a stored one, or that of a worker; cancelling this ends the work.
 
         Raises:
-            RefusedError: There is none.
+            RefusedError: There is no result.
         """
 
 
@@ -62,7 +61,7 @@ class SynthesisService:
     """Implementation of the service, which answers its calls.
 
     Args:
-        provider: ResultProvider that has tasks done.
+        provider: Provider of the results of tasks.
         sender: Sender of results.
         limits: Limits of a request.
         targets: The answer of ListTargets, serialized.

@@ -1,10 +1,10 @@
 """Dispatcher of accepted tasks: a task gets its result from the cache or from a worker."""
 
-from robosc_server.failures import RefusedError, public_failure
 from robosc_server.jobs import ResultCache, Scheduler
+from robosc_server.operations.failures import public_failure
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.quotas import Quotas
-from robosc_server.tasks.task import Failure, Result, Task, TaskLimits
+from robosc_server.tasks.task import Failure, RefusedError, Result, Task, TaskLimits
 from robosc_server.workers import OnReport
 
 
@@ -14,7 +14,7 @@ class TaskDispatcher:
     Args:
         results: Cache of results.
         scheduler: Queue in front of the workers.
-        quotas: Quotas of what each caller may ask for.
+        quotas: Quotas of callers.
         limits: Limits of one task.
         metrics: Metrics that count cache hits and misses.
     """
@@ -29,10 +29,10 @@ class TaskDispatcher:
         self._metrics = metrics
 
     def cached(self, key: str, caller: str) -> Result | None:
-        """The result of an equal task, if it is in memory.
+        """Return the result of an equal task, if it is in memory.
 
         Raises:
-            RefusedError: The caller has asked for too much.
+            RefusedError: The quota of the caller is used up.
         """
         result = self._results.in_memory(key)
         if result is not None:
@@ -41,10 +41,10 @@ class TaskDispatcher:
         return result
 
     async def result(self, task: Task, caller: str, on_report: OnReport) -> Result:
-        """The result of a task; cancelling this ends the work.
+        """Return the result of a task; cancelling this ends the work.
 
         Raises:
-            RefusedError: There is none.
+            RefusedError: There is no result.
         """
         found = await self._results.find(task.key)
         if found is not None:

@@ -4,7 +4,7 @@ import re
 from pathlib import Path
 
 from robosc_api.v1 import jobs_pb2, synthesis_pb2
-from robosc_server.failures import code_of
+from robosc_server.operations.failures import code_of
 from robosc_server.tasks.convert.chunks import CHUNK_BYTES
 from robosc_server.tasks.requests import RequestLimits
 from robosc_server.tasks.task import Reason, TaskLimits

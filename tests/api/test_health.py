@@ -10,7 +10,7 @@ from robosc_api.health import ask_alive, ask_health, local_address
 from robosc_api.security import SecurityError, ServerSecurity
 from robosc_api.security.addresses import joined
 from robosc_bridge.health_check import main as bridge_health
-from robosc_server.health_check import main as server_health
+from robosc_server.operations.health_check import main as server_health
 from support.certificates import Authority
 from support.health_servers import answering
 from support.scripted_service import kept_port

@@ -16,9 +16,9 @@ from typing import Any
 import pytest
 
 from robosc.execution.runtime.event_log import NullLog
+from robosc_bridge.assembly import EXCHANGE_S, assemble
 from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.configuration.structure import Execution
-from robosc_bridge.daemon.assembly import EXCHANGE_S, assemble
 from robosc_bridge.daemon.threads.workers import DriveWorker
 from robosc_bridge.daemon.timing import MEANINGS
 from robosc_simulated import SimulatedTurtleBot3, VirtualHost

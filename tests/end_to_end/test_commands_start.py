@@ -46,11 +46,11 @@ def started(
         ("robosc", "check nothing.rscd", ("robosc.cli.main", "msgspec", "robosc.language", "exit")),
         ("robosc", "view", ("robosc_view.command",)),
         ("robosc-client", "check nothing.rscd --server 127.0.0.1:1", ("robosc_client.main", "exit")),
-        ("robosc-bridge", "drivers", ("robosc_bridge.main", "robosc_bridge.daemon.assembly", "exit")),
+        ("robosc-bridge", "drivers", ("robosc_bridge.main", "robosc_bridge.assembly", "exit")),
         ("robosc-bridge", "stop", ("robosc_bridge.terminal.commands", "grpc")),
         ("robosc-bridge", "health --config nothing.yaml", ("robosc_bridge.health_check",)),
         ("robosc-server", "--version", ("robosc_server.main", "pydantic", "exit")),
-        ("robosc-server", "health", ("robosc_server.health_check",)),
+        ("robosc-server", "health", ("robosc_server.operations.health_check",)),
         ("robosc-lsp", "--check", ("pygls", "exit")),
     ],
 )

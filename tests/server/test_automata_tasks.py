@@ -14,10 +14,9 @@ from robosc.pipeline.systems import decode_system
 from robosc.supervisor import codec
 from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc, synthesis_pb2_grpc
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.failures import RefusedError
 from robosc_server.tasks.requests import RequestLimits, accept_request
 from robosc_server.tasks.run import run_task
-from robosc_server.tasks.task import Failure, Outcome, Reason, Result, TaskKind, TaskLimits
+from robosc_server.tasks.task import Failure, Outcome, Reason, RefusedError, Result, TaskKind, TaskLimits
 from support.automata_models import BUFFER, DOOR, EMPTY, TANK, TWO_TANKS, WRONG
 from support.requests import MESSAGES, RESPONSES, automata_bundle, small_request
 from support.service import served

@@ -6,9 +6,8 @@ from typing import Any
 
 import pytest
 
-from robosc_server.failures import RefusedError
 from robosc_server.result_sender import SMALL_BYTES, ResultSender
-from robosc_server.tasks.task import Reason
+from robosc_server.tasks.task import Reason, RefusedError
 
 SIZE = SMALL_BYTES + 1
 

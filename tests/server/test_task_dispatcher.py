@@ -7,12 +7,11 @@ from typing import Any
 import pytest
 
 from robosc_api.security import Entry, Quota, Scope
-from robosc_server.failures import RefusedError
 from robosc_server.jobs import QueueLimits
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.quotas import Quotas
 from robosc_server.task_dispatcher import TaskDispatcher
-from robosc_server.tasks.task import Reason, Report, Result, TaskLimits
+from robosc_server.tasks.task import Reason, RefusedError, Report, Result, TaskLimits
 from support.job_parts import Choices, Parts, parts
 from support.job_workers import task_of
 from support.waiting import limited, until

@@ -8,11 +8,10 @@ from hypothesis import strategies as st
 
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.failures import RefusedError
 from robosc_server.jobs.convert import submission
 from robosc_server.tasks.fields import Nested, has_few_fields, nested_of
 from robosc_server.tasks.requests import RequestLimits, accept_request
-from robosc_server.tasks.task import Reason, TaskKind
+from robosc_server.tasks.task import Reason, RefusedError, TaskKind
 from support.requests import varint
 
 LIMITS = RequestLimits()

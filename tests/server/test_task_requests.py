@@ -14,9 +14,8 @@ from hypothesis import strategies as st
 import robosc_server.tasks.requests as requests_module
 from robosc.verification import DEFAULT_STATES
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.failures import RefusedError
 from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestCache, RequestLimits, accept_request
-from robosc_server.tasks.task import Reason, Task, TaskKind
+from robosc_server.tasks.task import Reason, RefusedError, Task, TaskKind
 from support.effort import examples
 from support.models import EXAMPLES
 from support.requests import MESSAGES, bundle_at, small_request, varint

@@ -16,7 +16,7 @@ _IS_A_CODE = re.compile(r"[a-z0-9]+(-[a-z0-9]+)*")
 NO_CODES = frozenset(
     {
         *("utf-8", "utf-8-sig", "robosc-supervisor", "explain-synthesis"),
-        *("ssh-ed25519", "check-log", "convert-log", "until-trouble", "site-functions", "bash-completion"),
+        *("ssh-ed25519", "check-log", "convert-log", "until-finding", "site-functions", "bash-completion"),
         # Words of Matplotlib and Foxglove.
         *("triangle-up", "steps-post", "x-thin", "follow-none"),
         *(info.name for info in available_targets()),

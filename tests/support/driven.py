@@ -12,8 +12,8 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from robosc.execution.runtime.event_log import MemoryLog
+from robosc_bridge.assembly import Machine, assemble, safety_limits
 from robosc_bridge.configuration import map_channels, parse
-from robosc_bridge.daemon.assembly import Machine, assemble, safety_limits
 from robosc_bridge.daemon.states import State
 from robosc_bridge.host import Host, Thread
 from robosc_bridge.safety import SafetyLimits

@@ -13,8 +13,7 @@ from alembic.runtime.migration import MigrationContext
 from sqlalchemy import Connection, inspect, text
 
 from robosc_server.store import JobState, Store
-from robosc_server.store.migrate import latest_version
-from robosc_server.store.migrations.table import VERSION_TABLE
+from robosc_server.store.migrate import VERSION_TABLE, latest_version
 from robosc_server.store.schema import METADATA
 from robosc_server.tasks.task import Result, TaskKind
 

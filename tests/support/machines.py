@@ -5,8 +5,8 @@ import sys
 from robosc.certification import make_supervisor
 from robosc.execution.runtime.event_log import NullLog
 from robosc.supervisor import Supervisor
+from robosc_bridge.assembly import Machine, assemble
 from robosc_bridge.configuration import map_channels, parse
-from robosc_bridge.daemon.assembly import Machine, assemble
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.host import Host

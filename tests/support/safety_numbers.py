@@ -3,8 +3,8 @@
 from dataclasses import fields
 from pathlib import Path
 
+from robosc_bridge.assembly import KEYS, safety_limits
 from robosc_bridge.configuration import parse
-from robosc_bridge.daemon.assembly import KEYS, safety_limits
 from robosc_bridge.safety import SafetyLimits
 from robosc_bridge.safety.limits import BOUNDS, Bounds
 

@@ -12,8 +12,8 @@ from pathlib import Path
 from unittest.mock import patch
 
 from robosc.execution.runtime.event_log import MemoryLog
+from robosc_bridge.assembly import Machine, assemble
 from robosc_bridge.configuration import map_channels, parse
-from robosc_bridge.daemon.assembly import Machine, assemble
 from robosc_bridge.daemon.programs.items import Attached, FromProgram, MessageReceived, Program, ToProgram
 from robosc_bridge.devices.camera import GreyRows
 from robosc_bridge.devices.interface import Scan as Ranges

@@ -13,10 +13,9 @@ import grpc.aio
 import structlog
 from google.rpc import error_details_pb2, status_pb2
 
-from robosc_server.failures import RefusedError
 from robosc_server.operations.logs import REQUEST_ID, configure_logging
 from robosc_server.operations.settings import LogFormat, LogLevel
-from robosc_server.tasks.task import Reason
+from robosc_server.tasks.task import Reason, RefusedError
 from support.waiting import PATIENCE_S
 
 SERVICE = "test.Service"

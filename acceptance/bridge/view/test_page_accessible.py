@@ -158,8 +158,8 @@ def test_graph_and_canvas_are_told_in_words(server: StandIn, seen: Visit) -> Non
         "driving",
     ]
     canvas = seen.page.get_by_role("img", name="Surroundings")
-    assert canvas.get_attribute("aria-describedby") == "map-told map-keys"
-    seen.wait("() => document.querySelector('#map-told').textContent.includes('x 0.50 m, y 0.25 m, heading 34°')")
+    assert canvas.get_attribute("aria-describedby") == "map-text map-keys"
+    seen.wait("() => document.querySelector('#map-text').textContent.includes('x 0.50 m, y 0.25 m, heading 34°')")
 
 
 def test_a_screen_reader_hears_what_matters_and_no_flood(server: StandIn, seen: Visit) -> None:

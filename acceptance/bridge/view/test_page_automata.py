@@ -37,7 +37,7 @@ def test_automata_are_played_with(browser: Browser, tmp_path: Path) -> None:
     file.write_text(TANK_AND_BELT, encoding="utf-8")
     with view_process(file) as (_, url), visit(browser, url) as seen:
         page = seen.page
-        told, count = page.locator("#play-told"), page.locator("#play-count")
+        told, count = page.locator("#play-report"), page.locator("#play-count")
 
         def happen(name: str) -> None:
             page.locator(form_of(name)).locator("button").first.click()
@@ -86,8 +86,8 @@ def test_automata_are_played_with(browser: Browser, tmp_path: Path) -> None:
         expect(told).to_contain_text("the supervisor adds to tank.c_fill: tank.level <= 1", timeout=SYNTHESIS_MS)
         expect(page.locator("#play-beginning")).to_have_value("tank.level = 1")
         seen.picture("automata")
-        page.locator("#play-trouble").click()
-        expect(told).to_contain_text("Trouble: blocked at ")
+        page.locator("#play-finding").click()
+        expect(told).to_contain_text("Found: blocked at ")
         page.locator("#play-link").click()
         expect(told).to_contain_text("the link to this model is")
         link = page.evaluate("location.hash")
@@ -103,7 +103,7 @@ def test_automata_are_played_with(browser: Browser, tmp_path: Path) -> None:
     gate = tmp_path / "gate.rscd"
     gate.write_text("robot Gate { component C { } }", encoding="utf-8")
     with view_process(gate) as (_, url), visit(browser, url + link) as linked:
-        expect(linked.page.locator("#play-told")).to_have_text(
+        expect(linked.page.locator("#play-report")).to_have_text(
             "Saved: this is the model of the link", timeout=SYNTHESIS_MS
         )
         expect(linked.page.locator("#components-title")).to_have_text("Automata")
@@ -119,7 +119,7 @@ def test_names_are_never_markup(browser: Browser, tmp_path: Path) -> None:
         expect(page.locator(form_of("toString")).locator("button")).to_have_attribute("aria-disabled", "true")
         expect(page.locator(form_of("__proto__")).locator("button")).to_have_attribute("aria-disabled", "false")
         constructor.locator("button").click()
-        expect(page.locator("#play-told")).to_have_text(f"constructor: odd = {MARKUP}")
+        expect(page.locator("#play-report")).to_have_text(f"constructor: odd = {MARKUP}")
         expect(constructor.locator(".play-why")).to_contain_text("is in <img src=x")
         expect(page.locator(".card-state")).to_have_text(MARKUP)
         page.locator(form_of(MARKUP)).locator("button").click()
@@ -150,7 +150,7 @@ def test_a_large_system_is_filtered_and_drawn_in_part(browser: Browser, tmp_path
         page.locator("#play-filter").fill("p17.")
         expect(page.locator(".play-event:visible")).to_have_count(2)
         page.locator(form_of("p17.c_a")).locator("button").click()
-        expect(page.locator("#play-told")).to_have_text("p17.c_a: p17 = m")
+        expect(page.locator("#play-report")).to_have_text("p17.c_a: p17 = m")
         page.locator("#play-walk").click()
-        expect(page.locator("#play-told")).to_contain_text("10 events by chance")
+        expect(page.locator("#play-report")).to_contain_text("10 events by chance")
         assert seen.errors == []

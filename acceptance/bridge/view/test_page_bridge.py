@@ -178,7 +178,7 @@ def test_a_whole_bridge_is_shown_stopped_started_and_missed(
         seen.page.get_by_role("button", name="Start", exact=True).click()
         seen.wait(STATE_IS, "running")
         wait_until(lambda: moves(robot), limit_s=LIMIT_S)
-        seen.wait("() => document.querySelector('#map-told').textContent.includes('Motors hold.')")
+        seen.wait("() => document.querySelector('#map-text').textContent.includes('Motors hold.')")
 
         seen.page.get_by_role("button", name="STOP").click()
         wait_until(lambda: not moves(robot), limit_s=LIMIT_S)

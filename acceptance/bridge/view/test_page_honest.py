@@ -110,7 +110,7 @@ def test_a_request_of_which_nothing_was_told_is_not_known(server: StandIn, seen:
         "dock.request": unknown,
     }
     seen.page.locator("[data-request='dock.request'] summary").click()
-    assert seen.text("[data-request='dock.request'] .whys") == "Whether it is enabled was not told."
+    assert seen.text("[data-request='dock.request'] .whys") == "It is not known whether it is enabled."
     server.send(update())
     seen.wait("() => document.querySelector('#requests-count').textContent === '2 of 4 enabled'")
 
@@ -119,7 +119,7 @@ def test_a_request_of_which_nothing_was_told_is_not_known(server: StandIn, seen:
     ("source", "words"),
     [
         ("bridge", "✓ Nothing keeps the robot from moving."),
-        ("ros2", "? Whether anything keeps the robot from moving is not told here."),
+        ("ros2", "? This source does not report what keeps the robot from moving."),
         ("log", ""),
     ],
 )

@@ -122,7 +122,7 @@ def test_the_canvas_has_walls_line_way_scan_robot_and_scale(placed: tuple[StandI
     seen.wait(f"() => ({SHARE})('scan') > 200")
     after = shares(seen)
     assert after["path"] > 100 and after["robot"] > 20
-    seen.wait("() => document.querySelector('#map-told').textContent.includes('Nearest thing 0.60 m away')")
+    seen.wait("() => document.querySelector('#map-text').textContent.includes('Nearest thing 0.60 m away')")
 
 
 def test_the_keyboard_moves_and_zooms_the_picture(placed: tuple[StandIn, Visit]) -> None:

@@ -1,4 +1,4 @@
-"""A model that is played with, in a real browser: events and their data, undo, trouble, kept runs, links, new files."""
+"""A model that is played with, in a real browser: events and data, undo, findings, kept runs, links, new files."""
 
 from pathlib import Path
 
@@ -49,7 +49,7 @@ def test_a_model_is_played_with(browser: Browser, tmp_path: Path) -> None:
         def event(name: str) -> str:
             return f'form[data-event="{name}"]'
 
-        opening, told = page.locator(event("open.request")), page.locator("#play-told")
+        opening, told = page.locator(event("open.request")), page.locator("#play-report")
         expect(opening.locator("button")).to_have_attribute("aria-disabled", "true")
         expect(opening.locator(".play-why")).to_contain_text("requirement open needs Sensor.light = day")
         expect(page.locator("#requests-panel")).to_be_hidden()
@@ -76,8 +76,8 @@ def test_a_model_is_played_with(browser: Browser, tmp_path: Path) -> None:
         page.reload()
         expect(told).to_have_text("what this page did before is here again")
         expect(page.locator("#stream-rows .row")).to_have_count(4)
-        page.locator("#play-trouble").click()
-        expect(told).to_contain_text("Trouble:")
+        page.locator("#play-finding").click()
+        expect(told).to_contain_text("Found:")
         for button, name in (("#play-log", "gate.jsonl"), ("#play-test", "test_gate.py")):
             with page.expect_download() as download:
                 page.locator(button).click()
@@ -100,7 +100,7 @@ def test_a_model_is_played_with(browser: Browser, tmp_path: Path) -> None:
         expect(page.locator("#robot")).to_have_text("Other")
         with visit(browser, url + link) as linked:
             expect(linked.page.locator("#robot")).to_have_text("Gate")
-            expect(linked.page.locator("#play-told")).to_have_text("Saved: this is the model of the link")
+            expect(linked.page.locator("#play-report")).to_have_text("Saved: this is the model of the link")
             assert linked.errors == []
         file.write_text("robot Gate {", encoding="utf-8")
         expect(page.locator("#causes")).to_contain_text("this is not what it says: gate.rscd, line 1")
@@ -110,7 +110,7 @@ def test_a_model_is_played_with(browser: Browser, tmp_path: Path) -> None:
 def test_an_example_is_played_with_on_a_small_screen(browser: Browser) -> None:
     with view_process(MODEL) as (_, url), visit(browser, url, (400, 900)) as seen:
         seen.page.locator('form[data-event="calibrate.request"] button').click()
-        expect(seen.page.locator("#play-told")).to_contain_text("calibrate = waiting")
+        expect(seen.page.locator("#play-report")).to_contain_text("calibrate = waiting")
         assert seen.page.evaluate("document.documentElement.scrollWidth <= window.innerWidth")
         seen.picture("playground-small")
         assert seen.errors == []

@@ -13,9 +13,8 @@ import grpc.aio
 
 from robosc_api.v1 import jobs_pb2 as pb
 from robosc_api.v1 import jobs_pb2_grpc
-from robosc_server.failures import RefusedError
 from robosc_server.store import JobState
-from robosc_server.tasks.task import Reason, TaskKind
+from robosc_server.tasks.task import Reason, RefusedError, TaskKind
 from support.job_parts import ME, Choices, ended, in_loop, is_in, parts
 from support.job_server import job_server
 from support.job_workers import messages_for, task_message, task_of

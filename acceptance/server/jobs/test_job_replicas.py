@@ -7,11 +7,10 @@ from typing import Any
 
 import pytest
 
-from robosc_server.failures import RefusedError
 from robosc_server.jobs import Caller, JobLimits
 from robosc_server.store import JobFilter, JobState, job_rows, store
 from robosc_server.store.job_rows import take_orphans
-from robosc_server.tasks.task import Reason, TaskKind
+from robosc_server.tasks.task import Reason, RefusedError, TaskKind
 from support.job_parts import ME, Choices, Parts, Times, ended, has_begun, in_loop, is_in, messages_of_job, parts
 from support.job_workers import messages_for, task_of
 from support.postgresql import Postgresql

@@ -101,7 +101,7 @@ def _event(record: Record) -> bytes:
 
 
 def _cleaned(info: LineInfo, pieces: list[bytes]) -> list[bytes]:
-    """The bytes of one direction, piece by piece; servos and OpenCR tell nothing of an owner."""
+    """The bytes of one direction, piece by piece; servos and OpenCR send nothing that identifies an owner."""
     if info.driver == "mavlink-rover":
         decoder = Decoder(Codec(1, 1), lambda message: message)
         return [

@@ -89,7 +89,7 @@ class Execution:
         return self.executor if isinstance(self.executor, Layer) else None
 
     def begin(self) -> Executor | Layer:
-        """A new run, from the initial state; `start` of its executor is still to be called."""
+        """Begin a new run in the initial state; its executor must still be started by `start`."""
         if self._has_begun and self._log.is_active:
             # One log for all runs: who reads it must know that the state is the initial one again.
             self._log.write({"time": self._clock.wall(), "kind": "restart", "what": ""})
@@ -109,14 +109,14 @@ class Execution:
         return Executor(system, self._robot, settings, clock, log), system
 
     def end(self) -> None:
-        """The run is over."""
+        """End the run."""
         self._run += 1 << 32
         self.executor = self._system = None
         self._robot.forget()
         self._requesters.forget()
 
     def decide(self, now_s: float, *, is_running: bool) -> None:
-        """A period has passed; decisions that come too late by whole periods are left out."""
+        """Let the executor decide, after a period; decisions that are late by whole periods are left out."""
         if self.executor is not None:
             if self.layer is not None:
                 self._requesters.release_silent(self.layer)
@@ -132,12 +132,12 @@ class Execution:
 
     @property
     def stops(self) -> tuple[str, ...]:
-        """Reasons why the executor requests nothing; empty: it may, or nothing is executed."""
+        """Reasons why the executor issues no request; empty: it may issue requests, or nothing is executed."""
         return () if self.executor is None else self.executor.reasons
 
     @property
     def changes(self) -> int:
-        """Another number whenever what is shown may be another."""
+        """Number that changes whenever the state that watchers see may have changed."""
         return self._run + (0 if self._system is None else self._system.changes)
 
     def components(self) -> Mapping[str, Mapping[str, Any]]:

@@ -95,11 +95,11 @@ class Subscription:
         return Update(self._feed.snapshot, entries, lost)
 
     def close(self) -> None:
-        """See nothing any more; may be called again."""
+        """End the subscription; may be called again."""
         self._feed.drop(self)
 
     def put(self, entry: Entry | None) -> None:
-        """For the feed: keep an entry, if it is one, and wake the watcher."""
+        """Keep a new entry, if there is one, and wake the watcher; called by the feed."""
         if entry is not None:
             with self._lock:
                 self._lost += len(self._entries) == self._entries.maxlen
@@ -118,7 +118,7 @@ class Feed:
 
     @property
     def snapshot(self) -> Snapshot | None:
-        """The latest; None: there was none yet."""
+        """Latest snapshot; None: there was none yet."""
         return self._snapshot
 
     @property

@@ -73,7 +73,7 @@ class Lifecycle:
         switch: StopSwitch,
         note: Callable[[str, str], None],
     ) -> None:
-        """Set the parts that it brings to work and to rest, and the function that notes what watchers want to see."""
+        """Set the parts that it starts and stops, and the function that records events for watchers."""
         self._execution = execution
         self._robot = robot
         self._motion = motion
@@ -88,7 +88,7 @@ class Lifecycle:
     def connect(
         self, hurry: Callable[[], None], reset_drive: Callable[[], None], are_alive: Callable[[], bool]
     ) -> None:
-        """Tell how the drive base's thread is told to hurry and to reset its motors, and whether all threads live."""
+        """Set the functions that wake the drive base's thread, reset its motors, and check that all threads live."""
         self._hurry = hurry
         self._reset_drive = reset_drive
         self._are_alive = are_alive
@@ -96,7 +96,7 @@ class Lifecycle:
     # Devices and the safety layer.
 
     def device_up(self, device: Device) -> None:
-        """A device works."""
+        """Handle the report that a device works."""
         _log.info("the %s is there", device)
         is_news = self._readiness.device_up(device)
         executor = self._execution.executor
@@ -106,7 +106,7 @@ class Lifecycle:
             self._robot.on_device_change(device, f"the {device} is back", executor, is_lost=False)
 
     def device_down(self, report: DeviceDown) -> None:
-        """A device does not work."""
+        """Handle the report that a device does not work."""
         is_news = self._readiness.device_down(report.device)
         if report.is_first:
             _log.error("%s: %s", report.device, report.problem)
@@ -121,13 +121,13 @@ class Lifecycle:
             self._fault(f"the drive base is lost: {report.problem}")
 
     def safety_changed(self, notice: SafetyNotice) -> None:
-        """Tell a person why nothing moves; what only a person can end ends the run."""
+        """Log the reasons why nothing moves; a reason that only a person can clear ends the run."""
         known, self._latches.notice = self.notice.warnings, notice
         for warning in notice.warnings:
             if warning not in known:
                 _log.warning("%s", warning)
         for reason in notice.reasons:
-            # Before the start, nothing has told anything yet.
+            # Before the start, no device has reported anything yet.
             is_news = self.state is State.RUNNING and reason not in _ORDINARY
             _log.log(logging.WARNING if is_news else logging.DEBUG, "%s", reason)
         latched = self._latches.latched
@@ -137,7 +137,7 @@ class Lifecycle:
     # Commands.
 
     def execute(self, order: Order) -> None:
-        """Do what is ordered, or answer why not."""
+        """Carry out an order, or answer it with the reason why not."""
         self._orders.arrived(order)
         command = order.command
         text = f"{command} ({order.by})" if order.by else str(command)
@@ -197,7 +197,7 @@ class Lifecycle:
         if self.state is State.FAULT:
             return f"the robot is in fault: {self.problem}; reset it first"
         if self._orders.is_halt_coming:
-            return "it was told to stop meanwhile"
+            return "a stop was requested meanwhile"
         if self._orders.is_waiting(Until.RESET):
             return "the motors are being reset"
         latched = self._latches.held(is_stopped=self._switch.is_stopped)
@@ -250,7 +250,7 @@ class Lifecycle:
         self._reset_drive()
 
     def reset_done(self, problem: str) -> None:
-        """The drive base has reset its motors, and told how they are; forget what has latched if nothing is wrong."""
+        """Clear what has latched, if the drive base has reset its motors and reports no problem."""
         if self._orders.is_waiting(Until.RESET):
             problem = problem or self._latches.release()
             if not problem:
@@ -300,11 +300,11 @@ class Lifecycle:
         self.problem = f"{self.problem}; {problem}" if self.problem else problem
 
     def poll(self, now_s: float) -> None:
-        """At the end of a cycle: whether the state becomes another."""
+        """Check at the end of a cycle whether the state must change, and change it."""
         if self.state is State.RUNNING and not self._are_alive():
             self._fault("a thread of a device or a remote endpoint has ended")
         if self._failed_rotation and self.state is State.RUNNING:
-            self._fault(f"a rotation has failed, and no message of the model tells it so: {self._failed_rotation}")
+            self._fault(f"a rotation has failed, and the model has no message for that: {self._failed_rotation}")
         self._failed_rotation = ""
         executor = self._execution.executor
         if self.state is State.RUNNING and executor is not None and executor.is_faulty:
@@ -353,7 +353,7 @@ class Lifecycle:
             self._reset()
 
     def operator_stop(self) -> None:
-        """The operator stops the robot."""
+        """Stop the robot on behalf of the operator."""
         self._orders.resolve(Until.RESET, str(Reason.OPERATOR_STOP))
         self._safety.operator_stop()
         self._hurry()
@@ -361,7 +361,7 @@ class Lifecycle:
         self._robot.stop("the operator has stopped the robot")
 
     def operator_resume(self) -> str:
-        """Let the robot go on after an operator's stop; why it cannot."""
+        """Let the robot continue after an operator's stop; return why it cannot, or an empty text."""
         if self.state in (State.STOPPING, State.OVER):
             return "the robot is being stopped"
         if self.state is State.FAULT:
@@ -377,5 +377,5 @@ class Lifecycle:
         return why
 
     def rotation_failed(self, reason: str) -> None:
-        """A rotation has failed of which the model hears nothing."""
+        """Record the failure of a rotation for which the model has no message."""
         self._failed_rotation = reason or "it was ended"

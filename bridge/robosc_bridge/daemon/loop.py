@@ -13,18 +13,18 @@ from typing import assert_never
 from robosc.execution.runtime.clock import Clock
 from robosc.execution.runtime.event_log import EventLog
 from robosc_bridge.daemon.execution import Execution, Job
+from robosc_bridge.daemon.executor_inputs import Listeners
 from robosc_bridge.daemon.feed import Feed, WatchedLog
 from robosc_bridge.daemon.lifecycle import OVER, Lifecycle
 from robosc_bridge.daemon.orders import HALTS, Orders, answer, unanswered
+from robosc_bridge.daemon.program_dispatcher import ProgramDispatcher
 from robosc_bridge.daemon.programs.channel import ProgramChannel
-from robosc_bridge.daemon.programs.dispatcher import ProgramDispatcher
 from robosc_bridge.daemon.programs.inbox import ProgramInbox
 from robosc_bridge.daemon.programs.items import Clients, FromProgram
 from robosc_bridge.daemon.programs.request_checker import RequestChecker
 from robosc_bridge.daemon.programs.requesters import Requesters
 from robosc_bridge.daemon.readiness import Readiness
 from robosc_bridge.daemon.robot.adapter import RobotAdapter
-from robosc_bridge.daemon.robot.executor_inputs import Listeners
 from robosc_bridge.daemon.robot.motion import MotionTarget
 from robosc_bridge.daemon.robot.stop_switch import StopSwitch
 from robosc_bridge.daemon.snapshots import Snapshots
@@ -148,12 +148,12 @@ class Daemon:
     def connect(
         self, hurry: Callable[[], None], reset_drive: Callable[[], None], are_alive: Callable[[], bool]
     ) -> None:
-        """Tell how the drive base's thread is told to hurry and to reset its motors, and whether all threads live."""
+        """Set the functions that wake the drive base's thread, reset its motors, and check that all threads live."""
         self._hurry = hurry
         self._lifecycle.connect(hurry, reset_drive, are_alive)
 
     def post(self, item: Report | Key | OperatorCommand | Order | FromProgram) -> None:
-        """Tell the loop something; from any thread or signal handler, never waits."""
+        """Put an item into the inbox of the loop; from any thread or signal handler, never waits."""
         if isinstance(item, FromProgram):
             self._from_programs.put(item)
             return
@@ -169,7 +169,7 @@ class Daemon:
             self._drain()
 
     def run(self) -> None:
-        """Run cycles until somebody wants it to end."""
+        """Run cycles until an order, a signal or a fault ends the loop."""
         try:
             while self.state is not State.OVER:
                 try:
@@ -201,7 +201,7 @@ class Daemon:
             _refuse(item)
 
     def cycle(self, *items: Item) -> None:
-        """Handle what has come, and decide if it is time."""
+        """Handle the items of the inbox, and let the supervisor decide if a decision is due."""
         self._in_hand = items
         self._safety.loop_cycled(self._clock.monotonic())
         self._in_hand = ()

@@ -24,7 +24,7 @@ class Inbox(Protocol):
     """Function that puts an item into the inbox of the loop."""
 
     def __call__(self, item: Order | FromProgram, /) -> None:
-        """Tell it something; never waits."""
+        """Put an item into the inbox; never waits."""
 
 
 class Operations:
@@ -73,10 +73,11 @@ class Operations:
         self._operator_seen = operator_seen
 
     def order(self, command: OperatorCommand, by: str) -> "Future[str]":
-        """Want something; a stop takes effect before this returns.
+        """Give a command to the daemon; a stop takes effect before this returns.
 
         Returns:
-            Why it cannot be, one sentence, or nothing ("") once it is done; it comes also when the daemon ends.
+            Future of the answer: one sentence that says why the command cannot be carried out, or "" once it is done.
+            It is also resolved when the daemon ends.
         """
         answer: Future[str] = Future()
         self._post(Order(command, by, answer.set_result))
@@ -87,5 +88,5 @@ class Operations:
         self._post(item)
 
     def operator_seen(self) -> None:
-        """The link to the operator works."""
+        """Report a sign of life of the operator to the safety layer."""
         self._operator_seen()

@@ -23,7 +23,7 @@ class Until(StrEnum):
 
 
 def unanswered(why: str) -> None:
-    """For who does not want to know what became of an order."""
+    """Ignore the answer to an order."""
 
 
 class Orders:
@@ -35,17 +35,17 @@ class Orders:
         self._halting: deque[Order] = deque()
 
     def halting(self, order: Order) -> None:
-        """An order that stops is on its way to the loop; from any thread or signal handler."""
+        """Note that an order which stops is on its way to the loop; from any thread or signal handler."""
         self._halting.append(order)
 
     def arrived(self, order: Order) -> None:
-        """The loop has taken an order up."""
+        """Note that the loop has taken an order up."""
         if order.command in HALTS:
             self._halting.popleft()
 
     @property
     def is_halt_coming(self) -> bool:
-        """True if an order that stops has not been taken up by the loop yet: it wins over what came before it."""
+        """True if an order that stops waits for the loop: it overrides all earlier orders."""
         return bool(self._halting)
 
     @property
@@ -55,7 +55,7 @@ class Orders:
         return any(order.command is OperatorCommand.STOP for order in tuple(self._halting))
 
     def wait(self, until: Until, order: Order) -> None:
-        """An order is answered later."""
+        """Keep an order that is answered later, when its condition holds."""
         self._open.append((until, order))
 
     def is_waiting(self, until: Until) -> bool:
@@ -63,7 +63,7 @@ class Orders:
         return any(item is until for item, _ in self._open)
 
     def resolve(self, until: Until, why: str = "") -> None:
-        """Answer the orders that wait for a condition: it is there, or a reason says why it never will be."""
+        """Answer the orders that wait for a condition: it holds, or `why` says that it never will."""
         settled = [order for item, order in self._open if item is until]
         self._open = [(item, order) for item, order in self._open if item is not until]
         for order in settled:
@@ -76,7 +76,7 @@ class Orders:
 
 
 def answer(order: Order, why: str) -> None:
-    """Answer an order: once only."""
+    """Answer an order."""
     if why:
         _log.warning("%s%s: %s", order.command, f" ({order.by})" if order.by else "", why)
     try:
@@ -85,7 +85,7 @@ def answer(order: Order, why: str) -> None:
         _log.exception("an answer could not be given")
 
 
-# An operator's stop is no fault; what is wrong with the supervisor is told by itself.
+# An operator's stop is no fault; a fault of the supervisor is reported separately.
 _GRAVE = frozenset(LATCHING) - {Reason.OPERATOR_STOP, Reason.SUPERVISOR_FAULT}
 
 
@@ -107,7 +107,7 @@ class Latches:
 
     @property
     def latched(self) -> tuple[Reason, ...]:
-        """Those that only a reset ends."""
+        """Reasons that hold until a reset."""
         return tuple(reason for reason in self.notice.reasons if reason in _GRAVE)
 
     def held(self, *, is_stopped: bool) -> str:
@@ -122,7 +122,7 @@ class Latches:
         return " ".join(reasons)
 
     def release(self) -> str:
-        """Let the safety layer forget all of them; why it does not."""
+        """Reset the latched reasons of the safety layer; return why it refuses, or an empty text."""
         if self._orders.is_stop_coming:
             return str(Reason.OPERATOR_STOP)
         if remaining := self._safety.reset():

@@ -32,17 +32,17 @@ class Readiness:
 
     @property
     def has_torque(self) -> bool:
-        """True if the motors hold, as far as anybody can tell."""
+        """True if the motors have torque, by the last reading of a drive base that works."""
         return self.is_drive_there and self.reading is not None and self.reading.is_torque_on
 
     def device_up(self, device: Device) -> bool:
-        """A device works; whether that is new."""
+        """Record that a device works; return True if it did not work before."""
         was_there = self.devices.get(device, False)
         self.devices = {**self.devices, device: True}
         return not was_there
 
     def device_down(self, device: Device) -> bool:
-        """A device does not work; whether that is new."""
+        """Record that a device does not work; return True if it worked before."""
         was_there = self.devices.get(device, False)
         self.devices = {**self.devices, device: False}
         if device is Device.SCANNER:

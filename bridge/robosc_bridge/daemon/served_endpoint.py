@@ -40,7 +40,7 @@ class ServedEndpoint(ABC):
 
     @property
     def name(self) -> str:
-        """For the log."""
+        """Name of the endpoint, for the log."""
         return self._thread.name
 
     @property
@@ -52,7 +52,7 @@ class ServedEndpoint(ABC):
         """Listen.
 
         Raises:
-            BridgeError: It cannot; of the kind that it was made with.
+            BridgeError: The endpoint cannot listen; an instance of `error`.
         """
         self._thread.start()
         if not self._is_ready.wait(_START_LIMIT_S):
@@ -64,7 +64,7 @@ class ServedEndpoint(ABC):
             raise self._error(f"{self._label}: {self._failure}") from self._failure
 
     def stop(self) -> None:
-        """End whatever is under way and give the port back; may be called again."""
+        """End all calls and close the port; may be called again."""
         if self._loop is not None and self._thread.is_alive():
             try:
                 self._loop.call_soon_threadsafe(self._end.set)

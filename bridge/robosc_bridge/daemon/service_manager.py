@@ -44,15 +44,15 @@ class ServiceManager:
         self._is_well = True
 
     def ready(self) -> None:
-        """Tell that the bridge has started; its devices may still be awaited."""
+        """Report that the bridge has started; its devices may still be awaited."""
         self._send("READY=1")
 
     def stopping(self) -> None:
-        """Tell that the bridge ends."""
+        """Report that the bridge ends."""
         self._send("STOPPING=1")
 
     def beat(self, now_s: float, state: str) -> None:
-        """Tell that the bridge lives, when that is due and if it is so; called in each cycle of the loop.
+        """Send the sign of life when it is due and the bridge is well; called in each cycle of the loop.
 
         Args:
             now_s: Time in seconds.

@@ -25,7 +25,7 @@ class ExecutionState(Protocol):
 
     @property
     def changes(self) -> int:
-        """Grows with each change of state."""
+        """Number that grows with each change of state."""
 
     def components(self) -> Mapping[str, Mapping[str, Any]]:
         """State and variables of each component."""
@@ -70,12 +70,12 @@ class Snapshots:
         self._due_s = -1.0
 
     def note(self, kind: str, what: str) -> None:
-        """Note an event of the bridge itself; it is in no log file, whose readers know nothing of it."""
+        """Send an event of the bridge itself to watchers; log files have no such entries."""
         if self._feed.is_watched:
             self._feed.append({"time": self._clock.wall(), "kind": kind, "what": what})
 
     def poll(self, state: State, problem: str, notice: SafetyNotice) -> None:
-        """Show what is so at the end of a cycle, if it is news or measurements have not been shown for a while."""
+        """Show a snapshot at the end of a cycle, after a change or when the last measurements shown are old."""
         stops, changes = self._execution.stops, self._execution.changes
         if changes != self._changes:
             self._changes = changes

@@ -94,7 +94,7 @@ def trusted_keys(entries: Iterable[str]) -> tuple[PublicKey, ...]:
 
 
 def credentials_of(chosen: SupervisorSource) -> Credentials:
-    """Return the credentials for reaching the synthesis server, as a configuration says."""
+    """Return the credentials of a configuration for the synthesis server."""
     return Credentials(
         ca=_path(chosen.ca),
         certificate=_path(chosen.certificate),
@@ -104,9 +104,9 @@ def credentials_of(chosen: SupervisorSource) -> Credentials:
 
 
 def cache_folder(argument: Path | None, chosen: SupervisorSource) -> Path | None:
-    """Return the folder for what a server made last.
+    """Return the folder for the last supervisors of a server.
 
-    As the command line says, else the configuration, else below the home.
+    The command line gives it, else the configuration, else it is below the home folder.
     """
     folder = argument or _path(chosen.keep) or state_folder()
     if folder is None:
@@ -141,7 +141,7 @@ def obtain(source: Source, report: Callable[[str], None] = lambda text: None) ->
 
 
 def deployment_of(file: Path) -> Deployment:
-    """Return the deployment that a file's supervisor says that it is for.
+    """Return the deployment that the supervisor in a file was made for.
 
     A model may have any deployment, and is taken for a controller.
 
@@ -207,7 +207,10 @@ def _signed(
 
 
 def _require_deployment(supervisor: Supervisor, deployment: Deployment, place: str) -> None:
-    """Without actions both deployments are the same, but for what a layer must be able to tell apart."""
+    """Check that a supervisor fits the deployment.
+
+    Without actions both deployments have the same supervisors, except that a layer must be able to tell messages apart.
+    """
     if supervisor.deployment is deployment:
         return
     model = supervisor.model
@@ -218,7 +221,7 @@ def _require_deployment(supervisor: Supervisor, deployment: Deployment, place: s
     if deployment is Deployment.LAYER:
         for item, other in confusable(model):
             raise NoSupervisorError(
-                f"{place}: made for the deployment controller; as a layer it could not tell whether a message on "
+                f"{place}: made for the deployment controller; as a layer it could not determine whether a message on "
                 f"'{item.identifier}' is '{item.name}' or '{other.name}'"
             )
 
@@ -336,7 +339,7 @@ _FOLDER = "robosc-bridge"
 
 
 def state_folder(environment: Mapping[str, str] = os.environ) -> Path | None:
-    """The user's folder for what is kept from one run to the next; None: there is no home.
+    """Return the user's folder for files that are kept from one run to the next; None: there is no home folder.
 
     Source: XDG Base Directory Specification 0.8, which also says that a path that is not absolute is ignored.
     """
@@ -350,7 +353,7 @@ def state_folder(environment: Mapping[str, str] = os.environ) -> Path | None:
 
 
 def is_cached(file: Path) -> bool:
-    """Return True if there is such a file, as far as this user may know."""
+    """Return True if there is such a file that this user can see."""
     try:
         return file.is_file()
     except OSError:
@@ -358,7 +361,7 @@ def is_cached(file: Path) -> bool:
 
 
 def store(file: Path, data: bytes) -> None:
-    """Replace a file at once, or warn that it cannot be: the start does not depend on it.
+    """Replace a file in one step, or log a warning that it cannot be replaced: the start does not depend on it.
 
     Whoever reads it finds the old or the new one, also after a power cut.
     """

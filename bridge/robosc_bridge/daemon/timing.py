@@ -1,8 +1,8 @@
 """Times of the bridge, measured by itself as histograms.
 
 Each histogram is filled by one thread, and read by any, without waiting: a reader may miss a time that is being added.
-Percentiles are the upper bounds of their buckets, which are a tenth wide, so that they are never too good, and at most
-a tenth too bad; what is below the first bound counts as that.
+Percentiles are the upper bounds of their buckets, which are a tenth wide, so that they are never below the true value,
+and at most a tenth above it; times below the first bound count as that bound.
 """
 
 from bisect import bisect_left
@@ -19,7 +19,7 @@ SHOWN_S = 1.0
 
 MEANINGS = {
     "scan_to_wheel": "from the last byte of a revolution until the bytes of the new velocity that was decided on it "
-    "have been written to the line of the drive base; of a driver that does not tell, until the end of its exchange",
+    "have been written to the line of the drive base; if its driver does not report that, until the exchange ends",
     "scan_to_decision": "from the last byte of a revolution until the supervisor has decided on it",
     "decision_period": "from one decision of the supervisor to the next",
     "queueing": "from the last byte of a reading until the loop takes it up",
@@ -30,7 +30,7 @@ MEANINGS = {
 
 @dataclass(frozen=True)
 class Latency:
-    """A histogram at one time.
+    """Values of a histogram at one time.
 
     Attributes:
         name: Key of `MEANINGS`.
@@ -50,7 +50,7 @@ class Latency:
         return sum(self.counts)
 
     def share_s(self, share: float) -> float:
-        """Return the time within which a share of all were, as the upper bound of its bucket; 0: there are none."""
+        """Return the quantile for a share of all times, as the upper bound of its bucket; 0: there are no times."""
         wanted, seen = share * self.count, 0
         for count, bound_s in zip(self.counts, BOUNDS_S, strict=False):
             seen += count
@@ -72,14 +72,14 @@ class Histogram:
         self._sum_s = self._max_s = 0.0
 
     def observe(self, seconds: float) -> None:
-        """Add a time."""
+        """Add a time to the histogram."""
         self._counts[bisect_left(BOUNDS_S, seconds)] += 1
         self._sum_s += seconds
         self._max_s = max(self._max_s, seconds)
 
     @property
     def latency(self) -> Latency:
-        """The histogram now."""
+        """Present values of the histogram."""
         return Latency(self.name, tuple(self._counts), self._sum_s, self._max_s)
 
 
@@ -129,22 +129,22 @@ class Timing:
         self._due_s = clock()
 
     def scan_taken(self, time_s: float) -> None:
-        """The loop takes up a scan of that time; with decisions at each event, it is decided on at once."""
+        """Note that the loop takes up a scan of that time."""
         self._scan_s = time_s
         self._is_deciding = True
 
     def scan_passed(self) -> None:
-        """The executor has the scan."""
+        """Note that the executor has received the scan; with decisions at each event, it has also decided."""
         if self._decides_at_once:
             self.decided()
         self._is_deciding = False
 
     def reading_taken(self, time_s: float) -> None:
-        """The loop has taken up a reading of that time."""
+        """Note that the loop has taken up a reading of that time."""
         self._histograms["queueing"].observe(max(self._clock() - time_s, 0.0))
 
     def deciding(self) -> None:
-        """The supervisor begins to decide."""
+        """Note that the supervisor begins to decide."""
         now_s = self._clock()
         if self._decided_s is not None:
             self._histograms["decision_period"].observe(now_s - self._decided_s)
@@ -152,36 +152,36 @@ class Timing:
         self._is_deciding = True
 
     def decided(self) -> None:
-        """The supervisor has decided."""
+        """Note that the supervisor has decided."""
         self._is_deciding = False
         if self._scan_s is not None:
             self._histograms["scan_to_decision"].observe(max(self._clock() - self._scan_s, 0.0))
             self._scan_s = None
 
     def rested(self) -> None:
-        """The supervisor is not executed: what comes next follows nothing."""
+        """Note that no supervisor is executed: the next decision has no period before it."""
         self._decided_s = self._scan_s = None
 
     def commanding(self) -> None:
-        """The loop is about to command another velocity."""
+        """Note that the loop is about to command another velocity."""
         if self._is_deciding and self._scan_s is not None:
             self._commanded_s = self._scan_s
 
     def take_command(self) -> float | None:
-        """Return the time of the scan that the velocity about to be sent was decided on; None: of none, or taken."""
+        """Return the time of the scan behind the velocity about to be sent; None: no scan, or returned before."""
         commanded_s, self._commanded_s = self._commanded_s, None
         return commanded_s
 
     def written(self, scan_s: float) -> None:
-        """The line has taken the velocity of the scan whose time `take_command` has given."""
+        """Note that the line has taken the velocity of the scan whose time `take_command` has returned."""
         self._histograms["scan_to_wheel"].observe(max(self._clock() - scan_s, 0.0))
 
     def exchanged(self, began_s: float) -> None:
-        """An exchange that began at that time is over."""
+        """Note the end of an exchange that began at that time."""
         self._histograms["exchange"].observe(self._clock() - began_s)
 
     def figures(self) -> TimingFigures:
-        """Return the figures, at most `SHOWN_S` old; asked by the loop."""
+        """Return the figures, at most `SHOWN_S` old; called by the loop."""
         now_s = self._clock()
         if now_s >= self._due_s:
             self._due_s = now_s + SHOWN_S
@@ -193,7 +193,7 @@ class Timing:
 
 
 def shown(latencies: Sequence[Latency]) -> list[tuple[str, float, float, float]]:
-    """Return name, 50th and 99th percentile and maximum in milliseconds of those that were measured at all."""
+    """Return name, median, 99th percentile and maximum in milliseconds of each time that was measured."""
     return [
         (one.name, one.share_s(0.5) * 1e3, one.share_s(0.99) * 1e3, one.max_s * 1e3) for one in latencies if one.count
     ]

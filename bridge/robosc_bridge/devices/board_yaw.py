@@ -1,4 +1,4 @@
-"""Rotation of an OpenCR board as its inertial sensor has it, for odometry that fuses it with the wheels."""
+"""Rotation of an OpenCR board by its inertial sensor, for odometry that fuses it with the wheels."""
 
 import math
 

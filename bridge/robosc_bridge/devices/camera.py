@@ -39,26 +39,26 @@ class Camera(Protocol):
     """Source of pictures; used from one thread, in which no call waits for longer than two seconds."""
 
     def open(self) -> None:
-        """Begin; at once, without waiting for a picture.
+        """Open the camera, without waiting for a picture.
 
         Raises:
-            LineError: It cannot be reached.
+            LineError: The camera cannot be reached.
         """
 
     def receive(self, limit_s: float) -> GreyRows | None:
         """Return the newest picture that has come, waiting for one; None: none was complete within the limit.
 
         Raises:
-            LineError: It is gone, or could not be opened.
-            WrongDeviceError: It sends something else than pictures.
+            LineError: The camera is gone, or could not be opened.
+            WrongDeviceError: The device sends data that are no pictures.
         """
 
     def close(self) -> None:
-        """Give it back; never raises, may be called at any time and again."""
+        """Close the camera; never raises, may be called at any time and again."""
 
 
 def make_camera(name: str) -> Camera:
-    """A camera, not opened yet.
+    """Return a camera that is not opened yet.
 
     Args:
         name: Path of a V4L2 device or a film; or `simulated:` and the path of a simulator's socket.

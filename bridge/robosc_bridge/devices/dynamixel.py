@@ -2,7 +2,7 @@
 
 The servos' bus watchdogs are armed while torque is on: a servo that receives nothing for half a second stops on its
 own. A servo that has stopped on its own, for whatever reason, is not set in motion again until torque is switched on
-anew, and one that has shut down not until a person has had it restarted.
+anew. A servo that has shut down is not set in motion again until a person has requested its restart.
 
 Source: ROBOTIS e-Manual, pages XL430-W250, XM430-W210 and "DYNAMIXEL Protocol 2.0".
 """
@@ -132,7 +132,7 @@ class DynamixelBase:
         return BusCounters() if bus is None else bus.counters
 
     def attend(self, source: VelocitySource) -> None:
-        """Command what this source has that is newer, also between the requests of an exchange."""
+        """Command newer velocities of this source from now on, also between the requests of an exchange."""
         self._source = source
 
     def wake(self) -> None:
@@ -141,13 +141,13 @@ class DynamixelBase:
     def open(self) -> None:
         """Find both motors, check that they can be driven, and set them up; wheels at rest, torque off.
 
-        Hardware errors do not keep it from opening: they are told by `exchange`, and `reset` is what they need.
+        Hardware errors do not keep it from opening: `exchange` reports them, and `reset` clears them.
 
         Raises:
             LineError: The line cannot be used.
             DeviceSilentError: A motor does not answer.
-            WrongDeviceError: They are no such motors, not alike, or set to what cannot be driven.
-            DeviceFaultError: A motor does not let go.
+            WrongDeviceError: The motors are of another or of different models, or have settings that cannot be driven.
+            DeviceFaultError: The torque of a motor cannot be switched off.
         """
         self.close()
         self._odometry = self._odometry.rebased()
@@ -189,12 +189,12 @@ class DynamixelBase:
         return DriveLimits(limits.linear_m_s, limits.angular_rad_s, min(limits.wheel_m_s, wheel_m_s))
 
     def set_torque(self, is_on: bool) -> None:
-        """Torque on and watchdogs armed, from a standstill; or both off, after a stop.
+        """Switch torque on and arm the watchdogs, from a standstill; or switch both off, after a stop.
 
         Raises:
             LineError: The line is gone.
             DeviceSilentError: A motor does not answer.
-            DeviceFaultError: A motor has shut down, or does not do it.
+            DeviceFaultError: A motor has shut down, or does not switch its torque.
             DeviceError: The wheels still rotate, or a motor refuses its settings.
         """
         pair, _ = self._opened()
@@ -215,11 +215,11 @@ class DynamixelBase:
         self._commanded_s = self._host.monotonic()
 
     def exchange(self, velocity: Velocity) -> DriveReading:
-        """Command the wheels and read both; at most `exchange_limit_s` of the bus.
+        """Command and read both wheels, in at most `exchange_limit_s` of the bus.
 
         Raises:
             LineError: The line is gone.
-            DeviceSilentError: A motor did not answer, also when asked again; the other one has been told to stop.
+            DeviceSilentError: A motor did not answer, also when asked again; a stop has been sent to the other one.
         """
         pair, bus = self._opened()
         bus.begin(self._exchange_limit_s)
@@ -231,12 +231,12 @@ class DynamixelBase:
             raise
 
     def reset(self) -> None:
-        """Restart the motors that tell of a hardware error; torque is off afterwards.
+        """Restart the motors that report a hardware error; torque is off afterwards.
 
         Raises:
             LineError: The line is gone.
             DeviceSilentError: A motor does not come back.
-            DeviceFaultError: A motor is too hot still, or its error remains.
+            DeviceFaultError: A motor is still too hot, or its error remains.
         """
         pair, _ = self._opened()
         self._is_torque_wanted = self._is_torque_on = False
@@ -248,7 +248,7 @@ class DynamixelBase:
         self._stops = frozenset()
 
     def close(self) -> None:
-        """Stop, torque off, watchdogs off, and give the line back."""
+        """Stop the wheels, switch torque and watchdogs off, and close the line."""
         if self._pair is not None:
             with contextlib.suppress(BridgeError):
                 self._pair.release_torque()

@@ -1,4 +1,4 @@
-"""Requests to Dynamixel devices, each with its own answer and never with that of another request.
+"""Requests to Dynamixel devices, in which no answer is taken for that of another request.
 
 Packets of protocol 2.0 carry no number that assigns an answer to its request, and an answer that comes too late looks
 like the answer to the next request. But a device answers requests in their order. So a device that has not answered is
@@ -152,15 +152,15 @@ class DynamixelBus:
         self.stranger = None
 
     def silence_of(self, names: str, verb: str) -> DeviceSilentError:
-        """The error to tell: who does not answer, and who does instead."""
+        """The error for devices that do not answer; it names the device that answers instead."""
         other = "" if self.stranger is None else f", but device {self.stranger} does"
         return DeviceSilentError(f"{names} {verb} not answer{other}")
 
     def settle(self, device: int) -> bytes:
-        """Have every older answer of a device behind: what it answers to the next request, that is its answer.
+        """Make sure that no older answer of a device can follow: its next answer belongs to the next request.
 
         Returns:
-            What was read for it.
+            Data that was read for this.
 
         Raises:
             LineError: The line is gone.
@@ -181,7 +181,7 @@ class DynamixelBus:
         return status.data
 
     def ping(self, device: int, limit_s: float | None = None) -> tuple[int, int]:
-        """Model number and version of the firmware.
+        """Return the model number and the version of the firmware.
 
         Args:
             device: Id of the device.
@@ -222,7 +222,7 @@ class DynamixelBus:
             address: Address of the first byte.
             data: Data to write.
             limit_s: Longest wait for the answer, where it is not the usual one.
-            sent: Function that is called whenever the line has taken it; None: none.
+            sent: Function that is called each time the line has taken the packet; None: none.
 
         Raises:
             LineError: The line is gone.
@@ -241,10 +241,10 @@ class DynamixelBus:
         )
 
     def interject(self, device: int, address: int, data: bytes) -> None:
-        """Write to an address of the device whose answer is awaited; only as, and once in, an `interruption`.
+        """Write to an address of the device whose answer is awaited; may be called once in an `interruption`.
 
-        Its own answer is heard after that one. If none comes, the request is not repeated: a device that is slow works
-        off each of them, and an older write must not follow a newer one.
+        The answer to this write is read after the awaited one. If none comes, the write is not repeated: a slow device
+        carries out every request, and an older write must not follow a newer one.
 
         Args:
             device: Id of the device.
@@ -263,7 +263,7 @@ class DynamixelBus:
             self._port.keeps_input = False
 
     def is_late(self, device: int, limit_s: float) -> bool:
-        """Return True if a device that has not answered in time does so after all.
+        """Return True if a device that has not answered in time answers late.
 
         Args:
             device: Id of the device.
@@ -284,7 +284,7 @@ class DynamixelBus:
         return False
 
     def write_unanswered(self, device: int, address: int, data: bytes) -> None:
-        """Write to an address of a device without waiting for an answer, as where the device hears and is not heard.
+        """Write to an address of a device without waiting for an answer, such as if its answers do not arrive.
 
         Raises:
             LineError: The line is gone.
@@ -293,7 +293,7 @@ class DynamixelBus:
         self._sent(int(self._handler.writeTxOnly(self._port, device, address, len(data), list(data))))
 
     def reboot(self, device: int) -> None:
-        """Restart a device; it is silent for a while then.
+        """Restart a device, which is then silent for a while.
 
         Raises:
             LineError: The line is gone.
@@ -306,8 +306,8 @@ class DynamixelBus:
         """Write to the same address of several devices at once; none of them answers.
 
         Args:
-            address: Of the first byte.
-            data: By device, all of the same length.
+            address: Address of the first byte.
+            data: Data by device, all of the same length.
 
         Raises:
             LineError: The line is gone.

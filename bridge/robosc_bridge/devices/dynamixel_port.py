@@ -26,8 +26,8 @@ class DynamixelPort:
         answer_limit_s: The same.
         end_s: Latest time of any wait, so that several requests together stay within a limit.
         received_s: Time when the last byte came, in seconds.
-        looked: Function that is called after each look for bytes while there is time; None: none.
-        keeps_input: True while a packet is sent that must not discard what has come.
+        looked: Function that is called after each read while there is time; None: none.
+        keeps_input: True while a packet is sent that must not discard received bytes.
     """
 
     def __init__(self, line: Port, answer_limit_s: float, host: Host) -> None:
@@ -59,14 +59,14 @@ class DynamixelPort:
     # The names below are the SDK's.
 
     def clearPort(self) -> None:  # noqa: N802
-        """Forget what has come; called before each request."""
+        """Discard received bytes; called before each request."""
         if self.keeps_input:
             return
         self.line.discard_input()
         self._found = b""
 
     def writePort(self, packet: Sequence[int]) -> int:  # noqa: N802
-        """Send all of a packet; how many bytes that were."""
+        """Send a whole packet; return the number of its bytes."""
         self.line.write(bytes(packet))
         return len(packet)
 
@@ -75,14 +75,14 @@ class DynamixelPort:
         self.wait_for(length)
 
     def wait_for(self, length: int, limit_s: float | None = None) -> None:
-        """Begin to wait for answers of so many bytes together, longest for a limit of their own."""
+        """Begin to wait for answers of so many bytes together, at most for a limit of their own."""
         wire_s = length * _BITS_PER_BYTE / self.line.baud
         wait_s = wire_s + (self.answer_limit_s if limit_s is None else limit_s)
         self._answer_end_s = min(self._host.monotonic() + wait_s, self.end_s)
         self._is_over = False
 
     def readPort(self, length: int) -> bytes:  # noqa: N802
-        """At most so many bytes, waiting for the first."""
+        """Return at most so many bytes, after waiting for the first."""
         if not self._found and not self._is_over:
             limit_s = self._answer_end_s - self._host.monotonic()
             # Bytes that came while this thread did not run still count: one look after the end, and no more.

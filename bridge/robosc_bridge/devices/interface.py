@@ -135,10 +135,10 @@ class DriveBase(Protocol):
 
     @property
     def limits(self) -> DriveLimits:
-        """Known after `open`."""
+        """Limits of the drive base; known after `open`."""
 
     def open(self) -> None:
-        """Find the device, check that it is the one that is meant, and leave it at a standstill with torque off.
+        """Find the device, check that it is the expected one, and leave it at a standstill with torque off.
 
         Raises:
             LineError: The line cannot be used.
@@ -146,28 +146,29 @@ class DriveBase(Protocol):
         """
 
     def set_torque(self, is_on: bool) -> None:
-        """Let the motors hold and obey, from a standstill; or let them go, after a goal of zero.
+        """Switch torque on, from a standstill; or switch it off, after a goal of zero.
 
         Raises:
             LineError: The line is gone.
-            DeviceError: The device does not do it.
+            DeviceError: The device does not switch torque.
         """
 
     def exchange(self, velocity: Velocity) -> DriveReading:
         """One cycle: command a velocity within the limits, keep every watchdog fed, read everything.
 
-        A velocity whose `until_s` is over is not commanded, but zero: a thread that was halted between the decision and
-        the writing of it must not set the wheels in motion when it goes on. It is looked at right before the writing.
+        If the `until_s` of the velocity has passed, zero is commanded instead: a thread that was halted between the
+        decision and the writing must not set the wheels in motion when it continues. The driver checks the time just
+        before it writes.
 
         With torque off the velocity is not sent, and zero is what the device has as its goal.
 
         Raises:
             LineError: The line is gone.
-            DeviceError: It did not answer, also when asked again within the cycle.
+            DeviceError: The device did not answer, also when asked again within the cycle.
         """
 
     def reset(self) -> None:
-        """Reboot motors that have switched themselves off, when told to by a person; torque is off afterwards.
+        """Reboot motors that have switched themselves off, at a person's request; torque is off afterwards.
 
         Raises:
             LineError: The line is gone.
@@ -175,7 +176,7 @@ class DriveBase(Protocol):
         """
 
     def close(self) -> None:
-        """Stop the wheels, torque off, give the line back; never raises, may be called at any time and again."""
+        """Stop the wheels, switch torque off, close the line; never raises, may be called at any time and again."""
 
 
 class VelocitySource(Protocol):
@@ -203,13 +204,13 @@ CONSTANT: VelocitySource = _ConstantSource()
 
 @runtime_checkable
 class AttentiveDriveBase(DriveBase, Protocol):
-    """A drive base that commands a newer velocity also during an exchange, and tells when a velocity was written.
+    """A drive base that commands a newer velocity also during an exchange, and reports when a velocity was written.
 
     Of any other drive base, a velocity counts as written when its exchange is over, and a newer one waits for that.
     """
 
     def attend(self, source: VelocitySource) -> None:
-        """Ask this source from now on, only within `exchange` and in its thread."""
+        """Ask this source for velocities from now on, only within `exchange` and in the thread of the drive base."""
 
     def wake(self) -> None:
         """Let an exchange under way ask its source soon; from any thread or signal handler, at any time."""
@@ -285,7 +286,7 @@ class RangeScanner(Protocol):
         """
 
     def receive(self, limit_s: float) -> Scan | None:
-        """The next full revolution; None: none was complete within the limit, or before `wake` was called.
+        """Return the next full revolution; None: none was complete within the limit, or before `wake` was called.
 
         Raises:
             LineError: The line is gone.
@@ -295,7 +296,7 @@ class RangeScanner(Protocol):
         """Let a `receive` that waits in another thread return at once."""
 
     def restart(self) -> None:
-        """Stop and start a motor that has fallen silent, where the device can be told so."""
+        """Stop and start a motor that has fallen silent, where the device has commands for that."""
 
     def close(self) -> None:
-        """Stop the motor, give the line back; never raises, may be called at any time and again."""
+        """Stop the motor, close the line; never raises, may be called at any time and again."""

@@ -1,4 +1,4 @@
-"""Commands for two wheels so that the body moves as it should, within the limits of the wheels.
+"""Commands for two wheels that move the body as commanded, within the limits of the wheels.
 
 The limits are applied in this order: the body's velocity is clamped; the speeds of the wheels are computed from it; if
 one wheel is too fast, both are slowed by the same factor, which keeps the curvature; then the speeds are rounded to the
@@ -53,7 +53,7 @@ def wheel_speeds(velocity: Velocity, separation_m: float) -> tuple[float, float]
 
 
 def body_velocity(left_m_s: float, right_m_s: float, separation_m: float) -> Velocity:
-    """The velocity of a body whose wheels rotate that fast."""
+    """Return the velocity of a body from the speeds of its wheels."""
     return Velocity((left_m_s + right_m_s) / 2, (right_m_s - left_m_s) / separation_m)
 
 
@@ -86,10 +86,10 @@ def wheel_goals(velocity: Velocity, limits: VelocityLimits, separation_m: float,
 
 
 def opencr_words(velocity: Velocity, limits: VelocityLimits, separation_m: float) -> tuple[int, int]:
-    """Return the words that command OpenCR, such that none of its own limits ever acts.
+    """Return the words that command OpenCR, so that none of the board's own limits takes effect.
 
-    Its firmware clamps both parts on their own and then each wheel, which changes the curvature; and its commands to
-    the servos may be beyond their velocity limit, which they ignore altogether and keep their last speed.
+    Its firmware clamps both parts separately and then each wheel, which changes the curvature. It may also command a
+    servo a goal beyond the servo's velocity limit: the servo ignores such a goal and keeps its last speed.
 
     Args:
         velocity: Velocity that the body should have.

@@ -121,7 +121,7 @@ class Lidar[Frame]:
         return self._line.baud if self._line else None
 
     def open(self) -> None:
-        """Open the line and start the motor; at once, without waiting for a frame.
+        """Open the line and start the motor, without waiting for a frame.
 
         Raises:
             LineError: The line cannot be used.
@@ -138,11 +138,11 @@ class Lidar[Frame]:
             raise
 
     def receive(self, limit_s: float) -> Scan | None:
-        """The next full revolution; when one read brings several, the newest.
+        """Return the next full revolution; when one read brings several, the newest.
 
-        To be called again and again: it also sends what a restart still owes, and tries another speed while no
-        well-formed frame has come. What waited in the line while nobody asked, or while the process was paused, for so
-        long that it is stale is discarded.
+        It must be called again and again: it also sends the delayed start command of a restart, and tries another baud
+        rate as long as no well-formed frame has come. Bytes that waited in the line until they were stale, because
+        nobody called or the process was paused, are discarded.
 
         Args:
             limit_s: Longest wait.
@@ -177,9 +177,9 @@ class Lidar[Frame]:
             line.wake()
 
     def restart(self) -> None:
-        """Stop and start a motor that has fallen silent; an LDS-02 cannot be told so, and nothing happens.
+        """Stop and start a motor that has fallen silent; an LDS-02 has no command for that, and nothing happens.
 
-        Does not wait: where a pause is due between the two, `receive` sends the start after it.
+        It does not wait: if a pause is needed between stop and start, `receive` sends the start after it.
 
         Raises:
             LineError: The line is gone.
@@ -192,7 +192,7 @@ class Lidar[Frame]:
             self._start_at_s = self._clock() + self._model.restart_pause_s
 
     def close(self) -> None:
-        """Stop the motor, give the line back; never raises, may be called at any time and again."""
+        """Stop the motor, close the line; never raises, may be called at any time and again."""
         line, self._line = self._line, None
         if line:
             with contextlib.suppress(LineError):

@@ -28,7 +28,7 @@ def make_rover(
     """Return a drive base.
 
     Args:
-        path: Path as of `MavlinkRover`, and so are the others that are not described here.
+        path: Path as for `MavlinkRover`.
         robot: Abilities of the robot.
         baud: Speed of a serial port.
         system: System number of the vehicle; None: the first rover that is heard.
@@ -69,7 +69,7 @@ def make_obstacles(
     signing_link: int = 0,
     host: Host = SYSTEM_HOST,
 ) -> MavlinkObstacles:
-    """A range scanner; arguments and errors are those of `make_rover`."""
+    """Return a range scanner; arguments and errors are those of `make_rover`."""
     return MavlinkObstacles(
         path,
         baud,

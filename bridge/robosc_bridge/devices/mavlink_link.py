@@ -50,7 +50,7 @@ type Obstacle = ObstacleRing | SectorDistance
 
 @dataclass(frozen=True, slots=True)
 class LinkSettings:
-    """Settings for reaching a vehicle, the same for all users of its line.
+    """Settings of the line to a vehicle, the same for all users of the line.
 
     Attributes:
         path: Path of a serial port, or an address of `transport.network_line`.
@@ -146,7 +146,7 @@ class VehicleLink:
         return self._lost is not None
 
     def wait(self, is_so: Callable[[VehicleState], bool], limit_s: float) -> bool:
-        """Wait until the vehicle has told something; whether it has, in time.
+        """Wait for a state of the vehicle; returns whether it came in time.
 
         Raises:
             LineLostError: The line is gone.
@@ -170,7 +170,7 @@ class VehicleLink:
             return found
 
     def wake(self) -> None:
-        """Let all who wait look whether they are meant."""
+        """Wake all waiting threads, which then check whether they were meant."""
         with self._changed:
             self._changed.notify_all()
 
@@ -204,7 +204,7 @@ class VehicleLink:
             self.send(own_heartbeat)
 
     def request(self, telemetry: tuple[Telemetry, ...], interval_s: float) -> None:
-        """Ask the vehicle to send messages that often; those that it does not know it refuses, and that is all.
+        """Ask the vehicle to send messages at an interval; it refuses messages that it does not know, without effect.
 
         Raises:
             LineLostError: The line is gone.
@@ -220,7 +220,7 @@ class VehicleLink:
             )
 
     def close(self) -> None:
-        """Give the line back; never raises."""
+        """Close the line; never raises."""
         self._is_closing = True
         self._line.wake()
         self._reader.join()
@@ -277,15 +277,15 @@ _guard = threading.Lock()
 
 
 def acquire(settings: LinkSettings, *, as_driver: bool, host: Host = SYSTEM_HOST) -> VehicleLink:
-    """Return the link on that line, opened if nobody uses it yet; to be given back by `release`.
+    """Return the link on a line, which is opened if it has no user yet; `release` gives it back.
 
     Args:
         settings: Settings for reaching the vehicle.
-        as_driver: True if it is to be driven; one user at a time may do that.
+        as_driver: True if the user drives the vehicle; only one user at a time may.
         host: Parts of its computer that it uses.
 
     Raises:
-        LineBusyError: It is driven already, or used with other settings.
+        LineBusyError: The vehicle is driven already, or the line is used with other settings.
         LineError: The line cannot be used.
     """
     with _guard:
@@ -303,7 +303,7 @@ def acquire(settings: LinkSettings, *, as_driver: bool, host: Host = SYSTEM_HOST
 
 
 def release(link: VehicleLink, *, as_driver: bool) -> None:
-    """Give it back; the last one closes it."""
+    """Give a link back; the last user closes it."""
     with _guard:
         link.users -= 1
         if as_driver:

@@ -33,7 +33,7 @@ _INTERVAL_S = 0.1
 
 
 class MavlinkObstacles:
-    """A `RangeScanner`. It may share its line with a `MavlinkRover` of the same settings.
+    """`RangeScanner` that may share its line with a `MavlinkRover` of the same settings.
 
     Args:
         path: Path as of `MavlinkRover`.
@@ -70,7 +70,7 @@ class MavlinkObstacles:
         self._reported: set[int] = set()
 
     def open(self) -> None:
-        """Open the line, unless a drive base has it open already; waits for nothing.
+        """Open the line, unless a drive base has opened it already; waits for nothing.
 
         Raises:
             LineError: The line cannot be used.
@@ -110,7 +110,7 @@ class MavlinkObstacles:
             link.wake()
 
     def restart(self) -> None:
-        """Ask the vehicle once more to tell of obstacles.
+        """Ask the vehicle once more to report obstacles.
 
         Raises:
             LineError: The line is gone.
@@ -119,7 +119,7 @@ class MavlinkObstacles:
         self._is_requested = False
 
     def close(self) -> None:
-        """Give the line back; never raises, may be called at any time and again."""
+        """Close the line; never raises, may be called at any time and again."""
         link, self._link = self._link, None
         if link is not None:
             release(link, as_driver=False)
@@ -156,7 +156,7 @@ class MavlinkObstacles:
         return self._after_sensor(obstacle.content, obstacle.time_s)
 
     def _after_sensor(self, content: SectorDistance, time_s: float) -> Scan | None:
-        """A round of them is complete when the first one tells again."""
+        """Return a scan when a round of the sensors is complete: when its first sensor reports again."""
         sector = sensor_sector(content)
         if sector is None or time_s - self._ring_s <= STALE_AFTER_S:
             return None
@@ -177,7 +177,7 @@ class MavlinkObstacles:
             tuple(sector.range_m for sector in sectors),
             (math.nan,) * len(sectors),
         )
-        # Nothing rotates that it could tell the speed of.
+        # Fixed sensors have no rotation whose speed could be given: it is NaN.
         min_m = min(sector.min_m for sector in sectors)
         max_m = max(sector.max_m for sector in sectors)
         return Scan(time_s, nearest_in_sectors(sectors), raw, math.nan, min_m, max_m)

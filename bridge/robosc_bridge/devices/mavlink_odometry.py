@@ -19,7 +19,7 @@ _NO_ODOMETRY = -1
 def estimate(state: VehicleState) -> Timestamped[MotionEstimate] | None:
     """The newest estimate, and when the older of its parts came; None: there is none yet.
 
-    Place and attitude stand in where ODOMETRY does not come, or comes no longer.
+    Place and attitude are used instead if ODOMETRY does not come, or no longer comes.
     """
     pair = _of_place_and_attitude(state)
     if state.motion is None or (pair is not None and pair.time_s - state.motion.time_s > _NO_LONGER_S):
@@ -45,7 +45,7 @@ def _of_place_and_attitude(state: VehicleState) -> Timestamped[MotionEstimate] |
 
 @dataclass(frozen=True, slots=True)
 class VehicleOdometry:
-    """An odometry after some estimates; `advanced` gives the one after the next.
+    """Odometry after some estimates; `advanced` returns the one after the next.
 
     Attributes:
         pose: Pose of the body.
@@ -60,7 +60,7 @@ class VehicleOdometry:
     rebases: int = 0
 
     def advanced(self, motion: MotionEstimate) -> "VehicleOdometry":
-        """The odometry after another estimate."""
+        """Return the odometry after another estimate."""
         velocity = Velocity(motion.linear_m_s, motion.angular_rad_s)
         last = self.last
         if last is None or last.resets != motion.resets:
@@ -78,5 +78,5 @@ class VehicleOdometry:
         return replace(self, pose=pose, velocity=velocity, last=motion)
 
     def rebased(self) -> "VehicleOdometry":
-        """The odometry whose next estimate is no motion."""
+        """Return an odometry for which the next estimate does not count as motion."""
         return replace(self, last=None)

@@ -166,20 +166,20 @@ class MavlinkRover:
         return FrameCounts() if link is None else link.counts
 
     def attend(self, source: VelocitySource) -> None:
-        """Tell this source when a target was sent; no exchange takes long enough to ask it for a newer one."""
+        """Report to this source when a target was sent; no exchange takes long enough to ask it for a newer one."""
         self._source = source
 
     def wake(self) -> None:
         """Do nothing: no exchange waits."""
 
     def open(self) -> None:
-        """Find the vehicle and check that it is a rover that tells where it is and that nobody else drives.
+        """Find the vehicle and check that it is a rover which reports its position, and that nobody else drives it.
 
         Raises:
             LineError: The line cannot be used.
             DeviceSilentError: No vehicle is heard.
             WrongDeviceError: It is no ArduPilot Rover.
-            DeviceFaultError: Somebody else drives it, or it does not know where it is, or does not disarm.
+            DeviceFaultError: Somebody else drives it, or it does not know its position, or does not disarm.
         """
         self.close()
         self._link = acquire(self._settings, as_driver=True, host=self._host)
@@ -205,7 +205,7 @@ class MavlinkRover:
             raise
 
     def set_torque(self, is_on: bool) -> None:
-        """Enter GUIDED and arm; or stop and disarm. A vehicle that somebody else has taken over is left to them.
+        """Enter GUIDED and arm; or stop and disarm. A vehicle that somebody else has taken over is left alone.
 
         Raises:
             LineError: The line is gone.
@@ -240,7 +240,7 @@ class MavlinkRover:
             _log.warning("%s: %s", self._path, _LONG_TARGETS)
 
     def exchange(self, velocity: Velocity) -> DriveReading:
-        """Send the velocity and our heartbeat where they are due, and tell what came; waits for nothing.
+        """Send the velocity and our heartbeat when they are due, and return what has arrived; waits for nothing.
 
         A target is sent at once when it is another one, and again every 100 ms, if this is called that often.
 
@@ -260,7 +260,7 @@ class MavlinkRover:
         report = self._fresh(state)
         if self._is_torque_wanted:
             self._is_torque_lost = self._is_torque_lost or not is_obeying
-            # Nor is one driven that no longer tells what it does.
+            # A rover that no longer reports its motion is not driven, either.
             is_driven = not self._is_torque_lost and report is not None
             target = velocity if is_driven else STANDSTILL
             target = within_limits(target, self.limits, self._robot.wheel_separation_m)
@@ -277,7 +277,7 @@ class MavlinkRover:
         return self._reading(state, report, is_obeying)
 
     def reset(self) -> None:
-        """See whether the vehicle arms in GUIDED again, and disarm it.
+        """Check whether the vehicle can be armed in GUIDED again, and disarm it.
 
         Raises:
             LineError: The line is gone.
@@ -288,7 +288,7 @@ class MavlinkRover:
         self.set_torque(False)
 
     def close(self) -> None:
-        """Stop, disarm, and give the line back; a vehicle that somebody else drives is left to them."""
+        """Stop, disarm, and close the line; a vehicle that somebody else drives is left alone."""
         if self._link is not None and self._is_torque_wanted:
             self._is_torque_wanted = False
             with contextlib.suppress(BridgeError):
@@ -373,7 +373,7 @@ class MavlinkRover:
 
     def _comes_to_rest(self) -> bool:
         def is_at_rest(state: VehicleState) -> bool:
-            # Where it tells nothing, there is nothing to wait for.
+            # A rover that reports no motion cannot be waited for.
             report = self._fresh(state)
             return report is None or (
                 abs(report.content.linear_m_s) < _REST_M_S and abs(report.content.angular_rad_s) < _REST_RAD_S
@@ -436,7 +436,7 @@ class MavlinkRover:
             raise DeviceFaultError(f"{self._path}: the rover has accepted the command, but does not {what}")
 
     def _waits(self, is_so: Callable[[VehicleState], bool], limit_s: float) -> bool:
-        """Wait until the vehicle has told something, with our heartbeat going on; whether it has, in time."""
+        """Wait for a state of the vehicle, with our heartbeat going on; returns whether it came in time."""
         link = self._used_link
         end_s = self._host.monotonic() + limit_s
         while True:

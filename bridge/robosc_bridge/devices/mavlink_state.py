@@ -39,7 +39,7 @@ class Timestamped[Content]:
 
 @dataclass(frozen=True)
 class VehicleState:
-    """A vehicle after some messages; `after` gives the one after the next.
+    """State of a vehicle after some messages; `after` returns the state after the next.
 
     Attributes:
         system: System number of the vehicle; None: any, the first rover is taken.

@@ -45,10 +45,11 @@ class Rotation:
 
 @dataclass(frozen=True, slots=True)
 class Odometry:
-    """An odometry after some readings; `advanced` gives the one after the next.
+    """Odometry after some readings; `advanced` returns the one after the next.
 
-    The encoders wrap around at 2**32, which is handled, and fall back into one revolution when their motor restarts.
-    The odometry cannot know whether one has: a jump is a reason to look, and `rebased` what follows from it.
+    The encoders wrap around at 2**32, which is handled. After a restart of its motor, an encoder begins again within
+    one revolution. The odometry cannot know whether a motor has restarted: after a jump, the driver must check, and
+    use `rebased` if it has.
 
     Attributes:
         tick_m: Way of a wheel in one tick.
@@ -67,7 +68,7 @@ class Odometry:
     covariance: Matrix = _CERTAIN
 
     def advanced(self, left: int, right: int, measured: Rotation | None = None) -> "Odometry":
-        """The odometry after another reading.
+        """Return the odometry after another reading.
 
         Args:
             left: Ticks of the left wheel, signed or not.
@@ -98,7 +99,7 @@ class Odometry:
     def jumps(self, left: int, right: int) -> tuple[bool, bool]:
         """Return, for each wheel, True if it has gone so far that its motor may have restarted instead.
 
-        Its way is counted since the last reading.
+        The way of a wheel is counted since the last reading.
         """
         is_left, is_right = (abs(step) > _HALF_TURN for step in self._steps(left, right))
         return is_left, is_right
@@ -107,7 +108,7 @@ class Odometry:
         return _step(self.ticks[0], left), _step(self.ticks[1], right)
 
     def rebased(self, is_left: bool = True, is_right: bool = True) -> "Odometry":
-        """The odometry whose next reading is no motion of these wheels."""
+        """Return an odometry for which the next reading does not count as motion of these wheels."""
         left, right = self.ticks
         return replace(self, ticks=(None if is_left else left, None if is_right else right))
 
@@ -157,8 +158,8 @@ def velocity_variances(left_m_s: float, right_m_s: float, raw_m_s: float, separa
 
     Args:
         left_m_s: Speed of the left wheel.
-        right_m_s: Of the right one.
-        raw_m_s: One unit in which they report it, of which they are off by one.
+        right_m_s: Speed of the right wheel.
+        raw_m_s: Unit in which the wheels report their speed; the error of a speed is one unit.
         separation_m: Distance between them.
     """
     # As far off as their ways are after one metre.

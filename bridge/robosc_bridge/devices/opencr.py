@@ -67,7 +67,8 @@ _REST_LIMIT_S = 1.0
 _TORQUE_LIMIT_S = 1.0
 _REFRESHED_MS = 45  # Two refreshes, every 20 ms, of what the board knows of its motors.
 _POLL_S = 0.01
-# Differences between the board's time and the computer's, from one reading to the next, that a restart is told from.
+# Differences between the board's time and the computer's, from one reading to the next, beyond which the board counts
+# as restarted.
 _LEAD_S = 0.7
 _LAG_S = 1.0
 
@@ -138,7 +139,7 @@ class OpenCrBase:
         return BusCounters() if bus is None else bus.counters
 
     def attend(self, source: VelocitySource) -> None:
-        """Command what this source has that is newer, also during an exchange."""
+        """Command newer velocities of this source from now on, also during an exchange."""
         self._source = source
 
     def wake(self) -> None:
@@ -148,7 +149,7 @@ class OpenCrBase:
             line.wake()
 
     def open(self) -> None:
-        """Find the board and check that it is the one that is meant; wheels at rest, torque off.
+        """Find the board and check that it is the expected one; wheels at rest, torque off.
 
         Raises:
             LineError: The line cannot be used.
@@ -230,7 +231,7 @@ class OpenCrBase:
         )
 
     def set_torque(self, is_on: bool) -> None:
-        """Torque on from a standstill, or off after a stop.
+        """Switch torque on, from a standstill; or switch it off, after a stop.
 
         Raises:
             LineError: The line is gone.
@@ -342,7 +343,7 @@ class OpenCrBase:
                 )
 
     def reset(self) -> None:
-        """See whether both motors hold again; the board cannot restart them.
+        """Check whether both motors hold again; the board cannot restart them.
 
         Raises:
             LineError: The line is gone.
@@ -353,7 +354,7 @@ class OpenCrBase:
         self.set_torque(False)
 
     def close(self) -> None:
-        """Stop, torque off, and give the line back."""
+        """Stop the wheels, switch torque off, and close the line."""
         if self._bus is not None and self._is_slow:
             self._is_torque_wanted = False
             with contextlib.suppress(BridgeError):
@@ -429,7 +430,7 @@ class OpenCrBase:
         self._await_refresh()
 
     def _await_refresh(self) -> None:
-        # After a calibration, which another program may have begun, the board first tells an uptime from before it.
+        # After a calibration, which another program may have begun, the board first reports an uptime from before it.
         self._host.sleep(_REFRESHED_MS / 1000)
 
     def _comes_to_rest(self) -> bool:
@@ -454,7 +455,7 @@ class OpenCrBase:
         while True:
             self._host.sleep(_POLL_S)
             block = self._cycle(STANDSTILL)
-            # Before, the board tells what was written or how it was, and not what the motors do.
+            # Before a refresh, the board reports what was written or an earlier state, and not what the motors do.
             is_refreshed = (block.uptime_ms - begin_ms) % UPTIME_MODULUS >= _REFRESHED_MS
             if is_refreshed and is_done(block):
                 return True

@@ -60,7 +60,7 @@ class Battery:
 
 @dataclass(frozen=True, slots=True)
 class Body:
-    """Abilities of a robot, as its owner gives them: enough for a drive that takes care of its motors itself.
+    """Abilities of a robot as its owner states them: enough for a drive base that controls its own motors.
 
     Attributes:
         linear_m_s: Fastest speed forward and backward; of a MAVLink rover, not more than its parameter CRUISE_SPEED.
@@ -80,7 +80,7 @@ class Body:
 
     @property
     def limits(self) -> DriveLimits:
-        """Limits of the body; each wheel may be as fast as both together make it."""
+        """Limits of the body; a wheel may be as fast as full speed and full rotation together make it."""
         wheel_m_s = self.linear_m_s + self.angular_rad_s * self.wheel_separation_m / 2
         return DriveLimits(self.linear_m_s, self.angular_rad_s, wheel_m_s)
 
@@ -115,12 +115,12 @@ class Robot:
     """A differential-drive robot.
 
     Attributes:
-        name: Name that it is asked for by.
+        name: Name of the robot in configurations.
         radius_m: Radius of the circle around it, as the firmware has it.
         wheel_radius_m: Radius of both wheels.
         wheel_separation_m: Distance between the wheels' middles, in metres.
         linear_m_s: Fastest as published; also what the teleoperation of the stock robot clamps to.
-        angular_rad_s: The same of a rotation.
+        angular_rad_s: Fastest rotation, with the same source.
         motor: Motor of both wheels.
         firmware_rpm: Limit that OpenCR's firmware puts on its commands, in rpm.
         opencr_information: Numbers that an OpenCR for this robot reports as its model information.
@@ -155,11 +155,11 @@ class Robot:
 
     @property
     def body(self) -> Body:
-        """Body of the robot, for a drive that sees to its motors itself."""
+        """Body of the robot, for a drive base that controls its own motors."""
         return Body(self.linear_m_s, self.angular_rad_s, self.wheel_separation_m)
 
     def limits(self, velocity_limit_raw: int) -> DriveLimits:
-        """Return the limits of the robot with servos that take goal velocities up to a limit."""
+        """Return the limits of the robot with servos that accept goal velocities up to a limit."""
         firmware_m_s = self.firmware_rpm * 2 * math.pi / 60 * self.wheel_radius_m
         wheel_m_s = min(velocity_limit_raw * self.raw_m_s, firmware_m_s)
         rotation_rad_s = wheel_m_s / (self.wheel_separation_m / 2)
@@ -167,7 +167,7 @@ class Robot:
 
 
 BURGER = Robot("burger", 0.105, 0.033, 0.160, 0.22, 2.84, XL430_W250, 61.0, frozenset({1}))
-# With an OpenManipulator, the board of a Waffle tells another number.
+# With an OpenManipulator, the board of a Waffle reports another number.
 WAFFLE = Robot("waffle", 0.220, 0.033, 0.287, 0.26, 1.82, XM430_W210, 77.0, frozenset({2, 3}))
 WAFFLE_PI = Robot("waffle_pi", 0.220, 0.033, 0.287, 0.26, 1.82, XM430_W210, 77.0, frozenset({2, 3}))
 ROBOTS = {robot.name: robot for robot in (BURGER, WAFFLE, WAFFLE_PI)}

@@ -24,7 +24,7 @@ _REST_RAW = 2
 _REST_LIMIT_S = 1.0
 _REBOOT_LIMIT_S = 2.0
 _POLL_S = 0.01
-# What a servo's LED tells a person, and us: the bridge has it, and it has not restarted since.
+# Value of a servo's LED, on since the bridge has opened it: a servo that has restarted since has it off.
 _OURS = b"\1"
 
 
@@ -89,7 +89,7 @@ class ServoPair:
                 self._bus.write(motor, servo.DRIVE_MODE, bytes((mode,)))
 
     def set_up(self) -> None:
-        """Do what can be done with torque off, and lasts until they restart.
+        """Write the settings that need torque off, and that last until the servos restart.
 
         Raises:
             LineError: The line is gone.
@@ -103,7 +103,7 @@ class ServoPair:
             self.read_hardware(motor)
 
     def arm(self, acceleration_raw: int, watchdog: int) -> None:
-        """Torque on from a standstill, then bus watchdogs, each seen to be done.
+        """Switch torque on, from a standstill, and then the bus watchdogs, and check each of them.
 
         Args:
             acceleration_raw: Profile acceleration.
@@ -134,7 +134,7 @@ class ServoPair:
         self._write_both(servo.BUS_WATCHDOG, watchdog, "does not arm its bus watchdog")
 
     def release_torque(self) -> None:
-        """Goal zero, wait for the wheels, torque off, then watchdogs off.
+        """Command a goal of zero, wait for the wheels, then switch torque and watchdogs off.
 
         Raises:
             LineError: The line is gone.
@@ -152,15 +152,15 @@ class ServoPair:
             raise
 
     def switch_leds_off(self) -> None:
-        """Switch off what tells a person that the bridge has them."""
+        """Switch off the LEDs, which show a person that the bridge has the motors."""
         self._bus.sync_write(servo.LED, dict.fromkeys(self.motors, b"\0"))
 
     def halt(self) -> None:
-        """A goal of zero for both."""
+        """Command a goal of zero to both."""
         self.command((0, 0))
 
     def command(self, goals_raw: tuple[int, int]) -> None:
-        """A goal for each, positive forward."""
+        """Command a goal to each, positive forward."""
         goals = zip(self.settings.items(), goals_raw, strict=True)
         data = {motor: encode_velocity(settings.sign * goal) for (motor, settings), goal in goals}
         self._bus.sync_write(servo.GOAL_VELOCITY, data)
@@ -213,7 +213,7 @@ class ServoPair:
         return any(status.data[0] == servo.WATCHDOG_TRIPPED for status in found.values())
 
     def read_hardware(self, motor: int) -> frozenset[MotorFault]:
-        """The hardware errors of one.
+        """Return the hardware errors of one servo.
 
         Raises:
             LineError: The line is gone.
@@ -224,10 +224,10 @@ class ServoPair:
         return self.hardware[motor]
 
     def restart_faulty(self) -> tuple[bool, bool]:
-        """Restart those that tell of a hardware error.
+        """Restart the motors that report a hardware error.
 
         Returns:
-            Whether the left and the right one were.
+            For the left and the right servo, True if it was restarted.
 
         Raises:
             LineError: The line is gone.

@@ -37,14 +37,14 @@ def read_settings(bus: DynamixelBus, device: int, name: str, is_mirrored: bool, 
     Args:
         bus: Bus that it is on.
         device: Its id.
-        name: Name of it in messages.
+        name: Name of the servo in messages.
         is_mirrored: True if it is mounted so that its own positive direction is backward.
         limit_s: Longest time for each half of it.
 
     Raises:
         LineError: The line is gone.
         DeviceSilentError: It does not answer.
-        WrongDeviceError: It is no servo that can be driven, or set to what cannot be driven; says what to change.
+        WrongDeviceError: The servo or its settings cannot be driven; the message says what to change.
     """
     bus.begin(limit_s)
     model_number, firmware = bus.ping(device)

@@ -44,7 +44,7 @@ class VideoDevice:
 
     @property
     def period_s(self) -> float:
-        """Time between pictures that must be waited for; 0: reading waits for them."""
+        """Time to wait between pictures, in seconds; 0: reading a picture waits for it."""
         if not self._is_film:
             return 0.0
         rate = float(self._capture.get(cv2.CAP_PROP_FPS))
@@ -53,7 +53,7 @@ class VideoDevice:
         return min(max(1.0 / rate, _FASTEST_S), _SLOWEST_S)
 
     def read(self) -> Picture:
-        """The next picture, waiting for it.
+        """Return the next picture, after waiting for it.
 
         Raises:
             LineLostError: The camera is gone, or the film has ended.
@@ -64,7 +64,7 @@ class VideoDevice:
         return np.asarray(picture, np.uint8)
 
     def close(self) -> None:
-        """Give it back; may be called again."""
+        """Close the device; may be called again."""
         self._capture.release()
 
 

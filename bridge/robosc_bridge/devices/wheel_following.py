@@ -32,7 +32,7 @@ class _LastingMonitor:
         self._time_s = 0.0
 
     def forget(self) -> None:
-        """Begin anew: nothing is asked of the wheels."""
+        """Begin anew, when nothing is commanded to the wheels."""
         self._since_s = []
 
     def _begins(self, count: int, time_s: float) -> bool:
@@ -77,8 +77,8 @@ class FollowingMonitor(_LastingMonitor):
             goals: Goal of each wheel.
             speeds: Speed of each wheel; what is not a number is far from any goal.
             time_s: Time when they were read, in seconds.
-            ramp: Acceleration with which the motors go to a goal, in the unit of the speeds a second: what they are
-                compared with goes there as well. None: they go there as fast as they can.
+            ramp: Acceleration with which the motors go to a goal, in the unit of the speeds a second: the speeds are
+                compared with a ramp of this slope. None: the motors go to the goal as fast as they can.
         """
         if self._begins(len(goals), time_s):
             self._goals = [speed if math.isfinite(speed) else 0.0 for speed in speeds]
@@ -95,10 +95,10 @@ class FollowingMonitor(_LastingMonitor):
 
 
 class ExcessMonitor(_LastingMonitor):
-    """Monitor that finds a wheel that is also driven otherwise: faster than its goal, or the other way round.
+    """Monitor that finds a wheel that is driven by others, too: faster than its goal, or in the opposite direction.
 
     Args:
-        limit_s: Longest time that a wheel may do so, since a braking wheel does it for a while.
+        limit_s: Longest time that a wheel may rotate like this, since a braking wheel does so for a while.
     """
 
     def __init__(self, limit_s: float = 0.5) -> None:

@@ -13,11 +13,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robosc.doctor import Finding, Grade, Machine, Purpose, examine, is_ready
+from robosc_bridge.assembly import drive_base, range_scanner
 from robosc_bridge.configuration import ConfigurationError, load
 from robosc_bridge.configuration.structure import Configuration
-from robosc_bridge.daemon.assembly import drive_base, range_scanner
-from robosc_bridge.devices.options import DriverOptionError
 from robosc_bridge.devices.robots import ROBOTS
+from robosc_bridge.driver_options import DriverOptionError
 from robosc_bridge.errors import BridgeError, DeviceError
 from robosc_bridge.first_drive import calibration
 from robosc_bridge.first_drive.calibration import CalibrationError
@@ -80,7 +80,7 @@ def add_commands(commands: Any) -> None:
         metavar="X",
         type=float,
         default=1.0,
-        help="of wheel-separation: what wheel-radius has told as the factor (default: 1)",
+        help="for wheel-separation: the factor that wheel-radius has measured (default: 1)",
     )
     calibrate.add_argument(
         "--json", action="store_true", help="for programs: the figures alone, questions go to stderr"
@@ -394,9 +394,7 @@ def _configuration_findings(file: Path) -> list[Finding]:
 def _port_finding(name: str, port: str) -> Finding:
     part = f"{name}.port"
     if not Path(port).exists():
-        return Finding(
-            part, Grade.MISSING, f"{port}: there is no such port", "`robosc-bridge probe` tells which there are"
-        )
+        return Finding(part, Grade.MISSING, f"{port}: there is no such port", "`robosc-bridge probe` lists the ports")
     if not os.access(port, os.R_OK | os.W_OK):
         return Finding(
             part, Grade.MISSING, f"{port}: no permission", 'sudo usermod -aG dialout "$USER", then log in again'

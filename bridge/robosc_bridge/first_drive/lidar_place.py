@@ -187,7 +187,7 @@ def place_of(sightings: Sequence[Sighting], rotation_rad: float) -> LidarPlace:
         rotation_rad: Angle by which it was turned, as the LiDAR saw it.
 
     Raises:
-        CalibrationError: They do not tell it: too few, of a part of a rotation, or too far from each other.
+        CalibrationError: The scans do not determine the place: too few, of a part of a rotation, or too far apart.
     """
     import numpy as np
 
@@ -241,7 +241,7 @@ def lidar_place(
         separation_m: Distance between the wheels that rotations go by.
 
     Raises:
-        BridgeError: A device is lost, does not tell what is needed, the torque is on, or the scans do not suffice.
+        BridgeError: A device is lost, does not report what is needed, the torque is on, or the scans do not suffice.
     """
     follower = WallFollower()
     x_m = y_m = heading_rad = 0.0

@@ -107,7 +107,7 @@ def find_servos(
 
 
 def read_servo(bus: DynamixelBus, device: int, baud: int, model_number: int, firmware: int) -> FoundServo:
-    """Return what a servo tells, and what is wrong with it.
+    """Return the settings and values that a servo reports, and what is wrong with them.
 
     Raises:
         LineError: The line is gone.

@@ -36,7 +36,7 @@ _MOST_REMEMBERED = 32
 _SHOWN_S = 1.0
 
 type Say = Callable[[Severity, str, Sender | None], None]
-"""Tells a text of that severity, as an answer to its sender's asking, or as news of the robot."""
+"""Sends a text of that severity, as an answer to a sender's request; None: as news of the robot."""
 
 type _Key = tuple[Sender, int, bytes]
 
@@ -84,7 +84,7 @@ class CommandHandler:
     Args:
         operations: The daemon.
         stream: Messages about the daemon.
-        say: Function that tells a person something.
+        say: Function that sends a text to the person at a ground station.
     """
 
     def __init__(self, operations: Operations, stream: Stream, say: Say) -> None:
@@ -225,7 +225,7 @@ class CommandHandler:
     def _unanswered(self, pending: _Pending) -> Result:
         undone_by = UNDONE_BY.get(pending.command)
         if undone_by is not None:
-            # What a person was told has failed does not happen later.
+            # A command that was reported as failed must not be carried out later.
             self._operations.order(undone_by, _name(pending.received.sender))
         self._say(Severity.ERROR, f"{_NOT_DONE[pending.command]}: the bridge's loop does not answer.", None)
         return Result.FAILED

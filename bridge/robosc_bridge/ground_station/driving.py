@@ -1,8 +1,8 @@
 """Motion that is asked for by set-points, as requests of a program to a supervision layer.
 
 Sources: mavlink.io (SET_POSITION_TARGET_LOCAL_NED, MANUAL_CONTROL) and ArduPilot Rover. Rotations are clockwise there
-and counter-clockwise here. Whoever drives by hand must go on telling so: a stream that ends is a request to stand
-still.
+and counter-clockwise here. A ground station that drives by hand must repeat its set-points: when the stream ends, the
+robot is requested to stand still.
 """
 
 import math

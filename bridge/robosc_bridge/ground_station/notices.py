@@ -44,7 +44,7 @@ def blocking_notices(snapshot: Snapshot) -> Iterator[Notice]:
         yield Severity.CRITICAL, snapshot.problem
     is_running = snapshot.state is State.RUNNING
     for reason in snapshot.reasons:
-        # Before the start, nothing has told anything yet.
+        # Before the start, no device has reported anything yet.
         if reason in LATCHING:
             is_chosen = reason is Reason.OPERATOR_STOP
             yield Severity.WARNING if is_chosen else Severity.CRITICAL, str(reason)

@@ -293,7 +293,7 @@ class StationSession:
 
     def _station(self, received: ReceivedMessage) -> None:
         if self._station_s is None:
-            # It has not been told anything yet.
+            # A station that has just connected has not been sent any text.
             self._texts.forget()
             _log.info("the ground station %d/%d has connected", *received.sender)
         self._station_s = self._now_s

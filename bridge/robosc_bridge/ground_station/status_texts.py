@@ -1,7 +1,7 @@
 """Texts for a person at the ground station: cut into chunks, not too many a second, the same one not again and again.
 
-The grave ones go first. What answers somebody's asking goes last, and waits in one place for each sender: nobody keeps
-the news of the robot from being told by asking nonsense.
+The grave ones go first. Answers to requests go last, and each sender has one place in which its answer waits: so no
+sender can hold back the news of the robot by sending nonsense.
 
 Source: mavlink.io (STATUSTEXT). A text of up to 50 bytes goes as it is. A longer one goes in chunks of 50, of which one
 that is shorter is the last: so a text that fills its chunks is followed by an empty one, and a chunk that would end
@@ -132,7 +132,7 @@ class StatusTexts:
         again_s: float = REPEAT_S,
         asked_by: Sender | None = None,
     ) -> None:
-        """Tell something, unless the same was told less than `again_s` ago.
+        """Queue a text, unless the same one was sent less than `again_s` ago.
 
         Args:
             now_s: The time.
@@ -164,7 +164,7 @@ class StatusTexts:
             if last.rank <= item.rank:
                 return False
             self._waiting.remove(last)
-            # It was not told: whoever says it again is to be heard.
+            # The dropped text was not sent: the next attempt to send it counts as new.
             self._recent.pop(last.text, None)
         return True
 
@@ -176,14 +176,14 @@ class StatusTexts:
         self._recent[text] = now_s
 
     def repeat(self, now_s: float, holding: Iterable[tuple[Severity, str]]) -> None:
-        """Tell what holds now: when it begins, and again every `REPEAT_S`."""
+        """Send the notices that hold now: when they begin, and again every `REPEAT_S`."""
         blocking_notices = {plain_text(text): severity for severity, text in holding}
         for text, severity in blocking_notices.items():
             self.say(now_s, severity, text, again_s=REPEAT_S if text in self._standing else FLAPPING_S)
         self._standing = frozenset(blocking_notices)
 
     def forget(self) -> None:
-        """Somebody listens anew, to whom nothing was told yet."""
+        """Forget which texts were sent, for a ground station that has just connected."""
         self._recent.clear()
 
     def take(self, now_s: float) -> list[Make]:

@@ -30,7 +30,7 @@ READING_LIMIT_S = 1.0
 """Age above which a scan or a reading is not reported, in seconds."""
 
 CHANGE_S = 0.1
-"""A named value that changes is told at most that often."""
+"""Shortest time between two messages about a named value that changes."""
 
 VALUES_FIRST = 3
 """Number of named values that go before other telemetry."""
@@ -114,7 +114,7 @@ class Stream:
         return [] if is_gone else [telemetry.heartbeat(self.status(now_s))]
 
     def once(self, message: int, now_s: float) -> list[Make] | None:
-        """A message as it is now, empty: there is nothing to tell; None: there is no such message here."""
+        """A message about the present state; empty: there is nothing to report; None: there is no such message here."""
         if message == VERSION:
             return [self._version]
         if message == HEARTBEAT:
@@ -164,7 +164,7 @@ class Stream:
                 yield value.name, number
 
     def _changed_values(self, now_s: float) -> Iterator[Make]:
-        """Those that have changed, and those that were not told for long; who waits longest is first."""
+        """Named values that have changed, or were not sent for long; the one that waits longest is first."""
         if self.is_stale(now_s):
             return
         found = []

@@ -1,6 +1,6 @@
 """State of the daemon, as messages that are sent again and again.
 
-Each function gives what makes a message with the library's codec, or None where there is nothing to tell. Axes: the
+Each function returns a maker of a message for the library's codec, or None where there is nothing to report. Axes: the
 robot's are x forward, y left, z up and rotations counter-clockwise (REP 103); MAVLink's are forward, right, down and
 clockwise, so that y, z and rotations change their sign. Source: mavlink.io (common messages).
 """
@@ -73,7 +73,7 @@ def sys_status(snapshot: Snapshot, bad_packets: int) -> Make:
 
 
 def battery_status(snapshot: Snapshot) -> Make | None:
-    """The battery by itself; None: the drive tells nothing of it."""
+    """The battery's own message; None: the drive base reports nothing about its battery."""
     reading = snapshot.reading
     millivolts = _millivolts(reading)
     if reading is None or (millivolts == UNKNOWN and _percent(reading) < 0):

@@ -60,7 +60,7 @@ class FrameDecoder[Frame](ABC):
         """Return the content of a complete frame; None: its check fails or it says what cannot be."""
 
     def _align(self, is_aligned: bool) -> None:
-        """Told whether the next bytes follow a well-formed frame without a gap."""
+        """Note whether the next bytes follow a well-formed frame without a gap."""
         self._is_aligned = is_aligned
 
     def feed(self, data: bytes) -> list[Frame]:

@@ -129,7 +129,7 @@ class Decoder[Content](FrameDecoder[Content]):
     def take_datagram(self, data: bytes) -> list[Content]:
         """The packets of one datagram, which begins with one and has no noise; a search of every byte is not needed.
 
-        What follows a packet whose length cannot be told is dropped, so that a hostile datagram costs little time.
+        After a packet whose length cannot be determined, the rest is dropped: a hostile datagram costs little time.
         """
         found: list[Content] = []
         at = 0

@@ -53,7 +53,7 @@ class Revolution:
         angles_deg: Of each point, counter-clockwise from the front, within [0, 360).
         ranges_m: NaN where nothing valid was measured.
         intensities: As the device gives them.
-        revolutions_per_s: Speed of the motor; NaN: the device has not told yet.
+        revolutions_per_s: Speed of the motor; NaN: the device has not reported it yet.
     """
 
     angles_deg: tuple[float, ...]

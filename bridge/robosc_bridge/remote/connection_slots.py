@@ -12,7 +12,7 @@ _ESTABLISHED = "01"
 
 
 class ConnectionSlots:
-    """Watch that reports once that all places are taken, and again only after half of them were free.
+    """Monitor that logs once that all connections are taken, and again only after half of them were free.
 
     Args:
         port: Port on which callers come.
@@ -25,7 +25,7 @@ class ConnectionSlots:
         self._is_full = False
 
     def poll(self) -> None:
-        """Count; a system without these tables tells nothing."""
+        """Count the connections, and report once that all places are taken; never on a system without these tables."""
         taken = sum(map(self._taken, _TABLES))
         if taken >= self._most and not self._is_full:
             self._is_full = True

@@ -50,10 +50,10 @@ BridgeServiceServicer = bridge_pb2_grpc.BridgeServiceServicer
 add_service = bridge_pb2_grpc.add_BridgeServiceServicer_to_server
 
 MAXIMUM_SUPERVISOR_BYTES = 8 * 2**20
-"""A larger supervisor is not told: a watcher takes 16 MiB in a message, and has to do without reasons then."""
+"""Size above which a supervisor is not sent: watchers take messages of 16 MiB, and do without reasons then."""
 
 MAXIMUM_TEXT = 1000
-"""Characters of a name, identifier, id or reason in what a program tells."""
+"""Most characters of a name, identifier, id or reason that a program sends."""
 
 _KINDS = {kind: f"COMMUNICATION_KIND_{kind.name}" for kind in CommunicationKind}
 _STATES = {state: f"BRIDGE_STATE_{state.name}" for state in State}
@@ -122,10 +122,10 @@ def _fields(model: Model, item: Communication) -> list[str]:
 
 
 def command_of(request: pb.CommandRequest) -> OperatorCommand:
-    """Return the wanted command.
+    """Return the command of a request.
 
     Raises:
-        RequestError: It is none that there is.
+        RequestError: There is no such command.
     """
     command = _COMMANDS.get(request.command)
     if command is None:
@@ -134,10 +134,10 @@ def command_of(request: pb.CommandRequest) -> OperatorCommand:
 
 
 def rate_hz_of(request: pb.WatchRequest, default_hz: float, least_hz: float, most_hz: float) -> float:
-    """Most responses a second.
+    """Return the maximum number of responses a second.
 
     Raises:
-        RequestError: It is out of bounds.
+        RequestError: The number is out of bounds.
     """
     rate_hz = request.maximum_rate_hz or default_hz
     # Not-a-number is in no range.
@@ -147,14 +147,14 @@ def rate_hz_of(request: pb.WatchRequest, default_hz: float, least_hz: float, mos
 
 
 class SnapshotEncoder:
-    """Snapshots as messages; each is made once, whoever watches."""
+    """Snapshots as messages; each message is made once for all watchers."""
 
     def __init__(self) -> None:
         self._number = -1
         self._made = pb.Snapshot()
 
     def put(self, target: pb.Snapshot, snapshot: Snapshot) -> None:
-        """Fill a message with a snapshot as it is seen now."""
+        """Fill a message with a snapshot and its present age."""
         if snapshot.number != self._number:
             self._made = _snapshot(snapshot)
             self._number = snapshot.number
@@ -250,16 +250,16 @@ def event_of(entry: Entry) -> Struct:
 
 
 def program_of(hello: pb.Hello, name: str, send: Callable[[programs.ToProgram], None], operations: Operations) -> Any:
-    """Return the program that says who it is.
+    """Return the program that a first message introduces.
 
     Args:
-        hello: Message in which it says who it is.
+        hello: First message of the program.
         name: Name for the log.
-        send: Function that tells it something.
+        send: Function that sends an item to the program.
         operations: The daemon.
 
     Raises:
-        RequestError: It calls itself by no name, or serves what is not to be served here.
+        RequestError: The program has no name, or offers a service or action that is not mapped to `grpc`.
     """
     if not 1 <= len(hello.name) <= 100 or not hello.name.isprintable():
         raise RequestError("a program has a name of 1 to 100 printable characters")
@@ -278,10 +278,10 @@ def program_of(hello: pb.Hello, name: str, send: Callable[[programs.ToProgram], 
 
 
 def item_of(request: pb.AttachRequest, program: programs.Program) -> programs.FromProgram | None:
-    """Return the item that a program tells the loop; None: only that it is there.
+    """Return the item that a program sends to the loop; None: only a sign of life.
 
     Raises:
-        RequestError: It makes no sense.
+        RequestError: The request is malformed.
     """
     kind = request.WhichOneof("message")
     if kind == "keep_alive":
@@ -331,12 +331,12 @@ def welcome(operator_timeout_s: float | None) -> pb.AttachResponse:
 
 
 def refused(why: str) -> pb.AttachResponse:
-    """Return the response that what a program sent makes no sense."""
+    """Return the response to a malformed request of a program."""
     return pb.AttachResponse(refused=pb.Refusal(why=text_of(why)))
 
 
 def response_of(item: programs.ToProgram) -> pb.AttachResponse:
-    """Return the response for an item that the loop tells a program."""
+    """Return the response for an item that the loop sends to a program."""
     match item:
         case programs.MessageSent(name, identifier, data):
             message = pb.ModelMessage(name=name, identifier=text_of(identifier), data=value_of(data))

@@ -1,7 +1,8 @@
-"""Plain data to `google.protobuf.Value` and back, within bounds.
+"""Conversion of plain data to `google.protobuf.Value` and back, within bounds.
 
-Values have doubles alone. The model's whole numbers are of 32 bits, so a double that is whole and exact as one is a
-whole number here: what reads a double takes it as well (`robosc.expressions.values`). NaN and infinities stay.
+All numbers of a `Value` are doubles. A double that is exactly a whole number becomes a whole number here, since whole
+numbers of models have 32 bits; a model that reads a double accepts a whole number as well
+(`robosc.expressions.values`). NaN and infinities stay.
 """
 
 import math
@@ -18,14 +19,14 @@ _LARGEST_EXACT = 2.0**53
 
 
 class DataError(ValueError):
-    """Data that is not taken; one sentence for its sender."""
+    """Data that is refused; one sentence for its sender."""
 
 
 def plain_of(value: Value) -> Any:
-    """Data of a value: None, booleans, numbers, texts, lists, dicts with texts as keys.
+    """Return the plain data of a value: None, booleans, numbers, texts, lists, dicts with texts as keys.
 
     Raises:
-        DataError: It is nested too deeply, has too many parts or a name that is too long.
+        DataError: The data is nested too deeply, has too many parts or a name that is too long.
     """
     return _Reader().value(value, 0)
 
@@ -71,10 +72,10 @@ def _name(name: str) -> str:
 
 
 def value_of(data: Any) -> Value:
-    """A value of plain data.
+    """Return the value of plain data.
 
     Raises:
-        TypeError: It is not plain.
+        TypeError: The data is not plain.
     """
     value = Value()
     _fill(value, data)
@@ -82,7 +83,7 @@ def value_of(data: Any) -> Value:
 
 
 def struct_of(data: dict[str, Any]) -> Struct:
-    """A struct of plain data; raises as `value_of`."""
+    """Return the struct of plain data; raises as `value_of`."""
     struct = Struct()
     _fill_struct(struct, data)
     return struct
@@ -126,5 +127,5 @@ def _double(number: float) -> float:
 
 
 def text_of(text: str) -> str:
-    """A text as protobuf takes it: halves of surrogate pairs, as in names of files, are question marks."""
+    """Return a text that protobuf accepts: halves of surrogate pairs, as in names of files, become question marks."""
     return text if text.isascii() else text.encode("utf-8", "replace").decode()

@@ -7,7 +7,7 @@ import os
 from dataclasses import dataclass, field
 from pathlib import Path
 
-# gRPC's own log would tell once more, in its words, what we tell; it is read at its import.
+# The log of gRPC would repeat in other words what the bridge reports; gRPC reads this variable when it is imported.
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 import grpc.aio
@@ -56,17 +56,17 @@ _LOOK_S = 1.0
 
 
 class RemoteError(BridgeError):
-    """The remote endpoint cannot listen as it is told to."""
+    """The remote endpoint cannot listen at its address, or with its certificates."""
 
 
 @dataclass(frozen=True, slots=True)
 class RemoteSettings:
-    """Settings for listening of the endpoint.
+    """Settings of the endpoint.
 
     Attributes:
         address: `HOST:PORT`; port 0 picks a free one.
         security: Certificates and tokens.
-        operator_timeout_s: Time without the operator after which the robot stops, in seconds; None: it needs none.
+        operator_timeout_s: Time without the operator after which the robot stops, in seconds; None: none is needed.
     """
 
     address: str
@@ -75,7 +75,7 @@ class RemoteSettings:
 
 
 def settings_of(configuration: Configuration) -> RemoteSettings | None:
-    """Return the settings of a configuration; None: there is to be no such endpoint."""
+    """Return the settings of a configuration; None: it has no remote endpoint."""
     remote = configuration.remote
     if remote.grpc_address is None:
         return None
@@ -110,7 +110,7 @@ class RemoteEndpoint(ServedEndpoint):
         """Listen.
 
         Raises:
-            RemoteError: It cannot.
+            RemoteError: The endpoint cannot listen.
         """
         super().start()
         _log.info("the remote endpoint listens on %s", self.address)
@@ -180,7 +180,7 @@ def serve(operations: Operations, settings: RemoteSettings) -> RemoteEndpoint:
         settings: Settings for listening.
 
     Raises:
-        RemoteError: It cannot.
+        RemoteError: The endpoint cannot listen.
     """
     endpoint = RemoteEndpoint(operations, settings)
     endpoint.start()

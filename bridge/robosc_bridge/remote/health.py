@@ -1,7 +1,7 @@
 """The standard health check of gRPC: true while the loop runs without a fault.
 
-Not the servicer of `grpc_health`: that one returns the last value set, and keeps a stream and a name for whoever
-asks to be notified of changes, without a token and without a limit.
+The servicer of `grpc_health` is not used: it returns the last value that was set, and keeps a stream and a name for
+each caller that asks to be notified of changes, without a token and without a limit.
 """
 
 import time
@@ -22,7 +22,7 @@ Context = grpc.aio.ServicerContext[Any, Any]
 
 
 class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # generated, without types
-    """Health service that answers by what the loop shows.
+    """Health service whose answers follow from the latest snapshot of the loop.
 
     Args:
         feed: Feed that the daemon shows.
@@ -33,7 +33,7 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # generated
 
     @property
     def is_serving(self) -> bool:
-        """True if the loop rotates, and no fault has stopped the robot."""
+        """True if the loop runs, and no fault has stopped the robot."""
         snapshot = self._feed.snapshot
         if snapshot is None or time.time() - snapshot.time_s > STALE_S:
             return False
@@ -51,5 +51,5 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # generated
     async def Watch(  # noqa: N802
         self, request: health_pb2.HealthCheckRequest, context: Context
     ) -> None:
-        """Not here: it needs no token, and would hold a stream for ever."""
+        """Refuse to stream the health: the call needs no token, and would hold a stream forever."""
         await context.abort(grpc.StatusCode.UNIMPLEMENTED, "ask again and again, or use Watch of the bridge's service")

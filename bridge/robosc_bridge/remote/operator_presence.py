@@ -14,14 +14,14 @@ FLOOD_S = 3
 
 
 class FloodError(Exception):
-    """An operator sends far more than it can mean."""
+    """An operator sends more messages than a person could give."""
 
 
 class OperatorPresence:
-    """Counts an operator's messages in each second.
+    """Counter of an operator's messages in each second.
 
     Args:
-        clock: Seconds of a monotonic clock.
+        clock: Monotonic clock, in seconds.
     """
 
     def __init__(self, clock: Callable[[], float]) -> None:
@@ -31,7 +31,7 @@ class OperatorPresence:
         self._seconds_over = 0
 
     def message_received(self) -> bool:
-        """One more message; whether it is fresh.
+        """Count a message; return True if it proves that the operator is there now.
 
         Raises:
             FloodError: There were too many for too long.

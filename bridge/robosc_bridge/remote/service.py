@@ -63,11 +63,11 @@ Context = grpc.aio.ServicerContext[Any, Any]
 
 
 class BridgeService(convert.BridgeServiceServicer):
-    """The bridge for whoever is connected; lives in the endpoint's event loop.
+    """Servicer of the bridge service; lives in the endpoint's event loop.
 
     Args:
         operations: The daemon.
-        operator_timeout_s: After how long without the operator the robot stops; None: it needs none.
+        operator_timeout_s: Time without the operator after which the robot stops, in seconds; None: none is needed.
     """
 
     def __init__(self, operations: Operations, operator_timeout_s: float | None) -> None:
@@ -80,7 +80,7 @@ class BridgeService(convert.BridgeServiceServicer):
         self._closing = asyncio.Event()
 
     def close(self) -> None:
-        """Let every call end."""
+        """End every call."""
         self._closing.set()
         self._watchers.wake()
 
@@ -103,7 +103,7 @@ class BridgeService(convert.BridgeServiceServicer):
     async def Stop(  # noqa: N802
         self, request: convert.StopRequest, context: Context
     ) -> convert.StopResponse:
-        """Stop the robot: it takes effect before the call returns, and waits for nobody."""
+        """Stop the robot: the stop takes effect before the call returns, and waits for no other call."""
         by = _caller(context)
         # The stop first; whatever may fail comes later.
         self._operations.order(states.OperatorCommand.STOP, by)
@@ -113,7 +113,7 @@ class BridgeService(convert.BridgeServiceServicer):
     async def Command(  # noqa: N802
         self, request: convert.CommandRequest, context: Context
     ) -> convert.CommandResponse:
-        """Want something of the bridge."""
+        """Give a command to the bridge, and return when it is done or refused."""
         async with self._translated(context), self._counted("commands", MAXIMUM_COMMANDS, context):
             command, by = convert.command_of(request), _caller(context)
             _log.info("%s wants: %s", by, command)
@@ -164,7 +164,7 @@ class BridgeService(convert.BridgeServiceServicer):
     async def Watch(  # noqa: N802
         self, request: convert.WatchRequest, context: Context
     ) -> None:
-        """Stream the state of the bridge and what happens."""
+        """Stream the snapshots and events of the bridge."""
         async with self._translated(context), self._counted("watchers", MAXIMUM_WATCHERS, context):
             rate_hz = convert.rate_hz_of(request, DEFAULT_RATE_HZ, LEAST_RATE_HZ, MOST_RATE_HZ)
             watcher = self._watchers.join(with_events=not request.without_events)
@@ -199,7 +199,7 @@ class BridgeService(convert.BridgeServiceServicer):
     async def Attach(  # noqa: N802
         self, requests: AsyncIterator[convert.AttachRequest], context: Context
     ) -> None:
-        """A program of the model."""
+        """Connect a program of the model, or the caller of a supervision layer."""
         async with self._translated(context), self._counted("programs", MAXIMUM_PROGRAMS, context):
             hello = await self._hello(requests)
             name = f"{hello.name} ({_caller(context)})"

@@ -33,20 +33,20 @@ _LOOK_S = 0.005
 
 
 class TooSlowError(Exception):
-    """The program does not read what it is sent."""
+    """The program does not read the items that are sent to it."""
 
 
 class ProgramSession:
-    """A program that is attached.
+    """Session of an attached program.
 
     Args:
         operations: The daemon.
-        hello: Message in which the program says who it is.
+        hello: First message of the program.
         name: Name for the log.
-        operator_timeout_s: Time without the operator after which the robot stops, in seconds; None: it needs none.
+        operator_timeout_s: Time without the operator after which the robot stops, in seconds; None: none is needed.
 
     Raises:
-        RequestError: It says what makes no sense.
+        RequestError: The first message is malformed.
     """
 
     def __init__(
@@ -73,11 +73,11 @@ class ProgramSession:
     async def run(
         self, requests: AsyncIterator[convert.AttachRequest], write: Callable[[convert.AttachResponse], Awaitable[None]]
     ) -> None:
-        """Until the program has no more to say.
+        """Exchange items until the program ends its stream.
 
         Raises:
-            TooSlowError: It does not read what it is sent.
-            FloodError: It is an operator, and sends far more than it can mean.
+            TooSlowError: The program does not read the items that are sent to it.
+            FloodError: The program is an operator, and sends more messages than a person could give.
         """
         self._operations.post(Attached(self._program))
         _log.info("%s is attached", self._program.name)
@@ -94,7 +94,7 @@ class ProgramSession:
                 task.result()
         finally:
             self._is_over = True
-            # Told before anything is awaited: whatever becomes of this task, the loop knows.
+            # Posted before anything is awaited, so that the loop learns of it even if this task is cancelled.
             self._operations.post(Detached(self._program))
             _log.info("%s is gone", self._program.name)
             for task in tasks:

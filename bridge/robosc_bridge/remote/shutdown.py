@@ -16,18 +16,18 @@ OWN_END_S = 0.2
 
 
 class ShutdownLayer(Layer):
-    """Before `PromptRequests`, after which every method takes a stream of requests."""
+    """Layer in front of `PromptRequests`, behind which every method takes a stream of requests."""
 
     def __init__(self) -> None:
         super().__init__()
         self._closing = asyncio.Event()
 
     def close(self) -> None:
-        """Let every call end."""
+        """End every call."""
         self._closing.set()
 
     def wrap(self, inner: Any, method: str) -> Any:
-        """A handler that ends with the bridge."""
+        """Return a handler whose calls end with the bridge."""
         answer = behaviour_of(inner)
         return with_behaviour(inner, self._ending(writing(answer) if inner.response_streaming else answer))
 

@@ -1,7 +1,6 @@
-"""Watchers: each with the latest snapshot and the events it has not seen, however slowly it reads.
+"""Watchers: each gets the latest snapshot and the events that it has not seen, however slowly it reads.
 
-One subscription of the feed serves all of them, so that what a watcher costs the loop does not grow with their
-number.
+One subscription of the feed serves all of them, so that the cost for the loop does not grow with their number.
 """
 
 import asyncio
@@ -21,7 +20,7 @@ MAXIMUM_BYTES = 1024 * 1024
 
 
 class Watcher:
-    """Watcher, with the events that it has not seen.
+    """Watcher of the bridge, with the events that it has not seen.
 
     Args:
         with_events: True if it wants events.
@@ -46,7 +45,7 @@ class Watcher:
             self._lost += 1
 
     def lose(self, count: int) -> None:
-        """Events were lost before they came here."""
+        """Record that events were lost before they reached this watcher."""
         self._lost += count if self._with_events else 0
 
     def wake(self) -> None:
@@ -54,7 +53,7 @@ class Watcher:
         self._news.set()
 
     def take(self) -> tuple[list[Struct], int]:
-        """Events since the last look, and how many before them were lost."""
+        """Return the events since the last call, and the number of events before them that were lost."""
         events, lost = [event for event, _ in self._events], self._lost
         self._events.clear()
         self._bytes = self._lost = 0
@@ -62,7 +61,7 @@ class Watcher:
         return events, lost
 
     async def wait(self, limit_s: float) -> None:
-        """Until there is something new, or for so long."""
+        """Wait until there is news, or until the time is over."""
         with contextlib.suppress(TimeoutError):
             async with asyncio.timeout(limit_s):
                 await self._news.wait()
@@ -83,7 +82,7 @@ class Watchers:
         self._is_called = False
 
     def join(self, *, with_events: bool) -> Watcher:
-        """One more."""
+        """Add a watcher."""
         watcher = Watcher(with_events=with_events)
         self._watchers.add(watcher)
         if self._subscription is None:
@@ -91,14 +90,14 @@ class Watchers:
         return watcher
 
     def leave(self, watcher: Watcher) -> None:
-        """One less."""
+        """Remove a watcher."""
         self._watchers.discard(watcher)
         if not self._watchers and self._subscription is not None:
             self._subscription.close()
             self._subscription = None
 
     def wake(self) -> None:
-        """Let all of them look."""
+        """Wake all watchers."""
         for watcher in self._watchers:
             watcher.wake()
 

@@ -16,7 +16,7 @@ WINDOW_S = 30.0
 
 
 def monotonic() -> float:
-    """Return this computer's time in seconds, by the clock that bridges tell their times by."""
+    """Return this computer's time in seconds, by the clock that bridges take their times from."""
     return time.clock_gettime(time.CLOCK_BOOTTIME) if hasattr(time, "CLOCK_BOOTTIME") else time.monotonic()
 
 

@@ -36,7 +36,7 @@ _SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 _EPILOG = (
     "It publishes odom, joint_states, imu, battery_state, scan, /tf, /tf_static and /diagnostics, and takes no "
     "velocities: the supervisor keeps command of the wheels. Arguments after --ros-args are passed to ROS, such as "
-    "`--ros-args -r odom:=wheels/odometry`. exit status: 0 it was told to end; 1 the bridge refuses, or ROS 2 has "
+    "`--ros-args -r odom:=wheels/odometry`. exit status: 0 a signal ended it; 1 the bridge refuses, or ROS 2 has "
     "failed; 2 wrong use, no ROS 2, or a bridge of an earlier version"
 )
 
@@ -245,7 +245,7 @@ class _Follower:
                 self._relay.take(response)
 
     def _report(self, text: str) -> None:
-        # A bridge that is away is asked each second, and told once.
+        # A bridge that is away is asked each second, but reported once.
         if text != self._reported:
             self._reported = text
             _say(text)

@@ -30,7 +30,7 @@ def odometry(drive: DriveState, stamp_ns: int, frames: Frames, pose_covariance: 
     """Return a nav_msgs/Odometry.
 
     Args:
-        drive: Reading as the bridge tells it.
+        drive: Reading as the bridge sends it.
         stamp_ns: Time of the reading.
         frames: Names of frames.
         pose_covariance: Covariance of the pose, row by row.
@@ -115,7 +115,7 @@ def _vector(measured: Mapping[str, float], name: str) -> list[float] | None:
 
 def _unit(quaternion: list[float]) -> list[float] | None:
     length = math.hypot(*quaternion)
-    # A sensor that has not begun to measure tells zeros.
+    # A sensor that has not begun to measure reports zeros.
     return [part / length for part in quaternion] if math.isfinite(length) and length > 0.5 else None
 
 
@@ -145,7 +145,7 @@ def laser_scan(scan: Scan, stamp_ns: int, frames: Frames) -> Any:
     device's affair. So all are of the middle of the revolution.
 
     Args:
-        scan: Revolution as the bridge tells it.
+        scan: Revolution as the bridge sends it.
         stamp_ns: Time when its last byte had come.
         frames: Names of frames.
     """

@@ -78,7 +78,7 @@ class BridgeNode:
         self._context = rclpy.context.Context()
         given = [messages.NODE, ROS_ARGUMENTS, *arguments] if arguments else [messages.NODE]
         try:
-            # A node that is refused is told by several lines of ROS, too.
+            # ROS would print several more lines about a namespace that it refuses.
             validate_namespace(namespace if namespace.startswith("/") else f"/{namespace}")
             rclpy.init(args=given, context=self._context, signal_handler_options=SignalHandlerOptions.NO)
             self._node = node = Node(
@@ -108,7 +108,7 @@ class BridgeNode:
         self._rclpy.try_shutdown(context=self._context)
 
     def know(self, turtlebot: str, scanner: tuple[float, float] | None) -> None:
-        """Tell where the parts of the robot are.
+        """Publish where the parts of the robot are.
 
         Args:
             turtlebot: TurtleBot3 as its bridge names it; empty: another robot.

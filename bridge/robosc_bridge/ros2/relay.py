@@ -14,7 +14,7 @@ STALE_S = 0.5
 """A reading or scan that is older says nothing about now, and is not published."""
 
 SILENCE_S = 2.5
-"""A bridge tells something once a second: one that says nothing for so long hangs, or is cut off."""
+"""A bridge sends something at least once a second: one that sends nothing for this long hangs, or is cut off."""
 
 BATTERY_S = 1.0
 """Time between two messages about the battery."""
@@ -23,14 +23,14 @@ _CLOCK_SET_NS = 1_000_000_000
 
 
 class EarlierBridgeError(Exception):
-    """The bridge is of an earlier version, which does not tell the times of its readings; one sentence for a person."""
+    """The bridge is of an earlier version, which does not send the times of its readings; one sentence for a person."""
 
 
 class Outlet(Protocol):
     """Receiver of the messages; stamps are in nanoseconds since 1970-01-01 UTC."""
 
     def know(self, turtlebot: str, scanner: tuple[float, float] | None) -> None:
-        """A bridge tells which TurtleBot3 it drives; empty: another robot."""
+        """Take the TurtleBot3 that a bridge drives; empty: another robot."""
 
     def put_drive(self, drive: DriveState, stamp_ns: int, pose_covariance: tuple[float, ...]) -> None:
         """Another reading of the drive base."""
@@ -88,7 +88,7 @@ class Relay:
             self._link = replace(self._link, problem=why)
 
     def take(self, response: WatchResponse) -> None:
-        """Pass on what is new in what a bridge tells.
+        """Pass on the news in a response of a bridge.
 
         Raises:
             EarlierBridgeError: It does not send its times.
@@ -149,7 +149,7 @@ class Relay:
         return stamp_ns
 
     def report(self) -> None:
-        """Tell the present state."""
+        """Publish the present state of the bridge."""
         with self._lock:
             silence_s = self._clocks.monotonic() - self._heard_s
             link, age_s = self._link, 0.0

@@ -93,7 +93,7 @@ class PoseUncertainty:
 
 
 def reported_pose(planar: Sequence[float]) -> tuple[float, ...] | None:
-    """Return the covariance of x, y, z and rotations about them, row by row, as a bridge tells it.
+    """Return the covariance of x, y, z and rotations about them, row by row, as a bridge reports it.
 
     Args:
         planar: Covariance of x, y and heading, row by row, from zero where the odometry began.

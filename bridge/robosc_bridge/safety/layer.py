@@ -87,7 +87,7 @@ class SafetyLayer:
         self._still_s = -math.inf
 
     def enable(self) -> None:
-        """Leave standby; what was commanded before does not count."""
+        """Leave standby; earlier commands do not count."""
         with self._lock:
             self._is_enabled = True
             self._is_held = True
@@ -100,10 +100,10 @@ class SafetyLayer:
             self._asked_m_s = 0.0
 
     def command(self, velocity: Velocity, now_s: float) -> None:
-        """Ask for a velocity.
+        """Request a velocity.
 
         Args:
-            velocity: Requested velocity; what is beyond a limit is brought within it; a velocity that is not finite
+            velocity: Requested velocity; a part beyond a limit is reduced to the limit; a velocity that is not finite
                 is refused and counts as a stop.
             now_s: Time of the request, in seconds; a time that is not finite refuses it, too.
         """
@@ -137,7 +137,7 @@ class SafetyLayer:
             self._is_noisy = is_noisy
 
     def on_drive_reading(self, reading: DriveReading) -> None:
-        """The drive base has answered."""
+        """Record a reading of the drive base."""
         with self._lock:
             self._failures = 0
             self._readings.update(reading.time_s)
@@ -167,38 +167,38 @@ class SafetyLayer:
             self._latched.add(Reason.UNBIDDEN_MOTION)
 
     def drive_failed(self) -> None:
-        """An exchange with the drive base has failed."""
+        """Record that an exchange with the drive base has failed."""
         with self._lock:
             self._failures += 1
 
     def loop_cycled(self, now_s: float) -> None:
-        """The supervisor's loop was at work then."""
+        """Record the time of a cycle of the supervisor's loop."""
         with self._lock:
             self._find_pause(now_s)
             self._loop.update(now_s)
 
     def supervisor_fault(self) -> None:
-        """The supervisor, or what runs it, has failed."""
+        """Record that the supervisor, or the loop that runs it, has failed."""
         with self._lock:
             self._latched.add(Reason.SUPERVISOR_FAULT)
 
     def operator_stop(self) -> None:
-        """An operator wants the robot to stop: always possible, and stronger than everything else."""
+        """Stop the robot for an operator: always possible, and overrides every other call."""
         with self._lock:
             self._latched.add(Reason.OPERATOR_STOP)
 
     def operator_seen(self, now_s: float) -> None:
-        """Note a sign of life of the operator at that time."""
+        """Record the time of a sign of life of the operator."""
         with self._lock:
             self._operator.update(now_s)
 
     def reset(self) -> tuple[Reason, ...]:
-        """Forget what has latched, when an operator says so; the robot is in standby afterwards.
+        """Clear the latched reasons on an operator's command; the robot is in standby afterwards.
 
         Returns:
-            The reasons that forbid it; nothing was forgotten then. Each must have been put out once, torque must be off
-            where a reason wants it off, the motors must report no fault, and the battery must not be empty. No reason:
-            it is done.
+            Reasons that forbid the reset, in which case none was cleared; empty: the reset is done. It needs that each
+            reason has been in an output, that torque is off if a reason requires that, that the motors report no fault,
+            and that the battery is not empty.
         """
         with self._lock:
             remaining = tuple(reason for reason in LATCHING if reason in self._latched and self._holds(reason))
@@ -211,7 +211,7 @@ class SafetyLayer:
 
     @property
     def is_letting_go(self) -> bool:
-        """True if a latched reason wants torque off, and the motors still have it."""
+        """True if a latched reason requires torque off, and the motors still have torque."""
         with self._lock:
             return self._torque_since_s is not None and not self._latched.isdisjoint(self._torque_off)
 

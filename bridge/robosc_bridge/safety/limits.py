@@ -31,7 +31,7 @@ class Bounds:
     most: float | None = None
 
     def problem(self, value: float) -> str:
-        """Return what the value must be, where it is not; empty: it is within the bounds."""
+        """Return the condition that the value violates; empty: it is within the bounds."""
         if not (math.isfinite(value) and value > 0):
             return "must be finite and above 0"
         if self.least is not None and value < self.least:

@@ -32,11 +32,11 @@ class Freshness:
             self._heard_s = time_s
 
     def forget(self) -> None:
-        """Forget what was heard."""
+        """Forget the last report."""
         self._heard_s = None
 
     def is_stale(self, now_s: float) -> bool:
-        """Return True if the last report is too long ago, or there never was one."""
+        """Return True if the last report is too old, or there was none."""
         if self._timeout_s is None:
             return False
         if self._heard_s is None:
@@ -56,11 +56,11 @@ class ScanCoverageMonitor:
 
     def __init__(self, min_share: float) -> None:
         self._min_share = min_share
-        # Without any scan, nobody can tell that a part of it is missing.
+        # Without any scan, it is not known that a part of the view is missing.
         self._is_blind_ahead = self._is_blind_behind = False
 
     def update(self, ranges_m: Sequence[float]) -> None:
-        """A full scan came.
+        """Record a full scan.
 
         Args:
             ranges_m: One for each degree, counter-clockwise from the front; NaN where nothing valid was measured.
@@ -72,7 +72,7 @@ class ScanCoverageMonitor:
         return sum(map(math.isfinite, ranges_m)) < self._min_share * len(ranges_m)
 
     def is_blind(self, linear_m_s: float) -> bool:
-        """Return True if nothing is seen in the direction of a speed; a rotation on the spot has no direction."""
+        """Return True if the scanner is blind in the direction of a speed; a rotation on the spot has no direction."""
         return (linear_m_s > 0 and self._is_blind_ahead) or (linear_m_s < 0 and self._is_blind_behind)
 
 
@@ -94,7 +94,7 @@ class BatteryMonitor:
         self._begin_s = 0.0
 
     def update(self, voltage_v: float | None, time_s: float, level: BatteryLevel | None = None) -> None:
-        """A voltage was measured, and the drive base judged; None and a voltage that is not finite are ignored."""
+        """Record a voltage and the drive base's own judgement; None and a voltage that is not finite are ignored."""
         self._level = level or self._level
         if voltage_v is None or not math.isfinite(voltage_v) or not math.isfinite(time_s):
             return
@@ -123,11 +123,11 @@ class WheelMonitor:
     """Monitor that finds wheels that are held, rotate without a command, or do not stop.
 
     Args:
-        limits: Limits of how far off a wheel may be, and for how long.
+        limits: Largest difference of a wheel from its goal, and longest time of such a difference.
 
     Attributes:
         is_astray: True if a wheel has been off its goal for too long.
-        is_unbidden: True if a wheel has rotated for too long after all stood still, although no motion was commanded.
+        is_unbidden: True if a wheel has rotated for too long without a command, after all wheels had stood still.
     """
 
     def __init__(self, limits: SafetyLimits) -> None:
@@ -136,18 +136,18 @@ class WheelMonitor:
         self.forget()
 
     def forget(self) -> None:
-        """Forget since when a wheel is off its goal."""
+        """Forget how long a wheel has been off its goal."""
         self.is_astray = self.is_unbidden = False
         self._following.forget()
         self._has_rested = False
         self._moving_since_s: float | None = None
 
     def update(self, goals_m_s: tuple[float, float], reading: DriveReading) -> None:
-        """The wheels were read.
+        """Record a reading of the wheels.
 
         Args:
             goals_m_s: Goals of the left and the right wheel.
-            reading: Reading with their speeds, and the acceleration that their motors keep to.
+            reading: Reading with the speeds of the wheels, and the acceleration to which their motors are limited.
         """
         self.is_astray = self._following.is_blocked(
             goals_m_s, reading.wheels_m_s, reading.time_s, reading.acceleration_m_s2

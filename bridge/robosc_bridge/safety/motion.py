@@ -6,11 +6,11 @@ from robosc_bridge.safety.limits import SafetyLimits
 
 
 def within(velocity: Velocity, limits: SafetyLimits) -> Velocity:
-    """Return the velocity, with no part and no wheel of it beyond its limit.
+    """Return the velocity, reduced so that no part and no wheel is beyond its limit.
 
     Args:
-        velocity: Velocity of numbers, however large.
-        limits: Limits that it is brought within.
+        velocity: Velocity of any size; its parts are numbers.
+        limits: Limits of the result.
     """
     return within_limits(velocity, limits, limits.separation_m)
 
@@ -23,8 +23,8 @@ def wheels(velocity: Velocity, limits: SafetyLimits) -> tuple[float, float]:
 def ramped(present: Velocity, wanted: Velocity, limits: SafetyLimits, step_s: float) -> Velocity:
     """The velocity after one step from the present towards the wanted one.
 
-    Each part goes its own way, so that braking never waits for the other part. That may lead through velocities that
-    one wheel cannot do: these are slowed, as `within` does.
+    Each part changes independently, so that braking never waits for the other part. On the way a wheel may be too fast:
+    such velocities are reduced as in `within`.
 
     Args:
         present: Within the limits.

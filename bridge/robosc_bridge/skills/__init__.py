@@ -1,7 +1,7 @@
-"""Skills: what the bridge can do by itself, as state machines that readings and time are passed to.
+"""Skills: abilities of the bridge itself, as state machines that take readings and times.
 
-No threads, no clock, no lines: whoever runs them brings both. The velocities that they ask for are requests, which pass
-the safety layer like every other.
+They have no threads, no clock and no lines: their caller passes readings and times. The velocities that they return are
+requests, which pass the safety layer like every other request.
 """
 
 from robosc_bridge.skills.emergency_stop import EmergencyStop, StopEvent

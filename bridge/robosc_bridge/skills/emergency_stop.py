@@ -1,6 +1,7 @@
 """The operator's stop and resume: from buttons, keys and remote calls to two events.
 
-Stopping always wins and needs a level; going on needs an edge: a button that is pressed anew while nothing stops.
+A stop always wins, and holds as long as a button is pressed. A resume needs a new press of a button, while no stop
+button is pressed.
 """
 
 from collections.abc import Collection
@@ -35,7 +36,7 @@ class EmergencyStop:
 
     @property
     def is_held(self) -> bool:
-        """True if a button that stops is pressed."""
+        """True if a stop button is pressed."""
         return bool(self._stopping)
 
     def update(
@@ -44,16 +45,16 @@ class EmergencyStop:
         keys: Collection[str] = (),
         remote: StopEvent | None = None,
     ) -> StopEvent | None:
-        """Return the event that the model is given now.
+        """Return the event that the model receives now.
 
         Args:
-            held_buttons: Names of the drive's buttons that are pressed; None: unknown, they count as they were.
+            held_buttons: Names of the drive's buttons that are pressed; None: unknown, the last ones count.
             keys: Keys that were typed since the last call.
-            remote: Event that came over the network since the last call, the stop if both did.
+            remote: Event that came over the network since the last call; if both came, the stop.
 
         Returns:
-            A stop at each new press, also by somebody who has stopped already: it may have been missed. A resume
-                once, when a stop ends.
+            A stop at each new press, also while the robot is stopped, since the first one may have been missed. A
+                resume once, when a stop ends.
         """
         settings = self._settings
         stopping, resuming = self._stopping, self._resuming

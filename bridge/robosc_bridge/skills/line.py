@@ -1,4 +1,4 @@
-"""Finds a line on the floor in pictures of a camera, and tells how to steer along it. Needs OpenCV and numpy."""
+"""Finds a line on the floor in pictures of a camera, and computes how to steer along it. Needs OpenCV and numpy."""
 
 from dataclasses import dataclass
 from typing import Any
@@ -28,7 +28,7 @@ LOST = Line(None)
 
 
 class LineDetector:
-    """Detector that rotates pictures into corrections, and silence of the camera into a lost line.
+    """Detector that computes a correction from each picture, and reports the line as lost if no pictures come.
 
     Args:
         settings: Settings of what counts as a line, and how to steer.
@@ -40,7 +40,7 @@ class LineDetector:
         self._seen_s = time_s
 
     def update(self, picture: Picture | None, time_s: float) -> Line | None:
-        """Return the line that the model is given now; None: nothing new.
+        """Return the line that the model receives now; None: nothing new.
 
         Args:
             picture: Picture that came since the last call; None: there was none.
@@ -52,7 +52,7 @@ class LineDetector:
             return LOST if aside is None else Line(self._correction_rad_s(aside))
         if time_s - self._seen_s < self._settings.timeout_s:
             return None
-        # Told again after as long: a model that starts anew learns of it.
+        # Reported again after each timeout, so that a model that starts anew learns of the lost line.
         self._seen_s = time_s
         return LOST
 

@@ -1,8 +1,9 @@
 """Rotates the robot by an angle, in a closed loop on the heading of its odometry.
 
-The speed is the least of three: the limit, what can be braked in time, v = sqrt(2 a r), and a share of what remains, so
-that a line with a delay of up to 1/(e * gain) seconds leads to no overshoot (the critical gain of a pure integrator
-with dead time; K. J. Astrom and T. Hagglund, "PID Controllers: Theory, Design, and Tuning", 2nd edition, 1995).
+The speed is the least of three: the limit; the speed from which the robot can brake in time, v = sqrt(2 a r); and the
+remaining angle times the gain, so that a line with a delay of up to 1/(e * gain) seconds leads to no overshoot (the
+critical gain of a pure integrator with dead time; K. J. Astrom and T. Hagglund, "PID Controllers: Theory, Design, and
+Tuning", 2nd edition, 1995).
 """
 
 import math
@@ -29,7 +30,7 @@ class Rotate:
 
     Attributes:
         state: Progress of the rotation; `DONE` and `FAILED` stay until the next `start`.
-        reason: Reason why it failed; empty: it did not.
+        reason: Reason why it failed; empty: it did not fail.
         remaining_rad: Angle left to rotate, counter-clockwise above zero; 0 before the first rotation.
 
     Args:
@@ -51,15 +52,15 @@ class Rotate:
         return self.state is RotateState.TURNING
 
     def start(self, angle_rad: float, time_s: float) -> bool:
-        """Begin a rotation, from the next heading that comes.
+        """Begin a rotation at the next heading that comes.
 
         Args:
-            angle_rad: By how much, counter-clockwise above zero. One that is not finite or beyond `MAXIMUM_ANGLE_RAD`
-                fails at once.
-            time_s: Now.
+            angle_rad: Angle, counter-clockwise above zero. The rotation fails at once if the angle is not finite or
+                beyond `MAXIMUM_ANGLE_RAD`.
+            time_s: Current time, in seconds.
 
         Returns:
-            Whether it was taken; False: another rotation is under way and goes on.
+            True if the rotation begins; False: another rotation is under way and goes on.
         """
         if self.is_rotating:
             return False
@@ -76,17 +77,17 @@ class Rotate:
         return True
 
     def cancel(self, reason: str) -> None:
-        """End a rotation that is under way: it has failed."""
+        """End the rotation under way as failed."""
         if self.is_rotating:
             self._fail(reason)
 
     def update(self, heading_rad: float | None, time_s: float) -> Velocity:
-        """The velocity that is wanted now; a standstill unless a rotation is under way.
+        """Return the velocity to request now; a standstill unless a rotation is under way.
 
         Args:
-            heading_rad: Of the odometry, any number of revolutions; None: there is no new one. Between two of them the
-                robot must rotate by less than half a rotation.
-            time_s: Now.
+            heading_rad: Heading of the odometry, with any number of revolutions; None: there is no new one. Between two
+                headings the robot must rotate by less than half a revolution.
+            time_s: Current time, in seconds.
         """
         if not self.is_rotating:
             return STANDSTILL

@@ -10,7 +10,7 @@ from enum import StrEnum
 from types import TracebackType
 from typing import Any, Self
 
-# gRPC's own log would tell once more, in its words, what we tell; it is read at its import.
+# The log of gRPC would repeat in other words what this client reports; gRPC reads this variable when it is imported.
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 import grpc
@@ -219,7 +219,7 @@ class Operator:
         self._requests.put(pb.AttachRequest(request=pb.Message(identifier=topic.identifier, data=data)))
 
     def keep_alive(self) -> None:
-        """Tell that the operator is there; raises as `drive`."""
+        """Send a sign of life of the operator; raises as `drive`."""
         self._look()
         self._requests.put(pb.AttachRequest(keep_alive=pb.KeepAlive()))
 

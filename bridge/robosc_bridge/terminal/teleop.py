@@ -228,7 +228,7 @@ class _Resuming:
     def __init__(self, terminal: Terminal, client: BridgeClient, status_line: "_StatusLine") -> None:
         self._terminal = terminal
         self._client = client
-        self._teller = status_line
+        self._status_line = status_line
         self._running: Running | None = None
         self._failure: UnreachableError | None = None
 
@@ -249,9 +249,9 @@ class _Resuming:
     def _ask(self) -> None:
         try:
             self._client.request(RequestedCommand.RESUME)
-            self._teller.note = ""
+            self._status_line.note = ""
         except RefusedError as error:
-            self._teller.note = str(error)
+            self._status_line.note = str(error)
         except UnreachableError as error:
             self._failure = error
 

@@ -19,7 +19,7 @@ def execute(robot: RosRobot, line: str) -> str:
         line: A command; an empty one does nothing.
 
     Returns:
-        What there is to tell; else nothing.
+        The answer to print; empty if there is none.
 
     Raises:
         UnknownCommandError: It is not known, or not with such values.

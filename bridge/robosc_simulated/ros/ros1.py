@@ -116,7 +116,7 @@ class RospySide:
             except BlockingIOError:
                 written = 0
             except BrokenPipeError:
-                # `receive` tells that it has ended.
+                # The end of the process is reported by `receive`.
                 self._waiting.clear()
                 self._waiting_size = 0
                 return
@@ -181,7 +181,7 @@ class Ros1Node:
         pacer: Pacer that brings the world up to now before a velocity acts.
         side: Process that speaks ROS.
         is_stamped: True if velocities come as `TwistStamped`.
-        is_sim_time: True if the other nodes are told to live by `/clock`.
+        is_sim_time: True if the parameter `use_sim_time` is set, so that the other nodes take their time from `/clock`.
         should_end: Function that returns True to wait no longer for a master.
 
     Raises:

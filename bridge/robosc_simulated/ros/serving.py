@@ -110,7 +110,7 @@ class Pacer:
 
 
 MakeNode = Callable[[RosRobot, Pacer, threading.Event], AbstractContextManager[RosNode]]
-"""Opens the node of a robot; the event tells that it is to end."""
+"""Opens the node of a robot; the node ends when the event is set."""
 
 
 def serve(options: argparse.Namespace, make_face: MakeNode) -> int:

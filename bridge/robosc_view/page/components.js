@@ -156,7 +156,7 @@ export function startComponents() {
         card.paint(under(components, name), places);
         if (isLastForgotten) card.graph?.setLast();
         if (taken.has(name)) card.graph?.take(taken.get(name));
-        // A recorded run may be anywhere after a jump, with entries that are not told.
+        // After a jump, a recorded run may be anywhere, and the entries in between were not sent.
         if (last !== null) card.graph?.setLast(under(last, name));
       }
       taken = new Map();

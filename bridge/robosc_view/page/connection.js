@@ -9,9 +9,9 @@ const LOOK_EVERY_MS = 250;
 export class Connection {
   /**
    * @param {string} address Of the stream.
-   * @param {string} places Address that tells whether there is a place for a stream.
-   * @param {{onMessage: (message: object) => void, onChange: () => void, onLook: () => void}} handlers Told of each
-   *   message, of each change of `isOpen`, and several times a second.
+   * @param {string} places Address that answers whether there is a place for a stream.
+   * @param {{onMessage: (message: object) => void, onChange: () => void, onLook: () => void}} handlers Called for each
+   *   message, for each change of `isOpen`, and several times a second.
    */
   constructor(address, places, handlers) {
     this.address = address;
@@ -70,7 +70,7 @@ export class Connection {
     this.waitMs = Math.min(this.waitMs * 2, LONGEST_WAIT_MS);
   }
 
-  /** Asks whether the server is full: a browser does not tell why a stream did not open. */
+  /** Asks whether the server is full: a browser does not report why a stream did not open. */
   async askPlaces() {
     try {
       this.isFull = (await fetch(this.places)).status === 503 && !this.isOpen;

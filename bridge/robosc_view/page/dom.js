@@ -1,4 +1,4 @@
-// Small helpers around the document. Whatever a robot tells is put in as text, never as markup.
+// Small helpers around the document. Data of a robot is put in as text, never as markup.
 
 const SVG = "http://www.w3.org/2000/svg";
 
@@ -25,18 +25,18 @@ function filled(element, attributes, children) {
 
 /** Sets a text; a document that says so already is left alone. */
 export function say(element, text) {
-  const told = String(text);
-  if (element.textContent === told) return;
+  const wanted = String(text);
+  if (element.textContent === wanted) return;
   const { firstChild } = element;
   // To change the text that is there is cheaper than to put another in its place.
-  if (firstChild?.nodeType === Node.TEXT_NODE && firstChild === element.lastChild) firstChild.data = told;
-  else element.textContent = told;
+  if (firstChild?.nodeType === Node.TEXT_NODE && firstChild === element.lastChild) firstChild.data = wanted;
+  else element.textContent = wanted;
 }
 
 /** Sets an attribute; a document that says so already is left alone. */
 export function mark(element, name, value) {
-  const told = String(value);
-  if (element.getAttribute(name) !== told) element.setAttribute(name, told);
+  const wanted = String(value);
+  if (element.getAttribute(name) !== wanted) element.setAttribute(name, wanted);
 }
 
 /** Shows or hides an element. */

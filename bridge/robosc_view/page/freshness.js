@@ -16,7 +16,7 @@ const SENTENCES = {
   lost: () => "Connection lost: nothing shown here is live.",
   full: () => "The server is full: close other pages, or open the address with the token, which has places of its own.",
   silent: () => "The server is silent: nothing shown here is live.",
-  gone: () => `The source is lost: ${received.gone ?? "no reason was told"}`,
+  gone: () => `The source is lost: ${received.gone ?? "no reason was given"}`,
   old: () => "The bridge's loop hangs: nothing shown here is live.",
 };
 const WORDS = { connecting: "connecting", lost: "no connection", full: "full", silent: "silent", gone: "source lost", old: "hangs", waiting: "waiting" };

@@ -73,7 +73,7 @@ const receive = {
   },
   run(message) {
     received.run = message;
-    play.told(message);
+    play.reported(message);
     stream.backTo((entry) => entry.number > message.entries);
     touch("run");
   },
@@ -82,7 +82,7 @@ const receive = {
   done: (message) => orders.answered(message),
   gone({ why }) {
     const now = String(why ?? "");
-    // It is told again and again, as a sign of life.
+    // The server sends this again and again, as a sign of life.
     if (now !== received.gone) stream.note(`The source is lost: ${now}`);
     received.gone = now;
     wasLost = true;

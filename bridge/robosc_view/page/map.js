@@ -105,7 +105,7 @@ export function startMap() {
     clearTimeout(wordsTimer);
     wordsTimer = null;
     if (poseOf() !== null) wordsMs = performance.now();
-    say(byId("map-told"), inWords());
+    say(byId("map-text"), inWords());
   };
 
   return {

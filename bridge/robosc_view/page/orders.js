@@ -25,7 +25,7 @@ export function startOrders(connection, token) {
   const answer = (kind, sentence) => {
     for (const place of ANSWERS.map(byId)) {
       mark(place, "data-kind", kind);
-      // A new element, so that the same sentence told twice is seen and read twice.
+      // A new element, so that a sentence that comes twice is shown and read twice.
       place.replaceChildren(make("span", {}, sentence));
     }
     announce("answer", sentence);

@@ -8,7 +8,7 @@ import { isAutomata, isModel, received, under } from "./received.js";
 /** The part of an address that holds a model: its language, where that is not RoboSC's, and the model. */
 const IN_LINK = /^#model(?:\.(\w+))?=(.*)$/;
 const FILTERED_FROM = 12;
-const LEADS = { __proto__: null, step: "", choose: "Which?", unknown: "Unknown:", trouble: "Trouble:", changed: "Saved:", wrong: "Not done:" };
+const LEADS = { __proto__: null, step: "", choose: "Which?", unknown: "Unknown:", finding: "Found:", changed: "Saved:", wrong: "Not done:" };
 
 /** One event: a button, a field for each part of its data, and why it cannot happen. */
 class PlayEvent {
@@ -43,8 +43,8 @@ class PlayEvent {
     say(this.why, (why ?? []).join("; "));
     show(this.why, why !== undefined);
     const ways = choice?.event === this.event ? choice.ways : [];
-    this.ways.replaceChildren(...ways.map((told, way) => {
-      const button = make("button", { type: "button", class: "plain" }, quoted(told));
+    this.ways.replaceChildren(...ways.map((label, way) => {
+      const button = make("button", { type: "button", class: "plain" }, quoted(label));
       button.addEventListener("click", () => {
         // This one goes, and the focus with it.
         this.button.focus();
@@ -116,17 +116,17 @@ function nested(parts) {
 export function startPlay(send, token) {
   let events = [];
   let walks = 0;
-  const tell = (kind, lines) => {
-    const place = byId("play-told");
+  const report = (kind, lines) => {
+    const place = byId("play-report");
     mark(place, "data-kind", kind);
     const lead = LEADS[kind] ? [make("strong", {}, LEADS[kind]), " "] : [];
-    // New elements, so that the same sentence told twice is seen and read twice.
+    // New elements, so that a sentence that is reported twice is shown and read twice.
     place.replaceChildren(...lines.map((line, i) => make("p", {}, ...(i === 0 ? lead : []), quoted(line))));
     if (lines.length > 0) announce("play", [LEADS[kind], ...lines].join(" "));
   };
   const want = (message) => {
     const isSent = send(message);
-    if (!isSent) tell("wrong", ["there is no connection"]);
+    if (!isSent) report("wrong", ["there is no connection"]);
     return isSent;
   };
 
@@ -141,24 +141,24 @@ export function startPlay(send, token) {
   };
   filter.addEventListener("input", narrow);
   for (const form of ["log", "test"]) byId(`play-${form}`).addEventListener("click", () => want({ type: "save", form }));
-  const walk = (untilTrouble) => {
+  const walk = (untilFinding) => {
     const seed = walks;
     walks += 1;
-    const steps = untilTrouble ? 1000 : Math.min(Math.max(Math.trunc(Number(byId("play-steps").value)) || 1, 1), 5000);
+    const steps = untilFinding ? 1000 : Math.min(Math.max(Math.trunc(Number(byId("play-steps").value)) || 1, 1), 5000);
     // Of a large system it takes its time.
-    if (want({ type: "walk", steps, seed, until_trouble: untilTrouble })) tell("step", ["chance goes on…"]);
+    if (want({ type: "walk", steps, seed, until_finding: untilFinding })) report("step", ["chance goes on…"]);
   };
   byId("play-walk").addEventListener("click", () => walk(false));
-  byId("play-trouble").addEventListener("click", () => walk(true));
+  byId("play-finding").addEventListener("click", () => walk(true));
   byId("play-link").addEventListener("click", async () => {
     const { language, link } = received.definition.play;
     const address = `${location.origin}/#model${isAutomata() ? `.${language}` : ""}=${link}`;
     history.replaceState(null, "", address);
     try {
       await navigator.clipboard.writeText(address);
-      tell("step", ["the link to this model is copied: it holds all of it"]);
+      report("step", ["the link to this model is copied: it holds all of it"]);
     } catch {
-      tell("step", ["the link to this model is in the address of this page: it holds all of it"]);
+      report("step", ["the link to this model is in the address of this page: it holds all of it"]);
     }
   });
   window.addEventListener("keydown", (event) => {
@@ -171,7 +171,7 @@ export function startPlay(send, token) {
   });
 
   let isLinkOpened = false;
-  /** Number of the state that the run has begun in, as it was told; what a person chooses meanwhile stays chosen. */
+  /** Number of the state that the run has begun in, as the server sent it; a person's later choice stays. */
   let begun = null;
   let isResumed = false;
   return {
@@ -199,7 +199,7 @@ export function startPlay(send, token) {
       say(byId("play-world-title"), isAutomata() ? "Uncontrollable events" : "The world may");
       show(filter, events.length > FILTERED_FROM);
       narrow();
-      beginning.replaceChildren(...play.beginnings.map((told) => make("option", {}, told)));
+      beginning.replaceChildren(...play.beginnings.map((label) => make("option", {}, label)));
       show(beginning, play.beginnings.length > 0);
       begun = null;
       for (const form of ["log", "test"]) show(byId(`play-${form}`), play.forms.includes(form));
@@ -234,14 +234,14 @@ export function startPlay(send, token) {
     disconnected() {
       isResumed = false;
     },
-    /** What was just done. */
-    told: ({ kind, lines }) => kind !== "" && tell(kind, lines),
-    refused: ({ what, why }) => tell("wrong", [`${what}: ${why}`]),
+    /** Report of what was just done. */
+    reported: ({ kind, lines }) => kind !== "" && report(kind, lines),
+    refused: ({ what, why }) => report("wrong", [`${what}: ${why}`]),
     saved({ name, text }) {
       const link = make("a", { href: URL.createObjectURL(new Blob([text], { type: "text/plain" })), download: name });
       link.click();
       setTimeout(() => URL.revokeObjectURL(link.href), 1000);
-      tell("step", [`${name} was saved${name.endsWith(".py") ? ": it belongs into the folder of the model" : ""}`]);
+      report("step", [`${name} was saved${name.endsWith(".py") ? ": it belongs into the folder of the model" : ""}`]);
     },
   };
 }

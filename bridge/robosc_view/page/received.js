@@ -1,6 +1,6 @@
 // Data that the server has sent last. Parts of the page read it; main.js alone writes it.
 
-/** Data that the server has sent last; whatever is not there is as if nothing was told about it. */
+/** Data that the server has sent last; null: nothing was sent. */
 export const received = {
   /** The `definition`; null: not yet. */
   definition: null,
@@ -18,12 +18,12 @@ export const received = {
   gone: null,
 };
 
-/** Forgets what was told about the robot, for a new definition. */
+/** Forgets the data about the robot, for a new definition. */
 export function forget() {
   Object.assign(received, { update: null, updateMs: 0, scan: null, position: null, run: null, gone: null });
 }
 
-/** Value that an object that was told has under a name; undefined: nothing, whatever objects have by themselves. */
+/** Value that a received object has under a name; undefined: none, even if every object inherits one of that name. */
 export const under = (object, name) => (Object.hasOwn(object, name) ? object[name] : undefined);
 
 /** Returns true if a recorded run is shown. */

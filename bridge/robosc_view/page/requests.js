@@ -5,8 +5,8 @@ import { received } from "./received.js";
 
 const NO_REASON = new Map([
   [true, "Nothing holds it back."],
-  [false, "No reason was told."],
-  [null, "Whether it is enabled was not told."],
+  [false, "No reason was given."],
+  [null, "It is not known whether it is enabled."],
 ]);
 
 class Request {

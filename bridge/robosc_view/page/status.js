@@ -37,12 +37,12 @@ export function paintStatus() {
     return;
   }
   const causes = causesOf(update);
-  // Of a model alone there is nothing to tell but what is wrong with its file.
+  // A model alone has no status, except for what is wrong with its file.
   show(byId("status"), !isModel() || causes.length > 0);
   const key = JSON.stringify(causes);
   if (key !== lastCauses) {
     byId("causes").replaceChildren(...causes.map(causeLine));
-    announce("causes", causes.map(({ lead, told: said }) => `${lead} ${said}`).join(" "));
+    announce("causes", causes.map(({ lead, text }) => `${lead} ${text}`).join(" "));
   }
   if (lastState !== null && state !== lastState) announce("state", `State: ${state}.`);
   lastState = state;
@@ -62,7 +62,7 @@ const TIMES = {
 
 let lastTimes = "";
 
-/** What the bridge measures of itself; other sources tell nothing of that. */
+/** Times that the bridge measures of itself; other sources send none. */
 function paintTimes(latencies) {
   const key = JSON.stringify(latencies);
   if (key === lastTimes) return;
@@ -75,30 +75,30 @@ function paintTimes(latencies) {
   );
 }
 
-/** A bridge tells all that keeps its robot from moving; of another source nothing is known of that. */
+/** A bridge reports every cause that keeps its robot from moving; other sources report none. */
 const NO_CAUSE = {
-  bridge: { kind: "fine", lead: "", told: "Nothing keeps the robot from moving." },
-  other: { kind: "unknown", lead: "", told: "Whether anything keeps the robot from moving is not told here." },
+  bridge: { kind: "fine", lead: "", text: "Nothing keeps the robot from moving." },
+  other: { kind: "unknown", lead: "", text: "This source does not report what keeps the robot from moving." },
 };
 
 function causesOf(update) {
   const causes = [];
-  if (update.problem) causes.push({ kind: "fault", lead: "Fault:", told: update.problem });
+  if (update.problem) causes.push({ kind: "fault", lead: "Fault:", text: update.problem });
   for (const reason of update.reasons ?? []) {
     const until = reason.holds_until_reset ? " (until reset)" : "";
-    causes.push({ kind: "reason", lead: "Nothing moves:", told: reason.text + until });
+    causes.push({ kind: "reason", lead: "Nothing moves:", text: reason.text + until });
   }
-  for (const stop of update.stops ?? []) causes.push({ kind: "stop", lead: "Nothing is requested:", told: stop });
+  for (const stop of update.stops ?? []) causes.push({ kind: "stop", lead: "Nothing is requested:", text: stop });
   if (causes.length === 0 && !isReplay() && !isModel()) causes.push(NO_CAUSE[received.definition?.source === "bridge" ? "bridge" : "other"]);
-  for (const warning of update.warnings ?? []) causes.push({ kind: "warning", lead: "Warning:", told: warning.text ?? warning });
+  for (const warning of update.warnings ?? []) causes.push({ kind: "warning", lead: "Warning:", text: warning.text ?? warning });
   return causes;
 }
 
 const SIGNS = { fault: "✕", reason: "■", stop: "■", warning: "▲", fine: "✓", unknown: "?" };
 
-function causeLine({ kind, lead, told: said }) {
+function causeLine({ kind, lead, text }) {
   const sign = make("span", { class: "sign", "aria-hidden": "true" }, SIGNS[kind]);
-  return make("li", { class: `cause is-${kind}` }, sign, make("span", {}, make("strong", {}, lead), lead && " ", quoted(said)));
+  return make("li", { class: `cause is-${kind}` }, sign, make("span", {}, make("strong", {}, lead), lead && " ", quoted(text)));
 }
 
 let lastDevices = "";

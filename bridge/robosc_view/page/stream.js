@@ -138,8 +138,8 @@ export function startStream() {
   });
   byId("stream-save").addEventListener("click", () => save(entries.all));
 
-  // Jump in a recorded run: where it is turned back, what comes again takes the place of what was there; where it is
-  // turned on, the stream begins anew with what the server tells of the time before.
+  // Jump in a recorded run: after a jump back, entries that come again replace those that were there; after a jump
+  // ahead, the stream begins anew with the entries that the server sends of the time before.
   const jumpTo = (first) => {
     if (first.number <= entries.highest) entries.takeBack((entry) => entry.number >= first.number);
     if (isModel()) return;

@@ -1,4 +1,4 @@
-"""Automata (CIF, libFAUDES, Supremica) in the commands that take them, with a server that does the work."""
+"""Commands for automata (CIF, libFAUDES, Supremica) that a server carries out."""
 
 import argparse
 from collections.abc import Collection
@@ -27,12 +27,12 @@ if TYPE_CHECKING:
 
 
 class Server:
-    """Machine of `robosc.cli.machine` that is a server, whose answers are not believed.
+    """Server as a machine of `robosc.cli.machine`; its answers are not trusted.
 
     Args:
         client: Connection to the server.
-        deadline_s: Time for each call, in seconds; None: any.
-        keys: Keys of which one must have signed a supervisor; none: it need not be signed.
+        deadline_s: Time limit for each call, in seconds; None: no limit.
+        keys: Keys of which one must have signed a supervisor; empty: it need not be signed.
     """
 
     def __init__(self, client: Client, deadline_s: float | None, keys: "Collection[PublicKey]" = ()) -> None:
@@ -151,10 +151,10 @@ def task_of(arguments: argparse.Namespace, package: str | None) -> Task:
 
     Args:
         arguments: Arguments of the command.
-        package: Name of what is generated; None: one made from the model's name.
+        package: Name of the generated package; None: a name made from the model's name.
 
     Raises:
-        UsageError: An argument means nothing for automata, or the model cannot be read.
+        UsageError: An argument has no effect for automata, or the model cannot be read.
     """
     from robosc.targets import GenerateOptions
 

@@ -23,8 +23,8 @@ def exit_statuses(done: str, failed: str | None = None, service: str | None = SE
 
     Args:
         done: Meaning of 0.
-        failed: Meaning of 1; None: it does not happen.
-        service: Meaning of 3; None: no server is asked.
+        failed: Meaning of 1; None: the command never ends with 1.
+        service: Meaning of 3; None: the command calls no server.
     """
     meanings = {0: done, 1: failed, 2: "wrong options", 3: service, 130: "Ctrl-C"}
     return "exit status:\n" + "".join(f"  {status}  {what}\n" for status, what in meanings.items() if what is not None)
@@ -53,11 +53,11 @@ _FIELDS = ("ca", "certificate", "key", "token_file")
 def add_connection_arguments(
     parser: argparse.ArgumentParser, *, deadline_s: float | None = None, epilog: str = MODEL_EPILOG
 ) -> None:
-    """Add the arguments for the server that is asked, and for the waiting time.
+    """Add the arguments for the server and for the time limit.
 
     Args:
         parser: Parser of the command.
-        deadline_s: Seconds, unless the arguments say otherwise; None: as long as it takes.
+        deadline_s: Default of the time limit, in seconds; None: no limit.
         epilog: Meanings of its exit statuses.
     """
     parser.epilog, parser.formatter_class = epilog, argparse.RawDescriptionHelpFormatter
@@ -83,17 +83,17 @@ def add_connection_arguments(
 
 
 def connect(arguments: argparse.Namespace) -> Client:
-    """A client of the server that the arguments name.
+    """Return a client of the server that the arguments name.
 
     Raises:
-        UsageError: They name none.
+        UsageError: The arguments name no server.
         CredentialsError: A certificate, key or token cannot be used.
     """
     return Client(*target_of(arguments))
 
 
 def target_of(arguments: argparse.Namespace) -> tuple[str, Credentials]:
-    """Address and credentials; raises UsageError as `connect`."""
+    """Return the address and credentials; raises UsageError as `connect`."""
     profile, defaults = _profile(arguments), arguments.from_environment
     if profile is not None:
         defaults = {name: getattr(profile, name) for name in _FIELDS}
@@ -116,7 +116,7 @@ def _profile(arguments: argparse.Namespace) -> Profile | None:
 
 
 def address(text: str) -> str:
-    """HOST:PORT of HOST or HOST:PORT, for a parser."""
+    """Return HOST:PORT from HOST or HOST:PORT, for a parser."""
     try:
         return with_port(text, SYNTHESIS_PORT)
     except ValueError as error:
@@ -124,7 +124,7 @@ def address(text: str) -> str:
 
 
 def seconds(text: str) -> float:
-    """A positive number of seconds, for a parser."""
+    """Return a positive number of seconds, for a parser."""
     try:
         number = float(text)
     except ValueError:
@@ -135,7 +135,7 @@ def seconds(text: str) -> float:
 
 
 def number_up_to(most: int) -> Callable[[str], int]:
-    """Reads a number from 1 to another one, for a parser."""
+    """Return a function that reads a number from 1 to a limit, for a parser."""
 
     def read(text: str) -> int:
         try:
@@ -153,7 +153,7 @@ def checked_number(number: int | None, option: str) -> int | None:
     """Return a number of an option, if a request can contain it.
 
     Raises:
-        UsageError: It cannot.
+        UsageError: The number is out of range.
     """
     if number is not None and number > _MAXIMUM_SENDABLE:
         raise UsageError(f"{option} must be at most {_MAXIMUM_SENDABLE}")

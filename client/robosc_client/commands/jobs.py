@@ -511,7 +511,7 @@ def _line(job: Job) -> str:
 
 
 def job_json(job: Job) -> dict[str, Any]:
-    """A job as JSON values; times in ISO 8601."""
+    """Return a job as JSON values; times in ISO 8601."""
 
     def time(moment: datetime | None) -> str | None:
         return None if moment is None else moment.isoformat()
@@ -537,7 +537,7 @@ def job_json(job: Job) -> dict[str, Any]:
 
 
 def result_json(found: TaskResult) -> dict[str, Any]:
-    """Return the result of a job, as JSON values; anything that is no text is left to -o."""
+    """Return the result of a job as JSON values; content that is no text is only written by -o."""
     import msgspec
 
     from robosc.explanation import document

@@ -37,7 +37,7 @@ def require_signature(keys: "Collection[PublicKey]", supervisor: bytes, signatur
     """Do nothing if one of the keys has signed a supervisor file.
 
     Raises:
-        CommandError: None has.
+        CommandError: None of the keys has signed it.
     """
     from robosc.signatures import SignatureError, signer
 

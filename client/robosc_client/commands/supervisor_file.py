@@ -9,14 +9,14 @@ from robosc.signatures import signature_file
 def write_supervisor(output: Path, content: bytes, signature: bytes) -> None:
     """Write a supervisor's file, and then what belongs beside it.
 
-    A signature that is there stays beside the same bytes, which it still vouches for, as where `robosc sign` has made
-    it; beside others it is replaced or removed. Until the file is written it is not touched: whatever goes wrong,
-    what is left is the file that was there with its signature, or the new one with a signature that does not fit it.
+    If the bytes of the file do not change, an existing signature stays, such as one of `robosc sign`; otherwise it is
+    replaced or removed, after the file was written. So an error leaves the previous file with its signature, or the new
+    file with a signature that does not verify.
 
     Args:
-        output: The supervisor's file; one that is no plain file (a device, a pipe) has nothing beside it.
-        content: Its bytes.
-        signature: Signature of the server; empty: it has not signed.
+        output: Path of the supervisor's file; a device or a pipe gets no signature file beside it.
+        content: Bytes of the file.
+        signature: Signature of the server; empty: the server has not signed.
 
     Raises:
         UsageError: A file cannot be written or removed.

@@ -140,7 +140,7 @@ def synthesis_options(arguments: argparse.Namespace) -> SynthesisOptions:
 
 
 def property_texts(arguments: argparse.Namespace) -> tuple[list[SourceFile], list[SourceFile]]:
-    """The properties that the arguments name: texts with one each, and files.
+    """Return the properties that the arguments name: texts with one property each, and files.
 
     Raises:
         UsageError: A file cannot be read.
@@ -279,7 +279,7 @@ def run_verify(
     """Run `robosc.cli.verify.run_with` for a command of this program.
 
     Raises:
-        UsageError: As there; it names this command.
+        UsageError: As in `run_with`; the message names this command.
     """
     try:
         return verify_here.run_with(arguments, verify_supervisor, verify_properties)
@@ -318,7 +318,7 @@ def _verify_properties(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def are_understood(arguments: argparse.Namespace, bundle: Bundle) -> bool:
-    """Return True if the properties can be understood; errors of one are reported before the server is asked."""
+    """Return True if the properties have no errors; errors are reported before the server is called."""
     from robosc.model.check import check
 
     model = check(bundle).model
@@ -385,7 +385,7 @@ def _format(arguments: argparse.Namespace, client: Client) -> int:
 
 
 def formatter(arguments: argparse.Namespace, client: Client) -> Callable[[str, str], str]:
-    """Formats a text of a name on the server; raises LanguageError for syntax errors."""
+    """Return a function that formats a named text on the server; it raises LanguageError for syntax errors."""
 
     def format_text(text: str, name: str) -> str:
         found = client.format(SourceFile(name, text), deadline_s=arguments.deadline)

@@ -1,4 +1,4 @@
-"""The command `top`, which shows what a service does now, again and again."""
+"""The command `top`, which shows the present load of a service, again and again."""
 
 import argparse
 import json

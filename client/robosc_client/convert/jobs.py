@@ -34,10 +34,10 @@ _STATES = {
 
 
 def job_of(message: pb.Job) -> Job:
-    """A job; its texts are harmless on a terminal.
+    """Return a job; its texts are harmless on a terminal.
 
     Raises:
-        ServiceError: The message is of no job.
+        ServiceError: The message is no valid job.
     """
     if not _ID.match(message.id):
         raise malformed("the id of a job is invalid")
@@ -74,12 +74,12 @@ def submission_of(message: pb.SubmitJobResponse) -> Submission:
 
 
 def job_in(message: pb.GetJobResponse | pb.CancelJobResponse | pb.WatchJobResponse) -> Job:
-    """The job in an answer; raises as `job_of`."""
+    """Return the job in an answer; raises as `job_of`."""
     return job_of(message.job)
 
 
 def page_of(message: pb.ListJobsResponse, most: int) -> tuple[tuple[Job, ...], str]:
-    """Jobs, at most so many, and what asks for those that follow; raises as `job_of`."""
+    """Return jobs, at most a given number, and the token of the next page; raises as `job_of`."""
     require_at_most(most, len(message.jobs), "jobs")
     return tuple(map(job_of, message.jobs)), message.next_page_token
 
@@ -88,7 +88,7 @@ def load_of(message: pb.GetLoadResponse) -> ServiceLoad:
     """Return the load of the service; its texts are harmless on a terminal.
 
     Raises:
-        ServiceError: The message is of no load.
+        ServiceError: The message is no valid load.
     """
     if not message.HasField("time") or not message.servers:
         raise malformed("the load of the service has no time or no server")

@@ -52,10 +52,10 @@ _KINDS = {
 
 
 def request_of(task: Task) -> Request:
-    """The request message of a task.
+    """Return the request message of a task.
 
     Raises:
-        RequestRefusedError: A name or text, or a number, cannot be sent.
+        RequestRefusedError: A name, text or number cannot be sent.
     """
     try:
         return _request(task)

@@ -60,14 +60,14 @@ def require_at_most(most: int, count: int, what: str) -> None:
     """Do nothing if a number of items is within its limit; checked before the items are converted.
 
     Raises:
-        ServiceError: There are.
+        ServiceError: There are too many.
     """
     if count > most:
         raise malformed(f"it has more than {most} {what}")
 
 
 def diagnostics_of(messages: Sequence[pb.Diagnostic], bundle: Bundle | None = None) -> Findings:
-    """Findings as the core's values.
+    """Return findings as the core's values.
 
     Args:
         messages: The findings.
@@ -105,7 +105,7 @@ def verification_status_of(number: pb.VerificationStatus) -> VerificationStatus:
 
 
 def explanation_status_of(number: pb.ExplanationStatus) -> SynthesisStatus | None:
-    """Return the status with which a synthesis ended that was to be explained; None: what is asked about is not there.
+    """Return the status of a synthesis that was to be explained; None: a part named in the request does not exist.
 
     Raises:
         ServiceError: The number is unknown.
@@ -142,10 +142,10 @@ def explanation_of(text: str) -> EmptyExplanation | None:
 
 
 def summary_of(message: pb.Summary) -> Summary:
-    """A supervisor in figures and words.
+    """Return the summary of a supervisor, in numbers and texts.
 
     Raises:
-        ServiceError: A count is no number, or there are too many events.
+        ServiceError: A count is invalid, or there are too many events.
     """
     require_at_most(MAXIMUM_ITEMS, len(message.added), "events")
     return Summary(
@@ -159,7 +159,7 @@ def summary_of(message: pb.Summary) -> Summary:
 
 
 def statistics_of(message: pb.Statistics) -> Statistics:
-    """Figures of a synthesis."""
+    """Return the statistics of a synthesis."""
     return Statistics(message.engine, message.state_bits, message.iterations, message.peak_nodes)
 
 

@@ -70,7 +70,7 @@ class ResponseReader[Result](Protocol):
         """
 
     def result(self) -> Result:
-        """The result, once the stream has ended.
+        """Return the result, once the stream has ended.
 
         Raises:
             ServiceError: The stream ended before the result was complete.
@@ -78,7 +78,7 @@ class ResponseReader[Result](Protocol):
 
 
 class UnaryReader[Message, Result]:
-    """ResponseReader of the answer of a method that answers with one message."""
+    """ResponseReader for methods that answer with one message."""
 
     def __init__(self, convert: Callable[[Message], Result]) -> None:
         self._convert = convert
@@ -343,7 +343,7 @@ class ExplanationReader(_StreamReader):
     """ResponseReader of the answer to Explain.
 
     Args:
-        bundle: Texts that were sent; None: they are not at hand.
+        bundle: Texts that were sent; None: they are not available.
     """
 
     _found: Explained | None
@@ -376,7 +376,7 @@ class ExplanationReader(_StreamReader):
         """Return the outcome of the explanation.
 
         Raises:
-            NotThereError: Something that is asked about is not there.
+            NotThereError: An event, a state or a run of the request does not exist.
         """
         self._require_result()
         if self._found is None:
@@ -388,7 +388,7 @@ def check_reader(bundle: Bundle | None = None) -> UnaryReader[pb.CheckResponse, 
     """Return the reader of the response to Check.
 
     Args:
-        bundle: Texts that were sent; None: they are not at hand.
+        bundle: Texts that were sent; None: they are not available.
     """
     return UnaryReader(lambda message: diagnostics_of(message.diagnostics, bundle))
 
@@ -397,7 +397,7 @@ def format_reader(before: str | None) -> UnaryReader[pb.FormatResponse, Formatte
     """Return the reader of the response to Format.
 
     Args:
-        before: Text that was given: only its layout may differ afterwards; None: it is not at hand.
+        before: Text that was sent, of which only the layout may differ in the answer; None: it is not available.
     """
 
     def convert(message: pb.FormatResponse) -> Formatted:
@@ -454,7 +454,7 @@ class JobResultReader:
 
 
 def reader_for(kind: TaskKind) -> ResponseReader[TaskResult]:
-    """A new reader for the responses of a kind of task."""
+    """Return a new reader for the responses of a kind of task."""
     match kind:
         case TaskKind.CHECK:
             return check_reader()

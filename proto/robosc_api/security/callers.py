@@ -18,7 +18,7 @@ ENTRY: ContextVar[Entry | None] = ContextVar("entry", default=None)
 
 
 def caller_of(context: Any) -> str:
-    """Return the name that tells a caller from others: its token's, else its certificate's, else its host.
+    """Return the name that distinguishes a caller: that of its token, else of its certificate, else of its host.
 
     Args:
         context: Context of the call under way.

@@ -55,7 +55,7 @@ class Guard(Layer):
         rules: Rules by full name of a method (`/package.Service/Method`); other methods need any token.
         tokens: Token file; None: no tokens are required.
         has_client_certificates: True if the service requires client certificates.
-        is_forwarded: True if a trusted proxy tells the name and scopes of callers.
+        is_forwarded: True if a trusted proxy sends the name and scopes of callers.
     """
 
     def __init__(

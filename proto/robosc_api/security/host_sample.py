@@ -10,7 +10,7 @@ PERIOD_S = 10.0
 """Time between two events of one host that are reported, in seconds."""
 
 _HOSTS = 1000
-"""Hosts that are told apart; further ones share one entry."""
+"""Hosts that have entries of their own; further ones share one entry."""
 
 _OTHERS = "other hosts"
 

@@ -29,7 +29,7 @@ class ServerSecurity:
         client_ca: Authorities (PEM) of client certificates; None: no client certificates are required.
         tokens: Token file; None: no tokens are required.
         insecure_beyond_loopback: True to allow connections from other machines without TLS.
-        forwarded_identity: True if a proxy in front of the service tells who calls.
+        forwarded_identity: True if a proxy in front of the service sends the identity of callers.
     """
 
     certificate: Path | None = None

@@ -99,7 +99,7 @@ class Entry:
 
     @property
     def id(self) -> str:
-        """First digits of its digest, which tell the tokens of one owner from each other."""
+        """First digits of its digest, which distinguish the tokens of one owner."""
         return self.digest[:ID_DIGITS]
 
     def is_valid(self, now_s: float) -> bool:
@@ -276,8 +276,8 @@ class TokenFile:
         self._clock, self._wall_clock = clock, wall_clock
         self._needed = needed
         # Digests of tokens whose expiry, near or past, is in the log already.
-        self._told_soon: set[str] = set()
-        self._told_expired: set[str] = set()
+        self._reported_soon: set[str] = set()
+        self._reported_expired: set[str] = set()
         self._is_scope_missing = False
         self._lock = threading.Lock()
         self._entries, self._stamp = _read(path)
@@ -294,9 +294,9 @@ class TokenFile:
         found = self._find(token)
         if found is None or found.expires_s is None or found.is_valid(self._wall_clock()):
             return None
-        if found.digest not in self._told_expired:
+        if found.digest not in self._reported_expired:
             # No more than the file has lines.
-            self._told_expired.add(found.digest)
+            self._reported_expired.add(found.digest)
             _log.warning(
                 "the token %s of '%s' has expired at %s and is still used: give its owner a new one, or revoke it",
                 found.id,
@@ -338,8 +338,8 @@ class TokenFile:
                         self._entries, self._stamp = _read(self._path)
                         _log.info("%s: reloaded", self._path)
                         known = {entry.digest for entry in self._entries}
-                        self._told_soon &= known
-                        self._told_expired &= known
+                        self._reported_soon &= known
+                        self._reported_expired &= known
                 except (OSError, SecurityError) as error:
                     _log.error("the changed token file is not used: %s", error)
                 self._warn()
@@ -349,9 +349,9 @@ class TokenFile:
         """Log a warning when a token expires soon, and when no token has the needed scope any more."""
         now_s = self._wall_clock()
         for entry in unreplaced(self._entries):
-            if entry.digest in self._told_soon or entry.is_valid(now_s + SOON_S) or entry.expires_s is None:
+            if entry.digest in self._reported_soon or entry.is_valid(now_s + SOON_S) or entry.expires_s is None:
                 continue
-            self._told_soon.add(entry.digest)
+            self._reported_soon.add(entry.digest)
             verb = "expires" if entry.is_valid(now_s) else "has expired"
             _log.warning(
                 "the token %s of '%s' %s at %s: rotate it", entry.id, entry.name, verb, time_text(entry.expires_s)

@@ -40,9 +40,9 @@ from robosc.targets.code.expressions import (
 from robosc.targets.code.naming import require_package_name
 from robosc.targets.code.statements import Block, codes
 from robosc.targets.code.templates import environment
-from robosc.targets.code.text import indent
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions, SupervisedSystem
+from robosc.targets.text import indent
 
 _API_NAMES = """
     t EVENT_COUNT H enabled event_name event_t happened_t init inputs_t is_controllable is_marked run set_inputs state_t

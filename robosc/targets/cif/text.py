@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 
-from robosc.targets.code.text import ascii_line
+from robosc.targets.text import ascii_line
 
 KEYWORDS = frozenset(
     """

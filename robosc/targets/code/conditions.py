@@ -13,7 +13,7 @@ from robosc.targets.acceptance import accepting_conditions, enabling_conditions
 from robosc.targets.code.expression_writer import ExpressionWriter
 from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code
 from robosc.targets.code.statements import Block, Return, when
-from robosc.targets.model_text import requirement_text
+from robosc.targets.text import requirement_text
 
 Condition = tuple[str, Code]
 """Words that explain a condition, and its code."""

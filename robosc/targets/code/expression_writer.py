@@ -36,11 +36,10 @@ from robosc.expressions import (
     children,
 )
 from robosc.expressions.bounds import call_bounds
-from robosc.model.received import Path
+from robosc.model.received import Path, path_type
 from robosc.model.structure import Model
 from robosc.targets.acceptance import Condition, InOneOf, StaysInRange
 from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, Kind, Sort, Unknown, bounds_of, operation
-from robosc.targets.paths import path_type
 
 _ARITHMETIC = frozenset({"+", "-", "*", "/"})
 COMPARISONS = ("=", "!=", "<", "<=", ">", ">=")

@@ -6,7 +6,7 @@ from robosc.model.structure import Provide, ProvidedValue
 from robosc.targets.code.expression_writer import ExpressionWriter
 from robosc.targets.code.expressions import TRUE_CODE
 from robosc.targets.code.statements import Block, Comment, Return, Statement, when
-from robosc.targets.model_text import provide_text
+from robosc.targets.text import provide_text
 
 
 def first_provided(

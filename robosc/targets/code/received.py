@@ -4,13 +4,12 @@ from abc import ABC, abstractmethod
 
 from robosc.expressions import EnumValue, Type
 from robosc.expressions.text import expression_text
-from robosc.model.received import Path
+from robosc.model.received import Path, path_type
 from robosc.model.structure import EnumDefinition, Model
 from robosc.targets.code.expression_writer import ExpressionWriter, may_compute
 from robosc.targets.code.expressions import TRUE_CODE, Code
 from robosc.targets.code.naming import Namer
 from robosc.targets.code.statements import Block, Comment, If, Return, Statement, when
-from robosc.targets.paths import path_type
 
 
 class ReceivedReader(ABC):

@@ -7,9 +7,8 @@ import jinja2
 
 from robosc._version import __version__
 from robosc.supervisor import Supervisor
-from robosc.targets.code.text import printable
-from robosc.targets.model_text import requirement_texts
 from robosc.targets.registry import PackageMetadata
+from robosc.targets.text import printable, requirement_texts
 
 
 def environment(*packages: str, filters: Mapping[str, Callable[..., object]]) -> jinja2.Environment:

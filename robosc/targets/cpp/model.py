@@ -23,9 +23,9 @@ from robosc.targets.code.c.layout import Layout, event_data
 from robosc.targets.code.c.provide import Field, request_field
 from robosc.targets.code.c.text import comment, string_literal
 from robosc.targets.code.c.unit import Unit
-from robosc.targets.code.text import indent
 from robosc.targets.cpp.naming import require_field_name
 from robosc.targets.ros.state_topic import state_topic
+from robosc.targets.text import indent
 
 _LITERAL = 100
 """Characters of one piece of a long literal."""

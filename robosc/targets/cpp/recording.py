@@ -33,8 +33,8 @@ from robosc.supervisor import Supervisor
 from robosc.targets.code.c.header import batch
 from robosc.targets.code.c.layout import Layout, event_data
 from robosc.targets.code.c.text import string_literal
-from robosc.targets.code.text import indent
 from robosc.targets.cpp.model import received_topics, take_name
+from robosc.targets.text import indent
 
 STEPS = 40
 PERIOD_S = 0.125

@@ -3,9 +3,9 @@
 from robosc.supervisor import Supervisor
 from robosc.targets.code.naming import package_name
 from robosc.targets.files import GeneratedFiles
-from robosc.targets.model_text import requirements_chapter
 from robosc.targets.promela.model import promela_model
 from robosc.targets.registry import GenerateOptions
+from robosc.targets.text import requirements_chapter
 
 _README = """\
 # {name} in Promela

@@ -11,7 +11,7 @@ from robosc.targets.code.naming import snake_case
 from robosc.targets.code.python.generate import header
 from robosc.targets.code.python.layout import make_layout
 from robosc.targets.code.templates import shared_values
-from robosc.targets.registry import GenerateOptions
+from robosc.targets.registry import GENERAL_ERRORS, GenerateOptions
 from robosc.targets.ros.runtime.parameters import Parameter
 from robosc.targets.ros.state_topic import state_topic
 from robosc.targets.ros.topics import Topic, sent_paths, shapes_of
@@ -24,6 +24,27 @@ EVENT_LOG_FOLDER = "event_log"
 _DIAGNOSTICS = Interface("DiagnosticArray", "diagnostic_msgs")
 _RELEASED_TYPES = frozenset({"Twist", "TwistStamped"})
 _TITLES = {Deployment.CONTROLLER: "Supervisory controller", Deployment.LAYER: "Supervision layer"}
+
+# Codes of the check's warnings and notes that are errors for packages of ROS: their nodes would not start.
+_ERRORS = GENERAL_ERRORS | {
+    "field-type-mismatch",
+    "invalid-identifier",
+    "no-header",
+    "unknown-field",
+    "unknown-ros-type",
+}
+
+ROS1_CPP_ERRORS = _ERRORS | {"ros2-only"}
+"""Codes for ROS 1 in C++."""
+
+ROS1_ERRORS = ROS1_CPP_ERRORS | {"cpp-only"}
+"""Codes for ROS 1 in Python."""
+
+ROS2_CPP_ERRORS = _ERRORS | {"ros1-only"}
+"""Codes for ROS 2 in C++."""
+
+ROS2_ERRORS = ROS2_CPP_ERRORS | {"cpp-only", "not-in-ros2-python"}
+"""Codes for ROS 2 in Python."""
 
 
 @contextmanager

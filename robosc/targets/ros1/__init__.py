@@ -3,8 +3,8 @@
 from functools import partial
 
 from robosc.targets.registry import Target, TargetInfo
-from robosc.targets.ros.errors import ROS1_ERRORS
 from robosc.targets.ros.middleware import generate_package
+from robosc.targets.ros.package import ROS1_ERRORS
 from robosc.targets.ros1.package import MIDDLEWARE
 
 TARGET = Target(

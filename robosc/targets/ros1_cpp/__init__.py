@@ -4,7 +4,7 @@ from functools import partial
 
 from robosc.targets.cpp.package import generate_package
 from robosc.targets.registry import Target, TargetInfo
-from robosc.targets.ros.errors import ROS1_CPP_ERRORS
+from robosc.targets.ros.package import ROS1_CPP_ERRORS
 from robosc.targets.ros1_cpp.package import MIDDLEWARE
 
 TARGET = Target(

@@ -3,8 +3,8 @@
 from functools import partial
 
 from robosc.targets.registry import Target, TargetInfo
-from robosc.targets.ros.errors import ROS2_ERRORS
 from robosc.targets.ros.middleware import generate_package
+from robosc.targets.ros.package import ROS2_ERRORS
 from robosc.targets.ros2.package import MIDDLEWARE
 
 TARGET = Target(

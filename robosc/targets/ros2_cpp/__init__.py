@@ -4,7 +4,7 @@ from functools import partial
 
 from robosc.targets.cpp.package import generate_package
 from robosc.targets.registry import Target, TargetInfo
-from robosc.targets.ros.errors import ROS2_CPP_ERRORS
+from robosc.targets.ros.package import ROS2_CPP_ERRORS
 from robosc.targets.ros2_cpp.package import MIDDLEWARE
 
 TARGET = Target(

@@ -10,12 +10,12 @@ from google.protobuf.message import DecodeError
 
 from robosc_api.v1 import jobs_pb2 as pb
 from robosc_api.v1 import jobs_pb2_grpc, synthesis_pb2
-from robosc_server.failures import RefusedError, code_of
 from robosc_server.jobs.manager import ServiceLoad
+from robosc_server.operations.failures import code_of
 from robosc_server.store import JobFilter, JobRecord, JobState
 from robosc_server.tasks.fields import nested_of
 from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestLimits, require_parsable, require_short
-from robosc_server.tasks.task import Reason, TaskKind
+from robosc_server.tasks.task import Reason, RefusedError, TaskKind
 
 JOB_SERVICE_NAME: str = pb.DESCRIPTOR.services_by_name["JobService"].full_name
 JOB_METHODS: tuple[str, ...] = tuple(method.name for method in pb.DESCRIPTOR.services_by_name["JobService"].methods)
@@ -43,15 +43,15 @@ _SUBMISSION = nested_of(pb.SubmitJobRequest)
 
 
 def malformed(message: str) -> RefusedError:
-    """A request that is wrong."""
+    """Return the error for a malformed request."""
     return RefusedError(Reason.MALFORMED_REQUEST, message)
 
 
 def submission(content: bytes, limits: RequestLimits) -> pb.SubmitJobRequest:
-    """A submission, parsed.
+    """Return a parsed submission.
 
     Raises:
-        RefusedError: It is none, or has too much.
+        RefusedError: The bytes are no submission, or exceed a limit.
     """
     require_short(content, limits.submission_bytes)
     require_parsable(content, _SUBMISSION, limits)
@@ -63,7 +63,7 @@ def submission(content: bytes, limits: RequestLimits) -> pb.SubmitJobRequest:
 
 
 def kind_and_request(task: pb.Task) -> tuple[TaskKind, bytes]:
-    """Return the kind of a task, and its request, serialized.
+    """Return the kind of a task, and its serialized request.
 
     Raises:
         RefusedError: There is no task.
@@ -75,10 +75,10 @@ def kind_and_request(task: pb.Task) -> tuple[TaskKind, bytes]:
 
 
 def checked_idempotency_key(text: str) -> str:
-    """An idempotency key.
+    """Return an idempotency key unchanged, if it is valid.
 
     Raises:
-        RefusedError: It is none.
+        RefusedError: The key is invalid.
     """
     if len(text) > MAXIMUM_IDEMPOTENCY_KEY or not all(" " <= character <= "~" for character in text):
         raise malformed(f"an idempotency key must have 1 to {MAXIMUM_IDEMPOTENCY_KEY} printable ASCII characters")
@@ -86,10 +86,10 @@ def checked_idempotency_key(text: str) -> str:
 
 
 def checked_label(text: str) -> str:
-    """A label.
+    """Return a label unchanged, if it is valid.
 
     Raises:
-        RefusedError: It is none.
+        RefusedError: The label is invalid.
     """
     if len(text) > MAXIMUM_LABEL or not text.isprintable():
         raise malformed(f"a label must have at most {MAXIMUM_LABEL} printable characters")
@@ -100,7 +100,7 @@ def retention_s_of(request: pb.SubmitJobRequest) -> float | None:
     """Return the requested retention time of a job in seconds; None: not given.
 
     Raises:
-        RefusedError: It is no time.
+        RefusedError: The value is no time.
     """
     if not request.HasField("retention"):
         return None
@@ -111,7 +111,7 @@ def retention_s_of(request: pb.SubmitJobRequest) -> float | None:
 
 
 def filter_of(request: pb.ListJobsRequest, caller: str) -> JobFilter:
-    """Return the filter for the jobs that are asked for.
+    """Return the filter of a request for a list of jobs.
 
     Raises:
         RefusedError: There are no such states or kinds.
@@ -125,7 +125,7 @@ def filter_of(request: pb.ListJobsRequest, caller: str) -> JobFilter:
 
 
 def page_size_of(request: pb.ListJobsRequest) -> int:
-    """Return the number of jobs that are asked for."""
+    """Return the requested number of jobs."""
     return min(request.page_size or _DEFAULT_PAGE, MAXIMUM_PAGE)
 
 
@@ -138,7 +138,7 @@ def page_position(token: str, chosen: JobFilter) -> tuple[int, str] | None:
     """Return the creation time and id of the last job of the previous page; None: first page.
 
     Raises:
-        RefusedError: The token is none, or one for other jobs.
+        RefusedError: The token is invalid, or belongs to another filter.
     """
     if not token:
         return None
@@ -159,7 +159,7 @@ def _digest(chosen: JobFilter) -> bytes:
 
 
 def job_of(record: JobRecord, waiting_before: int) -> pb.Job:
-    """A job as a message."""
+    """Return a job as a message."""
     job = pb.Job(
         id=record.id,
         owner=record.owner,
@@ -185,7 +185,7 @@ def job_of(record: JobRecord, waiting_before: int) -> pb.Job:
 
 
 def load_response(load: ServiceLoad) -> pb.GetLoadResponse:
-    """The load of the service as a message."""
+    """Return the load of the service as a message."""
     answer = pb.GetLoadResponse(
         time=_timestamp(load.now_us),
         workers=load.workers,
@@ -215,7 +215,7 @@ def _timestamp(time_us: int | None) -> timestamp_pb2.Timestamp | None:
 
 
 def result_response(kind: TaskKind, message: bytes) -> bytes:
-    """A GetJobResultResponse, serialized, around a message that is: nothing of it is parsed.
+    """Return a serialized GetJobResultResponse around a serialized message, which is not parsed.
 
     Its field is written as the encoding of Protocol Buffers has it: a tag of number and wire type, the length, the
     bytes (protobuf.dev: Encoding, "Length-Delimited Records").
@@ -233,5 +233,5 @@ def _varint(number: int) -> bytes:
 
 
 def serialized(message: Any) -> bytes:
-    """The bytes of a message, or bytes that are serialized already."""
+    """Return the bytes of a message, or bytes unchanged."""
     return message if isinstance(message, bytes) else message.SerializeToString()

@@ -16,7 +16,6 @@ from typing import Self
 
 from robosc_api.security.callers import network_of
 from robosc_server.clock import monotonic
-from robosc_server.failures import RefusedError
 from robosc_server.jobs.lease_monitor import LeaseMonitor
 from robosc_server.jobs.result_cache import ResultCache
 from robosc_server.jobs.retention import JobLimits, Retention
@@ -26,7 +25,7 @@ from robosc_server.jobs.watchers import Watchers
 from robosc_server.operations.tracing import NO_TRACING, Tracing
 from robosc_server.store import JobFilter, JobRecord, JobState, Store, StoreUnavailableError
 from robosc_server.store.records import OwnerLoad, messages_of
-from robosc_server.tasks.task import Reason, Task, TaskKind, TaskLimits, shared_key
+from robosc_server.tasks.task import Reason, RefusedError, Task, TaskKind, TaskLimits, shared_key
 
 _log = logging.getLogger(__name__)
 
@@ -44,7 +43,7 @@ class Caller:
     """Caller of the server.
 
     Attributes:
-        name: Name that tells callers apart.
+        name: Name that distinguishes callers.
         is_admin: True if the caller may see and cancel the jobs of all callers.
     """
 
@@ -67,7 +66,7 @@ class CallerLoad:
     running: int = 0
 
     def weight(self) -> tuple[int, int]:
-        """Return how much it has to do, then how much was done for it."""
+        """Return the order of callers by load: first by unfinished work, then by finished work."""
         return max(self.waiting + self.running, self.jobs.queued + self.jobs.running), self.jobs.ended
 
 
@@ -164,13 +163,13 @@ class JobManager:
             caller: Caller whose job it is.
             idempotency_key: Key by which a repeated submission returns the same job; empty: none.
             label: Owner's name for the job.
-            retention_s: Time that it is kept after its end, in seconds; None, or too long: as long as jobs are kept.
+            retention_s: Time that it is kept after its end, in seconds; None, or too long: the server's maximum.
 
         Returns:
             The job, and whether it was there before.
 
         Raises:
-            RefusedError: It is not accepted; after STORE_UNAVAILABLE its acceptance is uncertain.
+            RefusedError: The job is not accepted; after STORE_UNAVAILABLE its acceptance is uncertain.
         """
         if self._is_draining:
             raise RefusedError(Reason.SHUTTING_DOWN, _LEFT, retry_after_s=1.0)
@@ -206,7 +205,7 @@ class JobManager:
         """Do nothing if a new job of a caller would be accepted, as far as this server knows.
 
         Raises:
-            RefusedError: It would not.
+            RefusedError: It would not be accepted.
         """
         if self._is_draining:
             raise RefusedError(Reason.SHUTTING_DOWN, _LEFT, retry_after_s=1.0)
@@ -214,7 +213,7 @@ class JobManager:
         self._scheduler.require_room(caller.name)
 
     async def submitted(self, task: Task, caller: Caller, idempotency_key: str) -> JobRecord | None:
-        """The job that was submitted with a key, if there is one.
+        """Return the job that was submitted with a key, if there is one.
 
         Raises:
             RefusedError: The key was used for another task.
@@ -223,7 +222,7 @@ class JobManager:
         return None if there is None else self._runner.current(_same_task(there, task))
 
     async def get(self, job_id: str, caller: Caller) -> JobRecord:
-        """A job of the caller.
+        """Return a job of the caller.
 
         Raises:
             RefusedError: There is no such job of the caller, or the database is unavailable.
@@ -270,7 +269,7 @@ class JobManager:
                     raise _no_such_job()
 
     async def cancel(self, job_id: str, caller: Caller) -> JobRecord:
-        """End a job, wherever it is; one that has ended stays as it is.
+        """Cancel a job at any server; a job that has ended does not change.
 
         Raises:
             RefusedError: There is no such job of the caller, or the database is unavailable.
@@ -283,7 +282,7 @@ class JobManager:
         return ended
 
     async def list_jobs(self, chosen: JobFilter, after: tuple[int, str] | None, limit: int) -> list[JobRecord]:
-        """Jobs, the youngest first.
+        """Return jobs, newest first.
 
         Raises:
             RefusedError: The database is unavailable.
@@ -291,7 +290,7 @@ class JobManager:
         return [self._runner.current(record) for record in await self._store.list_jobs(chosen, after, limit)]
 
     async def load(self, caller: Caller, *, all_callers: bool) -> ServiceLoad:
-        """The load of the service.
+        """Return the load of the service.
 
         Args:
             caller: Caller whose load it is.
@@ -319,7 +318,7 @@ class JobManager:
         )
 
     async def result(self, job_id: str, caller: Caller) -> tuple[JobRecord, AsyncIterator[bytes]]:
-        """A job that has succeeded, and the messages of its result, read as they are taken.
+        """Return a job that has succeeded, and the messages of its result, which are read during the iteration.
 
         Raises:
             RefusedError: There is no such job or result, or the database is unavailable, also during the iteration.

@@ -70,7 +70,7 @@ class ResultCache:
                 await self._write_some()
 
     def in_memory(self, key: str) -> Result | None:
-        """A result that is in memory."""
+        """Return a result that is in memory."""
         found = self._memory.get(key)
         if found is not None:
             self._memory.move_to_end(key)
@@ -100,18 +100,18 @@ class ResultCache:
         return self.remember(key, *there)
 
     def unwritten(self, key: str) -> Result | None:
-        """A result, as it was made, that the database will have before long."""
+        """Return a result that waits to be written to the database, in the form in which it was made."""
         found = self._unwritten.get(key)
         return None if found is None else found[1]
 
     def keep(self, key: str, kind: TaskKind, result: Result, owner: str) -> Result:
-        """Keep a new result in memory, and before long in the database, unless too much waits to be written there.
+        """Keep a new result in memory, and soon in the database, unless too much waits to be written there.
 
         Args:
             key: Key of its task.
             kind: Kind of its task.
             result: Result as it was made.
-            owner: Caller who asked for it.
+            owner: Caller who requested it.
 
         Returns:
             The result as it is sent.
@@ -125,7 +125,7 @@ class ResultCache:
         return finished
 
     def remember(self, key: str, kind: TaskKind, result: Result) -> Result:
-        """Keep a result in memory alone.
+        """Keep a result in memory only.
 
         Returns:
             The result as it is sent.

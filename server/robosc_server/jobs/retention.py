@@ -6,9 +6,8 @@ import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 
-from robosc_server.failures import RefusedError
 from robosc_server.store import JobState, Store, StoreUnavailableError
-from robosc_server.tasks.task import Reason, Result
+from robosc_server.tasks.task import Reason, RefusedError, Result
 
 _log = logging.getLogger(__name__)
 
@@ -22,14 +21,14 @@ class JobLimits:
 
     Attributes:
         retention_s: Longest time that a job is kept after its end.
-        results_bytes: Bytes of kept results. Beyond it, results that no kept job refers to are deleted; where those
-            that jobs do refer to are as large, jobs that have ended are forgotten before their time, and new ones are
-            refused until then. Each time, those of the caller who has most are chosen.
-        jobs_per_owner: Kept jobs of one caller; beyond it, those that ended first are forgotten.
-        poll_s: Period, in seconds, at which a server that shares its database looks for what others have done there;
-            one that has a database of its own needs it only after that was away.
+        results_bytes: Maximum size of all stored results. Beyond it, results that no job refers to are deleted. If the
+            results of jobs alone reach it, jobs that have ended are deleted early, and new jobs are refused until then.
+            Each time, data of the caller with the most data is chosen.
+        jobs_per_owner: Maximum number of stored jobs of one caller; beyond it, those that ended first are deleted.
+        poll_s: Period, in seconds, at which a server that shares its database reads the changes of other servers; a
+            server with its own database needs it only after the database was unavailable.
         lease_s: Duration of a lease, in seconds, after which the other servers take a server for dead.
-        sweep_s: Period, in seconds, of the search for what need not be kept any more.
+        sweep_s: Period, in seconds, of the search for expired jobs and excess results.
     """
 
     retention_s: float = 7 * 86400.0
@@ -70,7 +69,7 @@ class Retention:
         """Do nothing if there is room for the result of one more job.
 
         Raises:
-            RefusedError: There is none.
+            RefusedError: There is no room.
         """
         if self._needed_bytes >= self._limits.results_bytes:
             # Sweep at once, so that a caller who fills the storage blocks others only for a moment.

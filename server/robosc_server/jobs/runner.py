@@ -8,16 +8,16 @@ from collections.abc import Collection, Coroutine, Iterable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from robosc_server.failures import RefusedError, fault_message, public_failure
 from robosc_server.jobs.result_cache import ResultCache
 from robosc_server.jobs.retention import Retention
 from robosc_server.jobs.scheduler import Place, Scheduler
 from robosc_server.jobs.watchers import Watchers
+from robosc_server.operations.failures import fault_message, public_failure
 from robosc_server.operations.logs import log_fault
 from robosc_server.operations.tracing import Tracing
 from robosc_server.store import JobRecord, JobState, Store, StoreUnavailableError
 from robosc_server.store.records import STEP
-from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskLimits
+from robosc_server.tasks.task import Failure, Outcome, Reason, RefusedError, Report, Result, Task, TaskLimits
 from robosc_server.workers import WorkerLostError, WorkersError
 
 _RETRY_S = 0.5
@@ -58,7 +58,7 @@ class ActiveJob:
 
     @property
     def runs(self) -> bool:
-        """True if a worker is busy with it."""
+        """True if a worker runs the job."""
         return self.record.state is JobState.RUNNING
 
 
@@ -67,7 +67,7 @@ class JobRunner:
 
     Args:
         store: The database.
-        scheduler: The queue before the workers.
+        scheduler: Queue in front of the workers.
         results: Cache of results.
         task_limits: Limits of one task.
         retention: Retention that is notified of new results.
@@ -105,20 +105,20 @@ class JobRunner:
 
     @property
     def ids(self) -> set[str]:
-        """The ids of all of them, as of now."""
+        """Return the present ids of all jobs."""
         return set(self._active)
 
     @property
     def all(self) -> list[ActiveJob]:
-        """All of them, as of now."""
+        """Return all present jobs."""
         return list(self._active.values())
 
     def get(self, job_id: str) -> ActiveJob | None:
-        """One of them."""
+        """Return one of the jobs."""
         return self._active.get(job_id)
 
     def current(self, record: JobRecord) -> JobRecord:
-        """A job with the newest progress that its worker has reported."""
+        """Return a job with the newest progress that its worker has reported."""
         job = self._active.get(record.id)
         return job.record if job is not None and job.record.revision > record.revision else record
 
@@ -142,7 +142,7 @@ class JobRunner:
             its owner has too many.
 
         Raises:
-            StoreUnavailableError: It is not known whether it is accepted.
+            StoreUnavailableError: It is unknown whether the job was accepted.
         """
         job = self._active[record.id] = ActiveJob(record, place)
         # Shielded: a caller that disconnects must not leave a half-accepted job.
@@ -191,7 +191,7 @@ class JobRunner:
             await asyncio.wait(running, timeout=seconds)
 
     async def stop_all(self) -> None:
-        """Stop everything."""
+        """Stop all jobs, and their tasks."""
         await self.stop(self.all)
         if self._tasks:
             await asyncio.wait(self._tasks)

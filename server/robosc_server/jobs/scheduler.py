@@ -15,8 +15,7 @@ from typing import Protocol
 
 from robosc_api.security.callers import network_of
 from robosc_server.clock import monotonic
-from robosc_server.failures import RefusedError
-from robosc_server.tasks.task import Failure, Outcome, Reason, Task, TaskLimits
+from robosc_server.tasks.task import Failure, Outcome, Reason, RefusedError, Task, TaskLimits
 from robosc_server.workers import OnReport, WorkerLostError, Workers, WorkersError
 
 _POLL_S = 1.0
@@ -35,8 +34,9 @@ class QueueLimits:
     Attributes:
         waiting: Waiting tasks of all callers.
         waiting_per_caller: Waiting tasks of one caller.
-        reserved: Tasks that may run beyond the capacity of the workers, one for each caller of whom none runs: a
-            caller who has all workers taken for a long time makes everybody a little slower, but makes nobody wait.
+        reserved: Tasks that may run beyond the capacity of the workers, one for each caller without a running task: a
+            caller whose tasks occupy all workers for a long time makes others a little slower, but does not make them
+            wait.
     """
 
     waiting: int = 1000
@@ -54,7 +54,7 @@ class Accounts(Protocol):
         """Do nothing if a task of a caller may start.
 
         Raises:
-            RefusedError: It may not yet.
+            RefusedError: The task may not start yet.
         """
 
     def charge(self, caller: str, cpu_s: float) -> None:
@@ -62,7 +62,7 @@ class Accounts(Protocol):
 
 
 class Place:
-    """A place in the queue, and later at a worker; given back with `Scheduler.leave`, whatever happens.
+    """Place in the queue, and later at a worker; it must be given back with `Scheduler.leave`, whatever happens.
 
     Args:
         caller: Caller whose place it is.
@@ -81,22 +81,22 @@ class Place:
 
     @property
     def has_worker(self) -> bool:
-        """True if a worker is free for it."""
+        """True if a worker is free for the task."""
         return self._begun_s is not None
 
     async def wait_for_worker(self) -> None:
-        """Wait until a worker is free for it."""
+        """Wait until a worker is free for the task."""
         await asyncio.shield(self._worker_is_free)
 
 
 class Scheduler:
-    """The queue before the workers.
+    """Queue in front of the workers.
 
     Args:
         workers: Workers that do the tasks.
         limits: Limits on the number of waiting tasks.
         clock: Seconds of a monotonic clock.
-        accounts: Accounts of single callers; None: all may take the same.
+        accounts: Accounts of single callers; None: all callers have the same limits.
     """
 
     def __init__(
@@ -124,7 +124,7 @@ class Scheduler:
 
     @property
     def running(self) -> int:
-        """Number of workers that are taken."""
+        """Number of workers that are occupied."""
         return self._running
 
     @property
@@ -156,12 +156,12 @@ class Scheduler:
             caller: Caller whose task it is.
             limits: Limits of the task.
             on_report: Callback that receives reports of the progress.
-            known: Function that is called when the task has its turn: returns the outcome, if there is one by now,
-                since an equal task was done.
+            known: Function that is called when the turn of the task comes; returns its outcome, if an equal task has
+                ended meanwhile.
 
         Raises:
-            RefusedError: There is too much to do, there are no workers, the server ends, or the caller has used up
-                what it may take while this waited.
+            RefusedError: The queue is full, there are no workers, the server shuts down, or the caller has used up its
+                quota while the task waited.
         """
         if self._workers.capacity < 1:
             raise _no_workers()
@@ -184,13 +184,13 @@ class Scheduler:
         """Do nothing if a task of a caller whose turn it is may start.
 
         Raises:
-            RefusedError: It may not yet.
+            RefusedError: The task may not start yet.
         """
         if self._accounts is not None:
             self._accounts.check(caller)
 
     async def work(self, place: Place, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
-        """The outcome of a task that has its turn; what it takes is noted for its caller, however it ends.
+        """Return the outcome of a task whose turn has come; its CPU time is charged to its caller, however it ends.
 
         Raises:
             WorkersError: See `Workers.run`.
@@ -202,19 +202,19 @@ class Scheduler:
             self._accounts.charge(caller, cpu_s)
 
     def enter(self, caller: str) -> Place:
-        """A place in the line, or at once at a worker.
+        """Return a place in the queue, or at a worker if one is free.
 
         Raises:
-            RefusedError: There is too much to do, or the server ends.
+            RefusedError: The queue is full, or the server shuts down.
         """
         self.require_room(caller)
         return self.enter_unbounded(caller)
 
     def require_room(self, caller: str) -> None:
-        """Do nothing if `enter` would give a place.
+        """Do nothing if `enter` would return a place.
 
         Raises:
-            RefusedError: It would not.
+            RefusedError: The queue is full, or the server shuts down.
         """
         if self._is_closed:
             raise RefusedError(
@@ -288,7 +288,7 @@ class Scheduler:
     def tasks_ahead(self, place: Place) -> int:
         """Return the number of tasks that would begin before a waiting one, if nothing else came.
 
-        It is 0 for one that does not wait.
+        It is 0 for a task that does not wait.
         """
         if self._order is None:
             self._order = self._current_order()

@@ -10,12 +10,11 @@ import grpc.aio
 
 from robosc_api import security
 from robosc_api.v1 import jobs_pb2 as pb
-from robosc_server.failures import RefusedError
 from robosc_server.jobs import convert
 from robosc_server.jobs.manager import Caller, JobManager
 from robosc_server.store import JobRecord
 from robosc_server.tasks.requests import RequestLimits
-from robosc_server.tasks.task import Reason, Task, TaskKind, own_key
+from robosc_server.tasks.task import Reason, RefusedError, Task, TaskKind, own_key
 
 _ID_CHARACTERS = 64
 _JOBS_AT_ONCE = 20
@@ -44,7 +43,7 @@ class JobService(convert.JobServiceServicer):
     """Service that submits, reports on and cancels jobs.
 
     Args:
-        manager: Manager that has the jobs.
+        manager: Manager of the jobs.
         accept: Function that checks a request and returns its task, or raises RefusedError.
         identify: Function that returns the caller.
         admit: Function that counts a requested job for a caller's name, or raises RefusedError.

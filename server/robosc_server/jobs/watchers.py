@@ -18,7 +18,7 @@ _FEW = 25
 """Number of watchers that get every report."""
 
 
-class Watch:
+class JobWatch:
     """One watcher of one job, which holds only the newest record.
 
     Attributes:
@@ -62,7 +62,7 @@ class _Audience:
     __slots__ = ("_held", "_next_s", "_state", "_timer", "watches")
 
     def __init__(self) -> None:
-        self.watches: set[Watch] = set()
+        self.watches: set[JobWatch] = set()
         self._state: JobState | None = None
         self._next_s = 0.0
         self._held: JobRecord | None = None
@@ -108,9 +108,9 @@ class Watchers:
         self._by_job: dict[str, _Audience] = {}
 
     @contextmanager
-    def watch(self, job_id: str) -> Iterator[Watch]:
+    def watch(self, job_id: str) -> Iterator[JobWatch]:
         """Watch a job; what changes from now on is not missed."""
-        watch = Watch()
+        watch = JobWatch()
         audience = self._by_job.get(job_id)
         if audience is None:
             audience = self._by_job[job_id] = _Audience()

@@ -37,13 +37,13 @@ exit status:
 
 
 def run_command(words: Sequence[str]) -> int | None:
-    """Do what a command line says that begins with a command.
+    """Run a command line that begins with a command.
 
     Args:
-        words: After the program's name.
+        words: Words after the program's name.
 
     Returns:
-        The exit status; None: it begins with no command, and so means to serve.
+        The exit status; None: the command line begins with no command, so the server is to serve.
     """
     commands: dict[str, Callable[[Sequence[str]], int]] = {
         "health": _health,
@@ -59,8 +59,8 @@ def run_command(words: Sequence[str]) -> int | None:
 
 
 def make_whole_parser() -> Parser:
-    """The parser of all command lines, which shells complete them by; each command has its own for itself."""
-    from robosc_server import health_check
+    """Return the parser of all command lines, for completion in shells; each command has a parser of its own, too."""
+    from robosc_server.operations import health_check
 
     parser = make_parser()
     commands = parser.add_subparsers(metavar="COMMAND")
@@ -71,7 +71,7 @@ def make_whole_parser() -> Parser:
 
 
 def _health(argv: Sequence[str]) -> int:
-    from robosc_server.health_check import main
+    from robosc_server.operations.health_check import main
 
     return main(argv)
 
@@ -83,7 +83,7 @@ def _token_parser() -> Parser:
 
 
 def new_token(argv: Sequence[str]) -> int:
-    """Print a new token, and to standard error the line for the file of tokens; the exit status."""
+    """Print a new token, and its line for the token file to standard error; returns the exit status."""
     arguments = _token_parser().parse_args(argv)
     try:
         token, line = issue_token(arguments)
@@ -113,7 +113,7 @@ def _tokens_parser() -> Parser:
 
 
 def keep_tokens(argv: Sequence[str]) -> int:
-    """List, add, rotate or revoke tokens of a file; the exit status."""
+    """List, add, rotate or revoke tokens of a file; returns the exit status."""
     return run_tokens(parse(_tokens_parser(), argv))
 
 
@@ -126,7 +126,7 @@ def _example_parser() -> Parser:
 
 
 def print_example(argv: Sequence[str]) -> int:
-    """Print a file with every setting; the exit status."""
+    """Print a file with every setting; returns the exit status."""
     _example_parser().parse_args(argv)
     sys.stdout.write(example_file())
     return 0
@@ -147,7 +147,7 @@ def _check_parser() -> Parser:
 
 
 def check_config(argv: Sequence[str]) -> int:
-    """Print whether a server could start with such settings; the exit status."""
+    """Print whether a server could start with such settings; returns the exit status."""
     # The database's library takes longer to import than other commands take in all.
     from robosc_server.operations.config_check import Grade, check_settings
 

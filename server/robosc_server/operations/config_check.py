@@ -1,4 +1,4 @@
-"""Check of whether a server could start with given settings: everything that can be known without starting it.
+"""Check whether a server could start with given settings: everything that can be checked without starting it.
 
 Nothing is made or changed. Anything that another process holds now, such as the server that runs with the same
 settings, is a warning.
@@ -45,7 +45,7 @@ from robosc_server.store.factory import DATABASE_FILE, is_in_use
 from robosc_server.store.inspection import inspect_postgresql, inspect_sqlite
 from robosc_server.store.migrate import latest_version
 from robosc_server.workers import WorkersError
-from robosc_server.workers.cluster_check import check_cluster
+from robosc_server.workers.factory import check_cluster
 
 _CONNECT_S = 5.0
 _TRY_S = 20.0
@@ -77,7 +77,7 @@ class Finding:
 
 
 def check_settings(settings: Settings) -> tuple[Finding, ...]:
-    """Return the findings about every part of the settings, in the order in which a server comes to them."""
+    """Return the findings about every part of the settings, in the order in which a server uses them."""
     parts: dict[str, Callable[[Settings], Iterator[tuple[Grade, str]]]] = {
         "listening": _listening,
         "certificates": _certificates,

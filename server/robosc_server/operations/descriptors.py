@@ -15,7 +15,7 @@ _FEWEST_CONNECTIONS = 16
 
 
 def raise_descriptor_limit() -> None:
-    """Raise the soft limit on descriptors of this process: select(2) is why it is low, and it is not used here."""
+    """Raise the soft limit on descriptors of this process: it is low because of select(2), which is not used here."""
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     wanted = highest_descriptor_limit()
     if soft != resource.RLIM_INFINITY and soft < wanted:

@@ -51,10 +51,10 @@ async def drain(
         server: A `grpc.aio.Server`.
         health: Its health.
         calls: Interceptor in front of its services.
-        seconds: Time that calls under way are given, in seconds.
+        seconds: Time for calls under way to end, in seconds.
         idle_methods: Methods whose calls are not waited for, since their callers can use another server at any time.
-        unread_bytes: Function that returns the bytes of large answers that were sent and are not read yet; they are
-            waited for like calls.
+        unread_bytes: Function that returns the bytes of large answers that were sent and are not read yet; the shutdown
+            waits for them as for calls.
     """
     log = structlog.get_logger()
     begun_s = monotonic()

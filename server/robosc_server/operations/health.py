@@ -1,7 +1,7 @@
 """gRPC health service: the health of a service follows from the conditions that it needs.
 
-It is not the servicer of grpcio-health-checking (1.85), which writes to watchers while it holds the lock of a status:
-one watcher that takes no bytes, and needs no token, would keep every change from everybody, even that of a shutdown.
+The servicer of grpcio-health-checking (1.85) is not used: it writes to watchers while it holds the lock of a status, so
+that a watcher that reads nothing, and needs no token, would keep every change from all others, even a shutdown.
 """
 
 import asyncio
@@ -23,11 +23,11 @@ _Response = health_pb2.HealthCheckResponse
 
 
 class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
-    """The health service. To be used on one event loop.
+    """Health service, for use on one event loop.
 
     Args:
-        services: By full name, the conditions that it needs; none holds before it is set. The name `""` stands for the
-            server as a whole, which is well if every service is.
+        services: Conditions that each service needs, by full name of the service; no condition holds before it is set.
+            The name `""` stands for the whole server, which is well if every service is.
     """
 
     def __init__(self, services: Mapping[str, tuple[str, ...]]) -> None:
@@ -50,14 +50,14 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
         return not self._is_draining and all(self._conditions[name] for name in needed)
 
     def set_condition(self, name: str, holds: bool) -> None:
-        """Note that a condition holds, or not; the log reports changes.
+        """Set whether a condition holds; changes are logged.
 
         Args:
             name: Condition that a service needs.
             holds: True if the condition holds.
 
         Raises:
-            KeyError: No service needs it.
+            KeyError: No service needs the condition.
         """
         if self._conditions[name] != holds:
             log = structlog.get_logger()

@@ -50,7 +50,7 @@ class InstrumentedWorkers:
     async def run(
         self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime = ignore_cpu_time
     ) -> Outcome:
-        """The outcome of a task, as `Workers.run`."""
+        """Run a task, as `Workers.run`."""
         outcome: Outcome | None = None
         begun_s = monotonic()
         self._running += 1

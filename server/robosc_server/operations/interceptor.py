@@ -16,11 +16,11 @@ from robosc_api.layers import Layer, behaviour_of, with_behaviour, writing
 from robosc_api.security import CALLER
 from robosc_api.security.host_sample import HostSample
 from robosc_server.clock import monotonic
-from robosc_server.failures import RefusedError, abort, code_of, fault_message
+from robosc_server.operations.failures import abort, code_of, fault_message
 from robosc_server.operations.logs import REQUEST_ID, REQUEST_ID_HEADER, log_fault, request_id_of
 from robosc_server.operations.metrics import MethodMetrics, Metrics
 from robosc_server.operations.tracing import NO_TRACING, Tracing
-from robosc_server.tasks.task import Reason
+from robosc_server.tasks.task import Reason, RefusedError
 
 _HEALTH = "/grpc.health."
 _REFUSED_RETRY_S = 1.0
@@ -67,7 +67,7 @@ class CallInterceptor(Layer):
         )
 
     def handler(self, inner: Any, details: Any) -> Any:
-        """The handler of a call, with everything around it."""
+        """Return the handler of a call inside this layer."""
         # The handler runs in the same task, and so sees what is set here.
         REQUEST_ID.set(request_id_of(details.invocation_metadata))
         if inner is None:
@@ -75,7 +75,7 @@ class CallInterceptor(Layer):
         return super().handler(inner, details)
 
     def wrap(self, inner: Any, method: str) -> Any:
-        """A handler with everything around it."""
+        """Return a handler inside this layer."""
         answer = behaviour_of(inner)
         if inner.response_streaming:
             answer = writing(answer)

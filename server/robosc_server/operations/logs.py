@@ -125,8 +125,8 @@ def log_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> str
     """Log an internal error and return its id, which is all that the caller gets.
 
     Args:
-        fault: It, or another process's report of it, such as a traceback. Its words are logged at the level debug
-            alone; see `worker_words`.
+        fault: The error, or another process's report of it, such as a traceback, whose text is logged only at the level
+            debug; see `worker_words`.
         reason: The reason that the caller receives, as in google.rpc.ErrorInfo.
     """
     identity = secrets.token_hex(4)

@@ -1,4 +1,4 @@
-"""Metrics of the server, for Prometheus: in a registry of its own, asked for over HTTP at /metrics."""
+"""Metrics of the server for Prometheus, in a registry of their own, over HTTP at /metrics."""
 
 import asyncio
 from bisect import bisect_left
@@ -36,7 +36,7 @@ _RESULT, _CANCELLED = "RESULT", "CANCELLED"
 """Outcomes of tasks, beside the reasons of failures."""
 
 _COLLECT_S = 4.0
-"""Time for the event loop to tell the metrics, in seconds: less than a connection has."""
+"""Time limit for the event loop to collect the metrics, in seconds: less than that of a connection."""
 
 
 class MethodMetrics:
@@ -64,7 +64,7 @@ class MethodMetrics:
 
         Args:
             code: Status code with which the call ended.
-            reason: Reason of its failure, as in google.rpc.ErrorInfo; empty: nothing is known.
+            reason: Reason of its failure, as in google.rpc.ErrorInfo; empty: unknown.
             seconds: Duration of the call, in seconds.
         """
         if code is grpc.StatusCode.OK:
@@ -86,7 +86,7 @@ class Metrics:
     """Metrics of the server.
 
     Args:
-        version: Of RoboSC.
+        version: Version of RoboSC.
     """
 
     def __init__(self, version: str) -> None:
@@ -137,14 +137,14 @@ class Metrics:
         registry.register(_LabelledCollector(self))
 
     def method(self, name: str) -> MethodMetrics:
-        """Return the metrics of one method; only for methods that exist, since each stays."""
+        """Return the metrics of one method, which must exist, since its metrics are never removed."""
         found = self._methods.get(name)
         if found is None:
             found = self._methods[name] = MethodMetrics(self._refusals)
         return found
 
     def unknown_method(self) -> None:
-        """Count a call of a method that there is not; its name is the caller's, and kept nowhere."""
+        """Count a call of a method that does not exist; its name comes from the caller and is not stored."""
         self._unknown += 1
 
     @property
@@ -171,7 +171,7 @@ class Metrics:
         self._task_seconds.labels(kind.value).observe(seconds)
 
     def cache_hit(self, where: str) -> None:
-        """Count a request whose result was there.
+        """Count a request whose result was cached.
 
         Args:
             where: `memory` or `store`.
@@ -179,7 +179,7 @@ class Metrics:
         self._lookups[where] += 1
 
     def cache_miss(self) -> None:
-        """Count a request whose result was not there."""
+        """Count a request whose result was not cached."""
         self._lookups["none"] += 1
 
     def set_sources(
@@ -210,7 +210,7 @@ class Metrics:
         self._expiries = expiries or self._expiries
 
     def labelled_metrics(self) -> Iterable[Metric]:
-        """Return the metrics whose values are asked for, and that have labels."""
+        """Return the metrics that have labels and values that are computed on request."""
         calls = CounterMetricFamily("robosc_server_calls", "Completed calls.", labels=("method", "code"))
         seconds = HistogramMetricFamily("robosc_server_call_seconds", "Duration of calls.", labels=("method",))
         for method, found in self._methods.items():
@@ -246,11 +246,11 @@ class Metrics:
         return calls, seconds, lookups, jobs, conditions, restarts, expiries
 
     def collector(self, loop: asyncio.AbstractEventLoop) -> Collector:
-        """Return a collector of all metrics for other threads; it asks for them on the event loop."""
+        """Return a collector of all metrics for other threads, which collects them on the event loop."""
         return _OnLoop(self._registry, loop)
 
     def text(self) -> bytes:
-        """All of it, in the text format of Prometheus."""
+        """All metrics, in the text format of Prometheus."""
         return generate_latest(self._registry)
 
 
@@ -265,7 +265,7 @@ class _LabelledCollector:
     def collect(self) -> Iterable[Metric]:
         return self._metrics.labelled_metrics()
 
-    # By the names that this tells, a scraper can ask for a part of the metrics.
+    # The names that this returns let a scraper ask for a part of the metrics.
     describe = collect
 
 
@@ -343,10 +343,10 @@ class MetricsEndpoint:
 
 
 def check_metrics_address(address: str, *, beyond_loopback: bool) -> None:
-    """Check what can be known before the endpoint listens.
+    """Check the address of the endpoint before it listens.
 
     Raises:
-        SecurityError: It may not listen there.
+        SecurityError: The endpoint may not listen there.
     """
     if not beyond_loopback and not is_loopback_host(split_address(address)[0]):
         raise SecurityError(

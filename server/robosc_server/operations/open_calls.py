@@ -8,8 +8,7 @@ from typing import Any
 from robosc_api.connection_watch import Arrivals
 from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.security import ENTRY, caller_of, is_loopback_peer, network_of
-from robosc_server.failures import RefusedError
-from robosc_server.tasks.task import Reason
+from robosc_server.tasks.task import Reason, RefusedError
 
 HEALTH_CALLS = 1000
 """Health checks that are open at once, from this machine and from elsewhere: they need no token, and so have slots of
@@ -44,7 +43,7 @@ class OpenCalls(Layer):
         limits: Limits, health checks aside.
         identify: Function that returns the caller behind the call of a context.
         health: Limits of health checks.
-        arrivals: Layer that is told of which connection each open call is; None: none.
+        arrivals: Layer to which the connection of each open call is reported; None: none.
     """
 
     def __init__(
@@ -98,14 +97,14 @@ class _CallSlots:
         self.taken = 0
 
     def take(self, caller: str, context: Any) -> None:
-        """Take one, until the call is over.
+        """Take a slot until the end of the call.
 
         Args:
             caller: Name of its caller.
             context: Context of the call.
 
         Raises:
-            RefusedError: There is none for this caller; none is taken.
+            RefusedError: There is no slot for this caller; none is taken.
         """
         count = self._by_caller.get(caller, 0)
         entry = ENTRY.get()

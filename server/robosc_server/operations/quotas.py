@@ -8,19 +8,18 @@ from collections.abc import Callable
 
 from robosc_api.security import Quota, TokenFile
 from robosc_server.clock import monotonic
-from robosc_server.failures import RefusedError
-from robosc_server.tasks.task import Reason
+from robosc_server.tasks.task import Reason, RefusedError
 
 _MINUTE_S = 60.0
 _HOUR_S = 3600.0
 
 
 class Bucket:
-    """Bucket of limited size, into which that amount flows within a given time; it may be overdrawn.
+    """Bucket of limited size that refills steadily; it may be overdrawn.
 
     Args:
         size: Amount that it holds; it is full at first.
-        filled_in_s: Seconds within which an empty one is full.
+        filled_in_s: Time in which an empty bucket becomes full, in seconds.
         now_s: Current time of a monotonic clock, in seconds.
     """
 
@@ -31,12 +30,12 @@ class Bucket:
         self._at_s = now_s
 
     def take(self, amount: float, now_s: float) -> None:
-        """Take something, whether it is there or not."""
+        """Take an amount, even if the bucket holds less."""
         self._level = self._level_at(now_s) - amount
         self._at_s = max(self._at_s, now_s)
 
     def seconds_until(self, amount: float, now_s: float) -> float:
-        """Seconds until so much is there; 0: it is."""
+        """Return the seconds until the bucket holds an amount; 0: it does."""
         return max(0.0, (amount - self._level_at(now_s)) / self._rate)
 
     def _level_at(self, now_s: float) -> float:
@@ -73,7 +72,7 @@ class Quotas:
             caller: Name of the token.
 
         Raises:
-            RefusedError: It has asked for too much; nothing is counted.
+            RefusedError: The quota is used up; nothing is counted.
         """
         account = self._account(caller)
         if account is None:
@@ -89,7 +88,7 @@ class Quotas:
         """Do nothing if an admitted task may start, since other tasks of the token may have used up its CPU time.
 
         Raises:
-            RefusedError: Nothing of a processor's time is left.
+            RefusedError: The quota of CPU time is used up.
         """
         account = self._account(caller)
         if account is not None:
@@ -99,7 +98,7 @@ class Quotas:
         """Count the CPU time of a task.
 
         Args:
-            caller: Name of the token that it was for.
+            caller: Name of the token of the caller.
             cpu_s: CPU time of its process, in seconds.
         """
         account = self._account(caller)

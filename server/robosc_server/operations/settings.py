@@ -361,7 +361,7 @@ class SettingsError(Exception):
     """Settings that cannot be used.
 
     Attributes:
-        problems: A sentence for each, with the place.
+        problems: A sentence for each problem, with its place.
     """
 
     def __init__(self, problems: Sequence[str]) -> None:
@@ -397,14 +397,14 @@ class _SourcedSettings(BaseSettings, Settings):
 
 
 def settings_from(flags: Mapping[str, Any], config: Path | None) -> Settings:
-    """The settings of flags, environment and file together.
+    """Return the settings of flags, environment and file together.
 
     Args:
-        flags: By name of the field.
+        flags: Values of flags, by name of the field.
         config: File in TOML; None: none.
 
     Raises:
-        SettingsError: The file cannot be read, something in it is unknown, or a value is wrong; every problem at once.
+        SettingsError: The file cannot be read, has an unknown key, or a value is wrong; the error lists all problems.
     """
     content = {} if config is None else read_file(config)
 
@@ -454,7 +454,7 @@ def read_file(path: Path) -> dict[str, Any]:
     """Return the content of a file of settings.
 
     Raises:
-        SettingsError: It cannot be read, is too large, or is not TOML.
+        SettingsError: The file cannot be read, is too large, or is not TOML.
     """
     try:
         with path.open("rb") as stream:
@@ -474,12 +474,12 @@ def read_file(path: Path) -> dict[str, Any]:
 
 
 def flag_of(name: str) -> str:
-    """The flag of a setting."""
+    """Return the flag of a setting."""
     return "--" + name.replace("_", "-")
 
 
 def variable_of(name: str) -> str:
-    """The environment variable of a setting."""
+    """Return the environment variable of a setting."""
     return ENVIRONMENT_PREFIX + name.upper()
 
 
@@ -536,7 +536,7 @@ exit status:
 
 
 def add_settings_arguments(parser: argparse.ArgumentParser) -> None:
-    """A flag for each setting, and `--config`."""
+    """Add a flag for each setting, and `--config`."""
     parser.add_argument(
         "--config", type=Path, metavar="FILE", help=f"settings file in TOML (default: ${CONFIG_VARIABLE})"
     )
@@ -563,17 +563,17 @@ def _metavar(name: str) -> str:
 
 
 def settings_of(arguments: argparse.Namespace) -> Settings:
-    """The settings that flags, environment and file say.
+    """Return the settings of parsed flags, the environment and the file.
 
     Raises:
-        SettingsError: They cannot be used.
+        SettingsError: The settings cannot be used.
     """
     flags = {name: value for name, value in vars(arguments).items() if name in Settings.model_fields}
     return settings_from(flags, config_file_of(arguments))
 
 
 def config_file_of(arguments: argparse.Namespace) -> Path | None:
-    """The file of settings; None: there is none."""
+    """Return the path of the settings file; None: there is none."""
     if arguments.config is not None:
         return Path(arguments.config)
     variable = os.environ.get(CONFIG_VARIABLE)
@@ -581,7 +581,7 @@ def config_file_of(arguments: argparse.Namespace) -> Path | None:
 
 
 def make_parser() -> Parser:
-    """The parser of the command line that serves."""
+    """Return the parser of the command line that serves."""
     parser = Parser(
         prog="robosc-server",
         description="Check models, synthesize supervisors and generate packages over gRPC.",
@@ -595,7 +595,7 @@ def make_parser() -> Parser:
 
 
 def load_settings(argv: Sequence[str] | None = None) -> Settings:
-    """The settings of a command line; leaves the program with status 2 where they are wrong."""
+    """Return the settings of a command line; ends the program with status 2 if they are wrong."""
     try:
         return settings_of(make_parser().parse_args(argv))
     except SettingsError as error:

@@ -1,4 +1,4 @@
-"""A file of settings with every one of them, its words and its default, each a comment."""
+"""Example file of all settings, with descriptions and defaults as comments, and the tables of the manual."""
 
 import json
 import textwrap
@@ -34,7 +34,7 @@ _EXAMPLES = {
 
 
 def example_file() -> str:
-    """The file, in TOML."""
+    """Return the example file, in TOML."""
     lines = [
         "# Settings of robosc-server. Flags (--state-dir) and environment variables (ROBOSC_SERVER_STATE_DIR)",
         "# override this file, which is selected with --config or ROBOSC_SERVER_CONFIG. Relative paths start",
@@ -68,7 +68,7 @@ def _is_number(text: str) -> bool:
 
 
 def settings_table() -> str:
-    """The settings as the manual has them: a table in Markdown for each group."""
+    """Return the settings for the manual: a table in Markdown for each group."""
     parts = []
     for group in dict.fromkeys(map(group_of, Settings.model_fields)):
         rows = ["| flag | file | environment | what it is | default |", "|---|---|---|---|---|"]

@@ -23,10 +23,10 @@ _BY_SIGNAL = 128
 
 
 class ShutdownSignals:
-    """Handler of the signals to end; to be used in the main thread.
+    """Handler of the signals that end the server, for use in the main thread.
 
     Args:
-        drain_s: Time that calls under way are given, in seconds.
+        drain_s: Time for calls under way to end, in seconds.
         end_s: Additional time that the end may take, in seconds.
     """
 

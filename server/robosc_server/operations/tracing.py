@@ -1,4 +1,4 @@
-"""Traces of calls, jobs and the runs of workers, for who has the extra `tracing` (OpenTelemetry) and wants them.
+"""Traces of calls, jobs and the runs of workers, with the extra `tracing` (OpenTelemetry).
 
 Callers' traces are continued (W3C Trace Context). Nothing of a model stands in a span, nor do exceptions' messages.
 """
@@ -13,14 +13,14 @@ _HEADERS = ("traceparent", "tracestate")
 
 
 class TracingError(Exception):
-    """Traces are wanted, and cannot be made; one sentence for the operator."""
+    """Traces are configured, but cannot be made; one sentence for the operator."""
 
 
 class Tracing:
     """Tracing that makes no spans.
 
     Attributes:
-        is_on: True if it makes any.
+        is_on: True if it makes spans.
     """
 
     is_on = False
@@ -47,12 +47,12 @@ class Tracing:
         return nullcontext(_NO_SPAN)
 
     def close(self) -> None:
-        """Send what is left; waits for it, at most some seconds."""
+        """Send the remaining spans; waits for that, at most some seconds."""
 
 
 class _NoSpan:
     def set_attribute(self, name: str, value: str | float) -> None:
-        """Keep nothing."""
+        """Ignore the attribute."""
 
 
 _NO_SPAN = _NoSpan()
@@ -60,11 +60,11 @@ NO_TRACING = Tracing()
 
 
 def open_tracing(endpoint: str | None, version: str) -> Tracing:
-    """Traces that are sent somewhere. Start the workers first: it has threads, which a fork would lose.
+    """Return a tracing that sends its spans. Start the workers first: its threads would be lost in a fork.
 
     Args:
-        endpoint: `http://HOST:PORT` or `https://HOST:PORT` that takes OTLP over gRPC; None: nowhere.
-        version: Of RoboSC.
+        endpoint: `http://HOST:PORT` or `https://HOST:PORT` of an OTLP receiver over gRPC; None: no spans are made.
+        version: Version of RoboSC.
 
     Raises:
         TracingError: OpenTelemetry is not installed.
@@ -85,7 +85,7 @@ def open_tracing(endpoint: str | None, version: str) -> Tracing:
 
 
 class OtlpTracing(Tracing):
-    """Makes spans.
+    """Tracing that sends spans by OTLP.
 
     Args:
         provider: An `opentelemetry.sdk.trace.TracerProvider`.
@@ -107,7 +107,7 @@ class OtlpTracing(Tracing):
         return self._span(name, attributes, self._kinds.INTERNAL, None)
 
     def call_span(self, method: str, metadata: Any) -> AbstractContextManager[Any]:
-        """The same for a call."""
+        """Make a span of a call, a child of its caller's span."""
         carrier = {key: value for key, value in metadata or () if key in _HEADERS}
         service, _, name = method.strip("/").rpartition("/")
         attributes: Attributes = {"rpc.system": "grpc", "rpc.service": service, "rpc.method": name}
@@ -134,5 +134,5 @@ class OtlpTracing(Tracing):
                 raise
 
     def close(self) -> None:
-        """Send what is left."""
+        """Send the remaining spans."""
         self._provider.shutdown()

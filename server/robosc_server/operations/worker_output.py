@@ -24,10 +24,10 @@ _KIND = re.compile(r"([A-Za-z_][A-Za-z0-9_.]{0,100})(?::.*)?")
 
 
 def loggable_fields(words: str) -> dict[str, object]:
-    """Return the parts of a worker's words that hold nothing of a model, as fields of a line of the log.
+    """Return the parts of a worker's output that contain nothing of a model, as fields of a log line.
 
     Args:
-        words: Words of a worker, such as a traceback, or the facts of `workers.endings`.
+        words: Output of a worker, such as a traceback, or an exit description of `workers.exit_reasons`.
     """
     lines = [line[:_LINE_CHARACTERS] for line in words.split("\n")]
     fields: dict[str, object] = {}

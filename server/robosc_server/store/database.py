@@ -121,8 +121,8 @@ class Database:
 
     Args:
         engine: Engine of the database; `close` disposes of it.
-        readers: Threads for what only reads.
-        writers: Threads for what changes something.
+        readers: Number of threads for transactions that only read.
+        writers: Number of threads for transactions that write.
         answer_s: Maximum duration of a transaction, in seconds.
         clock: Seconds of a monotonic clock.
     """
@@ -153,16 +153,16 @@ class Database:
 
     @property
     def is_available(self) -> bool:
-        """True if the last read and the last change worked."""
+        """True if the last read and the last write worked."""
         return not any(self._is_failing.values())
 
     @property
     def is_readable(self) -> bool:
-        """True if the last read worked, whatever became of changes."""
+        """True if the last read worked, whether or not writes work."""
         return not self._is_failing[False]
 
     async def read[T](self, work: Callable[[Connection], T]) -> T:
-        """Run some work in a transaction, and return what it finds.
+        """Run work that only reads in a transaction, and return its result.
 
         Raises:
             StoreUnavailableError: The database is unavailable or too slow.
@@ -170,7 +170,7 @@ class Database:
         return await self._run(work, is_write=False)
 
     async def write[T](self, work: Callable[[Connection], T]) -> T:
-        """Return the result of some work whose changes are kept when this returns; it may be done twice.
+        """Run work that writes in a transaction, which may be tried twice; its changes are stored when this returns.
 
         Raises:
             StoreUnavailableError: The database is unavailable, too slow or full.
@@ -178,7 +178,7 @@ class Database:
         return await self._run(work, is_write=True)
 
     def close(self) -> None:
-        """Close connections and threads; what is under way ends first, or is cut off by its own limit."""
+        """Close connections and threads, after the end or the time limit of running transactions."""
         self._readers.shutdown(cancel_futures=True)
         self._writers.shutdown(cancel_futures=True)
         self._engine.dispose()

@@ -1,7 +1,6 @@
 """Errors of a database."""
 
-from robosc_server.failures import RefusedError
-from robosc_server.tasks.task import Reason
+from robosc_server.tasks.task import Reason, RefusedError
 
 _RETRY_S = 2.0
 

@@ -49,7 +49,7 @@ _held_lock = threading.Lock()
 def open_store(
     state_dir: Path, database_url: str | None = None, wall_clock: Callable[[], float] = wall_clock_s
 ) -> Store:
-    """The server's database, with its tables; blocks until it has answered.
+    """Return the server's database, with its tables; blocks until the database has answered.
 
     Args:
         state_dir: Folder for SQLite; made where it is missing.
@@ -57,7 +57,7 @@ def open_store(
         wall_clock: Seconds since 1970.
 
     Raises:
-        StoreError: It cannot be used.
+        StoreError: The database cannot be used.
     """
     path = state_dir / DATABASE_FILE
     if database_url:
@@ -195,7 +195,7 @@ def _lock_of(path: Path) -> Path:
 
 
 def is_in_use(given: Path) -> bool:
-    """Return True if a server uses an SQLite file now; ask for the lock without taking it, and make nothing.
+    """Return True if a server uses an SQLite file now; the lock is only tested, and nothing is created.
 
     Raises:
         OSError: It cannot be determined.

@@ -1,4 +1,4 @@
-"""Inspection of a database without changing it: can a server of this version use it?"""
+"""Inspection of a database, without changing it: whether a server of this version can use it."""
 
 from pathlib import Path
 
@@ -16,7 +16,7 @@ def inspect_sqlite(file: Path) -> int | None:
     """Inspect an existing file, which a server may have open, and return its schema version; None: it has no tables.
 
     Raises:
-        StoreError: It is no database that a server of this version can use.
+        StoreError: A server of this version cannot use the file.
     """
     # Reading a database with a write-ahead log creates shared files, which a reader without write access cannot delete
     # again. Without a log, no process uses the database, and the file alone is complete.
@@ -34,7 +34,7 @@ def inspect_postgresql(url: URL, connect_s: float) -> tuple[str, int | None]:
         connect_s: Time that a connection may take, in seconds.
 
     Raises:
-        StoreError: It cannot be reached, or is none that a server of this version can use.
+        StoreError: The database cannot be reached, or a server of this version cannot use it.
         ImportError: The driver is missing.
         NoSuchModuleError: The driver is missing.
     """

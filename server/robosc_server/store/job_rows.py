@@ -67,7 +67,7 @@ def _change_of(names: tuple[str, ...]) -> Any:
 
 
 def record_of(row: Row[Any]) -> JobRecord:
-    """The value of a row."""
+    """Return the record of a row."""
     values = row._mapping
     reason = values["reason"]
     return JobRecord(
@@ -96,19 +96,19 @@ def record_of(row: Row[Any]) -> JobRecord:
 
 
 def find(connection: Connection, job_id: str, now_us: int) -> JobRecord | None:
-    """A job that is still kept."""
+    """Return a job, if it is still stored."""
     row = connection.execute(_FIND, {"job": job_id, "now": now_us}).one_or_none()
     return None if row is None else record_of(row)
 
 
 def find_by_key(connection: Connection, owner: str, idempotency_key: str, now_us: int) -> JobRecord | None:
-    """The job that was accepted with an idempotency key."""
+    """Return the job that was accepted with an idempotency key."""
     row = connection.execute(_FIND_BY_KEY, {"by": owner, "with": idempotency_key, "now": now_us}).one_or_none()
     return None if row is None else record_of(row)
 
 
 def find_many(connection: Connection, revisions: dict[str, int]) -> tuple[list[JobRecord], set[str]]:
-    """Those of some jobs that have changed since the revisions given, and the ids of those that are there no more."""
+    """Return those of some jobs that have changed since the given revisions, and the ids of deleted ones."""
     ids = list(revisions)
     gone = set(ids)
     found: list[JobRecord] = []
@@ -126,7 +126,7 @@ def find_many(connection: Connection, revisions: dict[str, int]) -> tuple[list[J
 def listed(
     connection: Connection, chosen: JobFilter, after: tuple[int, str] | None, limit: int, now_us: int
 ) -> list[JobRecord]:
-    """Return jobs, the youngest first.
+    """Return jobs, newest first.
 
     Args:
         connection: Connection, in a transaction.
@@ -197,7 +197,7 @@ def _ended_by_owner(owner: str | None, since_us: int) -> Any:
 def accept(
     connection: Connection, record: JobRecord, request: bytes, result: Result | None, bound: int, now_us: int
 ) -> tuple[JobRecord, bool] | None:
-    """Keep a new job, and end it at once if there is a result of its task.
+    """Store a new job, and end it at once if there is a result of its task.
 
     Args:
         connection: Connection, in a transaction.
@@ -208,7 +208,7 @@ def accept(
         now_us: The time.
 
     Returns:
-        The job, and whether it was there before, by its idempotency key. None: as many have not ended.
+        The job, and True if it was found by its idempotency key. None: `bound` jobs of the owner have not ended.
     """
     if record.idempotency_key is not None:
         there = find_by_key(connection, record.owner, record.idempotency_key, now_us)
@@ -232,10 +232,10 @@ def accept(
 
 
 def begin(connection: Connection, job_id: str, replica: str, now_us: int) -> tuple[JobRecord, bytes] | None:
-    """Have a job run, or end if a result of its task has come up meanwhile (its request is empty then).
+    """Mark a job as running, or end it if there is a result of its task by now (its request is empty then).
 
     Returns:
-        The job and its request; None: it does not wait any more, or is another server's.
+        The job and its request; None: it no longer waits, or belongs to another server.
     """
     record = _locked(connection, job_id)
     if record is None or record.replica != replica or record.state is not JobState.QUEUED:
@@ -253,14 +253,14 @@ def begin(connection: Connection, job_id: str, replica: str, now_us: int) -> tup
 def requeue(
     connection: Connection, ids: Collection[str], replica: str, next_replica: str | None, *, is_lost: bool
 ) -> list[JobRecord]:
-    """Have running jobs wait again that were interrupted; the attempt does not count.
+    """Queue running jobs again that were interrupted; the attempt does not count.
 
     Args:
         connection: Connection, in a transaction.
-        ids: Ids of the jobs; those that do not run, or are another server's, stay as they are.
-        replica: Server whose jobs they are.
-        next_replica: Server whose jobs they will be; None: the one that finds them first.
-        is_lost: True if they lost their workers, perhaps through their own fault; that is counted.
+        ids: Ids of the jobs; those that do not run, or belong to another server, do not change.
+        replica: Server to which the jobs belong.
+        next_replica: Server to which they will belong; None: the one that finds them first.
+        is_lost: True if they lost their workers, which the jobs may have caused; such losses are counted.
     """
     found = []
     for job_id in sorted(ids):  # The same order in each server prevents deadlocks.
@@ -280,7 +280,7 @@ def release_queued(connection: Connection, replica: str) -> None:
 
 
 def succeed(connection: Connection, job_id: str, replica: str, result: Result, now_us: int) -> JobRecord | None:
-    """Keep the result of a job that runs; None: it does not any more, or is another server's."""
+    """Store the result of a running job; None: it no longer runs, or belongs to another server."""
     record = _locked(connection, job_id)
     if record is None or record.replica != replica or record.state.has_ended:
         return None
@@ -289,7 +289,7 @@ def succeed(connection: Connection, job_id: str, replica: str, result: Result, n
 
 
 def fail(connection: Connection, job_id: str, replica: str, failure: Failure, now_us: int) -> JobRecord | None:
-    """End a job without a result; None: it has ended before, or is another server's."""
+    """End a job without a result; None: it has ended before, or belongs to another server."""
     record = _locked(connection, job_id)
     if record is None or record.replica != replica or record.state.has_ended:
         return None
@@ -320,23 +320,23 @@ def write_progress(connection: Connection, replica: str, progress: dict[str, tup
 
 
 def active_of(connection: Connection, replica: str) -> list[JobRecord]:
-    """The jobs of a server that have not ended, the oldest first."""
+    """Return the jobs of a server that have not ended, the oldest first."""
     query = select(JOBS).where(_IS_ACTIVE, JOBS.c.replica == replica)
     return [record_of(row) for row in connection.execute(query.order_by(JOBS.c.created_us, JOBS.c.id))]
 
 
 def active_ids_of(connection: Connection, replica: str) -> set[str]:
-    """The ids of the jobs of a server that have not ended."""
+    """Return the ids of the jobs of a server that have not ended."""
     return set(connection.scalars(_ACTIVE_IDS, {"by": replica}))
 
 
 def has_orphans(connection: Connection) -> bool:
-    """Return True if there are jobs that have not ended, and are no server's."""
+    """Return True if there are jobs that have not ended and belong to no server."""
     return connection.scalar(select(JOBS.c.id).where(_is_orphan()).limit(1)) is not None
 
 
 def take_orphans(connection: Connection, ours: str, now_us: int, limit: int) -> list[JobRecord]:
-    """Take over the jobs that have not ended, and are no server's; those that ran wait again, or have failed.
+    """Take over jobs that have not ended and belong to no server; those that ran are queued again, or have failed.
 
     Args:
         connection: Connection, in a transaction.
@@ -362,7 +362,7 @@ def take_orphans(connection: Connection, ours: str, now_us: int, limit: int) -> 
 
 
 def sweep(connection: Connection, now_us: int, limit: int) -> int:
-    """Delete jobs whose time has passed, at most so many; how many there were."""
+    """Delete expired jobs, at most a given number; return the number of deleted jobs."""
     expired = select(JOBS.c.id).where(JOBS.c.expires_us <= now_us).limit(limit)
     ids = list(connection.scalars(expired))
     if ids:
@@ -371,7 +371,7 @@ def sweep(connection: Connection, now_us: int, limit: int) -> int:
 
 
 def results_by_owner(connection: Connection) -> dict[str, int]:
-    """Bytes of the results that each owner's jobs refer to; one that several owners have counts for each of them."""
+    """Return the bytes of the results that each owner's jobs refer to; a shared result counts for each owner."""
     referred = select(JOBS.c.owner, JOBS.c.result_key).where(JOBS.c.result_key.is_not(None)).distinct().subquery()
     query = select(referred.c.owner, func.sum(RESULTS.c.size).label("total")).group_by(referred.c.owner)
     query = query.join_from(referred, RESULTS, RESULTS.c.key == referred.c.result_key)
@@ -379,12 +379,12 @@ def results_by_owner(connection: Connection) -> dict[str, int]:
 
 
 def forget(connection: Connection, held: dict[str, int], excess: int, limit: int) -> tuple[int, dict[str, int]]:
-    """Delete jobs with results before their time: of the owner whose results take most, the one that ended first.
+    """Delete jobs with results early: each time the job that ended first of the owner whose results are largest.
 
     Args:
         connection: Connection, in a transaction.
         held: Bytes of the results that each owner's jobs refer to.
-        excess: Number of bytes that are too many.
+        excess: Number of bytes to free.
         limit: Largest number of jobs.
 
     Returns:
@@ -448,5 +448,5 @@ def _end(connection: Connection, record: JobRecord, state: JobState, now_us: int
 
 
 def clean(text: str) -> str:
-    """A text that every database takes: without NUL and lone surrogates, not too long."""
+    """Return a text that every database accepts: without NUL and lone surrogates, not too long."""
     return text[:_MESSAGE_CHARACTERS].encode("utf-8", "replace").decode().replace("\0", "\N{REPLACEMENT CHARACTER}")

@@ -1,6 +1,7 @@
 """Migration of a database to the schema version of this server, by Alembic.
 
-The whole way is one transaction, on the server's own connection. Servers of the earlier version continue to work.
+All migrations together are one transaction, on the server's own connection. Servers of the earlier version continue to
+work.
 """
 
 import logging
@@ -14,10 +15,13 @@ from alembic.script import ScriptDirectory
 from sqlalchemy import Connection, delete, insert, inspect, select, text
 
 from robosc_server.store.errors import StoreError
-from robosc_server.store.migrations.table import VERSION_TABLE
 from robosc_server.store.schema import METADATA, SCHEMA
 
 _log = logging.getLogger(__name__)
+
+VERSION_TABLE = "robosc_migrations"
+"""Table in which Alembic keeps the schema version, not called as it would call it: a database may hold tables of other
+programs that use Alembic."""
 
 _LOCK = 0x726F626F7363
 """PostgreSQL advisory lock for migrations: several servers may start at the same time."""

@@ -34,19 +34,19 @@ class JobRecord:
         key: Key of its task.
         main_file: Name of the main file.
         label: Owner's name for it; may be empty.
-        idempotency_key: Idempotency key; None: it was given none.
+        idempotency_key: Idempotency key; None: none was given.
         retention_us: Time that it is kept after its end, in microseconds.
         created_us: Time of its acceptance.
         started_us: Time at which a worker began; None: not yet.
         ended_us: Time of its end; None: not yet.
-        expires_us: Time at which it is forgotten; None: not before it has ended.
+        expires_us: Time at which it is deleted; None: it has not ended.
         attempts: Number of times that a worker has begun.
         progress: Last report of a worker; None: nothing.
         failure: Failure of the job; None: it has not failed.
         is_from_store: True if its result is that of an earlier task.
-        replica: Server that has it to do; None: none.
+        replica: Server to which it belongs; None: none.
         result_key: Key of its result; None: it has none.
-        losses: Number of times that its worker was lost while it ran, in a way that may be its own fault.
+        losses: Number of times that its worker was lost while it ran, which the job may have caused.
     """
 
     id: str
@@ -89,7 +89,7 @@ class JobFilter:
 
 @dataclass(frozen=True, slots=True)
 class OwnerLoad:
-    """Load that one owner's jobs are, at all servers.
+    """Load of one owner's jobs, at all servers.
 
     Attributes:
         owner: Owner of the jobs.
@@ -107,7 +107,7 @@ class OwnerLoad:
 
 
 def blocks_of(messages: Sequence[bytes]) -> Iterator[bytes]:
-    """Messages in blocks of about half a megabyte, each message with its length before it."""
+    """Return messages in blocks of about half a megabyte, each message with its length before it."""
     block = bytearray()
     for message in messages:
         if block and len(block) + len(message) > _BLOCK_BYTES:
@@ -120,7 +120,7 @@ def blocks_of(messages: Sequence[bytes]) -> Iterator[bytes]:
 
 
 def messages_of(block: bytes) -> Iterator[bytes]:
-    """The messages of one block."""
+    """Return the messages of one block."""
     place = 0
     while place < len(block):
         (size,) = _LENGTH.unpack_from(block, place)

@@ -23,7 +23,7 @@ _ALL_BLOCKS = select(BLOCKS.c.content).where(BLOCKS.c.key == bindparam("of")).or
 
 
 def insert_result(connection: Connection, key: str, kind: TaskKind, result: Result, owner: str, now_us: int) -> None:
-    """Keep a result that was made for an owner, unless there is one of that key."""
+    """Store a result that was made for an owner, unless there is one with this key."""
     size = sum(map(len, result.messages))
     new = {"key": key, "kind": kind, "size": size, "used_us": now_us, "owner": owner}
     # Not by the number of inserted rows: a driver may not know it, and say -1.
@@ -40,13 +40,13 @@ def count_blocks(connection: Connection, key: str) -> int | None:
 
 
 def read_block(connection: Connection, key: str, number: int) -> bytes | None:
-    """One block of a result; None: it is not there."""
+    """Return one block of a result; None: there is no such block."""
     content = connection.scalar(_BLOCK, {"of": key, "at": number})
     return None if content is None else bytes(content)
 
 
 def read_blocks(connection: Connection, key: str) -> tuple[TaskKind, list[bytes]] | None:
-    """Return the kind of task that a result is of, and all its blocks; None: there is no such result."""
+    """Return the kind of task of a result, and all its blocks; None: there is no such result."""
     kind = connection.scalar(_KIND, {"of": key})
     if kind is None:
         return None
@@ -54,7 +54,7 @@ def read_blocks(connection: Connection, key: str) -> tuple[TaskKind, list[bytes]
 
 
 def touch(connection: Connection, keys: Collection[str], now_us: int) -> None:
-    """Note that some results were asked for."""
+    """Record that some results were requested now."""
     names = sorted(keys)  # The same order in each server prevents deadlocks.
     for place in range(0, len(names), 500):
         part = names[place : place + 500]
@@ -62,13 +62,13 @@ def touch(connection: Connection, keys: Collection[str], now_us: int) -> None:
 
 
 def sizes_by_owner(connection: Connection) -> dict[str, int]:
-    """Bytes of all results, by those for whom they were made first."""
+    """Return the bytes of all results, by the owner for whom each was made first."""
     query = select(RESULTS.c.owner, func.sum(RESULTS.c.size).label("total")).group_by(RESULTS.c.owner)
     return {row.owner: int(row.total) for row in connection.execute(query)}
 
 
 def trim(connection: Connection, held: dict[str, int], excess: int, limit: int) -> tuple[int, dict[str, int]]:
-    """Delete results that no job refers to: of the owner who holds most, the one that was asked for longest ago.
+    """Delete results that no job refers to: each time the least recently used one of the owner with the most bytes.
 
     Args:
         connection: Connection, in a transaction.

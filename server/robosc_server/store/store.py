@@ -30,11 +30,11 @@ def _do_nothing() -> None:
 
 
 class Store:
-    """A database with jobs and results.
+    """Database with jobs and results.
 
     Args:
-        database: With its tables.
-        on_close: Called when it is closed.
+        database: Database with its tables.
+        on_close: Function that is called when the store is closed.
         wall_clock: Seconds since 1970.
     """
 
@@ -55,51 +55,51 @@ class Store:
 
     @property
     def is_available(self) -> bool:
-        """True if the last request to it worked."""
+        """True if the last request to the database worked."""
         return self._database.is_available
 
     @property
     def is_readable(self) -> bool:
-        """True if the last read was possible; a full disk can be read."""
+        """True if the last read worked; a full disk can be read."""
         return self._database.is_readable
 
     def now_us(self) -> int:
-        """Microseconds since 1970."""
+        """Return the microseconds since 1970."""
         return round(self._wall_clock() * 1e6)
 
     def close(self) -> None:
-        """Let go of the database; blocks for a moment."""
+        """Close the database; blocks for a moment."""
         self._database.close()
         self._on_close()
 
     async def accept(
         self, record: JobRecord, request: bytes, result: Result | None, bound: int
     ) -> tuple[JobRecord, bool] | None:
-        """Keep a new job, see `job_rows.accept`: the job, and whether it was there before."""
+        """Store a new job, as `job_rows.accept`; return the job, and True if it was there before."""
         now_us = self.now_us()
         return await self._database.write(
             lambda connection: job_rows.accept(connection, record, request, result, bound, now_us)
         )
 
     async def find(self, job_id: str) -> JobRecord | None:
-        """A job that is kept."""
+        """Return a stored job."""
         now_us = self.now_us()
         return await self._database.read(lambda connection: job_rows.find(connection, job_id, now_us))
 
     async def find_by_key(self, owner: str, idempotency_key: str) -> JobRecord | None:
-        """The job that was accepted from an owner with an idempotency key."""
+        """Return the job that was accepted from an owner with an idempotency key."""
         now_us = self.now_us()
         return await self._database.read(
             lambda connection: job_rows.find_by_key(connection, owner, idempotency_key, now_us)
         )
 
     async def find_changed(self, revisions: Mapping[str, int]) -> tuple[list[JobRecord], set[str]]:
-        """Those of some jobs that have greater revisions than those given, and the ids of those that are gone."""
+        """Return those of some jobs whose revisions are greater than given, and the ids of deleted ones."""
         known = dict(revisions)
         return await self._database.read(lambda connection: job_rows.find_many(connection, known))
 
     async def list_jobs(self, chosen: JobFilter, after: tuple[int, str] | None, limit: int) -> list[JobRecord]:
-        """Jobs, the youngest first; see `job_rows.listed`."""
+        """Return jobs, newest first; see `job_rows.listed`."""
         now_us = self.now_us()
         return await self._database.read(lambda connection: job_rows.listed(connection, chosen, after, limit, now_us))
 
@@ -108,19 +108,19 @@ class Store:
         return await self._database.read(job_rows.counts_by_state)
 
     async def loads(self, owner: str | None, within_s: float) -> list[OwnerLoad]:
-        """Return the load of owners, with what has ended within so many seconds; see `job_rows.loads`."""
+        """Return the load of owners, with the jobs that ended in the last seconds; see `job_rows.loads`."""
         since_us = self.now_us() - round(within_s * 1e6)
         return await self._database.read(lambda connection: job_rows.loads(connection, owner, since_us))
 
     async def begin(self, job_id: str, replica: str) -> tuple[JobRecord, bytes] | None:
-        """Have a waiting job run; see `job_rows.begin`."""
+        """Mark a waiting job as running; see `job_rows.begin`."""
         now_us = self.now_us()
         return await self._database.write(lambda connection: job_rows.begin(connection, job_id, replica, now_us))
 
     async def requeue(
         self, ids: Collection[str], replica: str, next_replica: str | None, *, is_lost: bool = False
     ) -> list[JobRecord]:
-        """Have running jobs wait again; see `job_rows.requeue`. In small transactions."""
+        """Queue running jobs again, in small transactions; see `job_rows.requeue`."""
         found: list[JobRecord] = []
         for some in batched(sorted(ids), _TAKEN_AT_ONCE):
             work = partial(job_rows.requeue, ids=some, replica=replica, next_replica=next_replica, is_lost=is_lost)
@@ -132,7 +132,7 @@ class Store:
         await self._database.write(lambda connection: job_rows.release_queued(connection, replica))
 
     async def end(self, job_id: str, replica: str, outcome: Result | Failure) -> JobRecord | None:
-        """End a job; None: it has ended, or is another server's."""
+        """End a job; None: it has ended before, or belongs to another server."""
         now_us = self.now_us()
         if isinstance(outcome, Result):
             return await self._database.write(
@@ -156,11 +156,11 @@ class Store:
         await self._database.write(lambda connection: job_rows.write_progress(connection, replica, reports))
 
     async def active_of(self, replica: str) -> list[JobRecord]:
-        """The jobs of a server that have not ended, the oldest first."""
+        """Return the jobs of a server that have not ended, the oldest first."""
         return await self._database.read(lambda connection: job_rows.active_of(connection, replica))
 
     async def active_ids_of(self, replica: str) -> set[str]:
-        """The ids of the jobs of a server that have not ended."""
+        """Return the ids of the jobs of a server that have not ended."""
         return await self._database.read(lambda connection: job_rows.active_ids_of(connection, replica))
 
     async def enter(self, replica: str) -> None:
@@ -205,7 +205,7 @@ class Store:
         return await self._take_orphans(replica)
 
     async def keep_results(self, results: Sequence[tuple[str, TaskKind, Result, str]]) -> None:
-        """Keep results by their keys, with their owners, but for those whose keys are there; all or none."""
+        """Store results by their keys, with their owners, except for keys that are stored already; all or none."""
         now_us = self.now_us()
         # The same order in each server prevents deadlocks.
         ordered = sorted(results, key=lambda item: item[0])
@@ -217,7 +217,7 @@ class Store:
         await self._database.write(insert)
 
     async def find_result(self, key: str) -> tuple[TaskKind, Result] | None:
-        """A whole result, and what its task was."""
+        """Return a whole result, and the kind of its task."""
         found = await self._database.read(lambda connection: result_rows.read_blocks(connection, key))
         if found is None:
             return None
@@ -229,16 +229,16 @@ class Store:
         return await self._database.read(lambda connection: result_rows.count_blocks(connection, key))
 
     async def read_block(self, key: str, number: int) -> bytes | None:
-        """One block of a result; see `records.messages_of`."""
+        """Return one block of a result; see `records.messages_of`."""
         return await self._database.read(lambda connection: result_rows.read_block(connection, key, number))
 
     async def touch(self, keys: Collection[str]) -> None:
-        """Note that some results were asked for."""
+        """Record that some results were requested now."""
         now_us = self.now_us()
         await self._database.write(lambda connection: result_rows.touch(connection, keys, now_us))
 
     async def size_of_needed(self) -> int:
-        """Bytes of the results that kept jobs refer to; what jobs of several owners do counts for each of them."""
+        """Return the bytes of the results that jobs refer to; a result of several owners counts for each of them."""
         return sum((await self._database.read(job_rows.results_by_owner)).values())
 
     async def sweep(self, results_bytes: int) -> int:
@@ -248,10 +248,10 @@ class Store:
         limit, the jobs that ended first, until a tenth of it is free again.
 
         Args:
-            results_bytes: Bytes of results that may stay.
+            results_bytes: Maximum size of all results.
 
         Returns:
-            How many jobs were deleted.
+            Number of deleted jobs.
         """
         now_us = self.now_us()
         total = 0

@@ -31,7 +31,7 @@ _VERDICTS = {
 
 
 class Automata:
-    """Automata of a request, and how they are synthesized.
+    """Automata of a request, and the results of commands for them.
 
     Args:
         model: The automata.
@@ -70,7 +70,7 @@ class Automata:
         """The files of a target, or None, and the fields of the result.
 
         Raises:
-            RequestError: `initial` names what is not there.
+            RequestError: `initial` names a part that does not exist.
             UnknownTargetError: There is no such target.
         """
         made = generate(self._model, target, choices, self._options, initial=initial, on_progress=self._report)

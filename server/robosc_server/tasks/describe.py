@@ -17,7 +17,7 @@ def server_limits(
     waiting_tasks_per_caller: int,
     retention_seconds: float,
 ) -> pb.ServerLimits:
-    """Return the limits of what a server takes and gives.
+    """Return the limits of a server's requests, tasks and results.
 
     Args:
         request: Limits of a request.

@@ -1,8 +1,7 @@
-"""Number of fields of a serialized message, found out before it is parsed.
+"""Count of the fields of a serialized message, before it is parsed.
 
 A megabyte of empty files is half a million messages: the parser takes a tenth of a second for them, though their
-bytes are within every limit. The encoding is read as it stands (protobuf.dev: Encoding), and no further than up to
-the limit.
+bytes are within every limit. The count reads the encoding itself (protobuf.dev: Encoding), and stops at the limit.
 """
 
 from typing import Any
@@ -42,7 +41,7 @@ def has_few_fields(content: bytes, nested: Nested, limit: int) -> bool:
     Takes a time in proportion to the limit, however long the message is.
 
     Args:
-        content: The message, serialized. If it cannot be parsed, the result says nothing: the parser reports that.
+        content: The serialized message. If it cannot be parsed, the result has no meaning: the parser reports that.
         nested: Fields of the message that are messages.
         limit: Fields that it may have.
     """

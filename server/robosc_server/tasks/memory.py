@@ -1,4 +1,4 @@
-"""Errors that come of a lack of memory, whatever they are called by the library that raises them."""
+"""Recognition of errors that a lack of memory has caused, whatever their type."""
 
 import errno
 
@@ -11,7 +11,7 @@ _PROBE_BYTES = 2**20
 def is_lack_of_memory(error: BaseException) -> bool:
     """Return True if an error that ended a task comes of a lack of memory; ask while the error is being handled.
 
-    Libraries in C tell it in words of their own: Protocol Buffers refuse to read or write a message that is right, and
+    Libraries in C report it in ways of their own: Protocol Buffers refuse to read or write a message that is right, and
     a system call reports ENOMEM. Some lose the reason, so it is also tried whether there is memory left: what the task
     has made is still there while its error is handled.
 

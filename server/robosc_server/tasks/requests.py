@@ -19,9 +19,8 @@ from robosc._version import __version__
 from robosc.dd_modules import has_cudd
 from robosc.source import visible
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_server.failures import RefusedError
 from robosc_server.tasks.fields import Nested, has_few_fields, nested_of
-from robosc_server.tasks.task import Reason, Task, TaskKind
+from robosc_server.tasks.task import Reason, RefusedError, Task, TaskKind
 
 NOT_A_MESSAGE = "the request is not a valid message of this service"
 
@@ -63,10 +62,10 @@ class RequestLimits:
     """Limits of a request.
 
     Attributes:
-        bundle_bytes: Bytes of all its names and texts; a given supervisor and properties count, too.
-        bundle_files: Number of its files; as many places that were searched, and as many properties.
-        name_bytes: Bytes of the name of a file, a target or an engine.
-        nodes: Nodes of decision diagrams, all together, that a task may have; a request for more gets so many.
+        bundle_bytes: Maximum size of all names and texts of a bundle; a given supervisor and properties count, too.
+        bundle_files: Maximum number of files; also of searched places, and of properties.
+        name_bytes: Maximum length of the name of a file, a target or an engine, in bytes.
+        nodes: Maximum number of decision diagram nodes of a task; a request for more gets this number.
     """
 
     bundle_bytes: int = 2**20
@@ -76,7 +75,7 @@ class RequestLimits:
 
     @property
     def request_bytes(self) -> int:
-        """Maximum size of a whole message, in bytes: no longer one is parsed."""
+        """Maximum size of a whole message, in bytes: a longer one is not parsed."""
         return self.bundle_bytes + _FRAMING_BYTES
 
     @property
@@ -91,17 +90,17 @@ class RequestLimits:
 
 
 def require_short(content: bytes, limit: int) -> None:
-    """Do nothing if a message has no more bytes than it may have.
+    """Do nothing if a message does not exceed the limit on its bytes.
 
     Raises:
-        RefusedError: It has.
+        RefusedError: The message is too long.
     """
     if len(content) > limit:
         raise _too_large(f"the request has {len(content)} bytes; this server accepts at most {limit}")
 
 
 def require_parsable(content: bytes, nested: Nested, limits: RequestLimits) -> None:
-    """Do nothing if a message that is short is parsed in a short time.
+    """Do nothing if a short message can be parsed in a short time.
 
     Args:
         content: The message, serialized.
@@ -109,22 +108,22 @@ def require_parsable(content: bytes, nested: Nested, limits: RequestLimits) -> N
         limits: Limits of a request.
 
     Raises:
-        RefusedError: It has too many fields.
+        RefusedError: The message has too many fields.
     """
     if len(content) > QUICK_BYTES and not has_few_fields(content, nested, limits.fields):
         raise _too_large(f"the request has more than {limits.fields} fields (files, names and texts)")
 
 
 def accept_request(kind: TaskKind, request: bytes, limits: RequestLimits) -> Task:
-    """Return the task that a request asks for.
+    """Return the task of a request.
 
     Args:
         kind: Kind of the request.
-        request: Its message, serialized.
+        request: The serialized message of the request.
         limits: Limits of the request.
 
     Raises:
-        RefusedError: It is no message, has invalid names, lacks something or has too much.
+        RefusedError: The request is malformed, has invalid names, is incomplete or exceeds a limit.
     """
     require_short(request, limits.request_bytes)
     parse, read, nested = _KINDS[kind]
@@ -154,10 +153,10 @@ class RequestCache:
         self._bytes = 0
 
     def accept(self, kind: TaskKind, request: bytes) -> Task:
-        """The task that a request asks for; see `accept_request`.
+        """Return the task of a request; see `accept_request`.
 
         Raises:
-            RefusedError: It cannot be one.
+            RefusedError: The request is invalid.
         """
         known = self._tasks.get((kind, request))
         if known is not None:
@@ -203,20 +202,20 @@ class _RequestReader:
         self.is_automata = False
 
     def require_small(self) -> None:
-        """Do nothing if all that was counted is within the limit.
+        """Do nothing if the bytes counted so far are within the limit.
 
         Raises:
-            RefusedError: It is not.
+            RefusedError: The limit is exceeded.
         """
         limit = self._limits.bundle_bytes
         if self._bytes > limit:
             raise _too_large(f"the names and texts have {self._bytes} bytes; this server accepts at most {limit}")
 
     def require_few(self, count: int, what: str) -> None:
-        """Do nothing if there are no more files, or other things, than there may be.
+        """Do nothing if the number of files, or of other items, is within its limit.
 
         Raises:
-            RefusedError: There are.
+            RefusedError: There are too many.
         """
         limit = self._limits.bundle_files
         if count > limit:
@@ -269,7 +268,7 @@ class _RequestReader:
             **given: Value of each of these fields.
 
         Raises:
-            RefusedError: It has.
+            RefusedError: The request has such a field.
         """
         for name, value in given.items():
             if self.is_automata and value:

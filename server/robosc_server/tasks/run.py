@@ -72,7 +72,7 @@ class ThrottledReports:
 
     Args:
         on_report: Receiver of the reports.
-        clock: Seconds that never go back.
+        clock: Monotonic clock, in seconds.
     """
 
     def __init__(self, on_report: Callable[[Report], None], clock: Callable[[], float] = monotonic) -> None:
@@ -90,13 +90,13 @@ class ThrottledReports:
 
 
 def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnReport) -> Outcome:
-    """Do a task to its end.
+    """Run a task to its end.
 
     Args:
         kind: Kind of the task.
         request: The message of an accepted request.
         limits: Limits of the task; those of time and memory are enforced outside of this function.
-        on_report: Callback that receives reports of the progress now and then.
+        on_report: Callback that receives reports of the progress.
     """
     try:
         return Result(_bounded(_WORK[kind](request, limits, ThrottledReports(on_report)), limits.result_bytes))

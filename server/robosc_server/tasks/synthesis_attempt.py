@@ -32,8 +32,8 @@ class SynthesisAttempt:
     """Context of a synthesis, which keeps the error of a model that is not supported.
 
     Attributes:
-        made: Result of making the supervisor; None where the attempt did not come so far.
-        refusal: Refusal of the target that was asked for, or None.
+        made: Result of making the supervisor; None: the attempt ended before.
+        refusal: Refusal by the requested target, or None.
         error: Error that says why the model cannot be handled, or None.
     """
 
@@ -56,7 +56,7 @@ class SynthesisAttempt:
     def make(
         self, request: Request, maximum_nodes: int, on_report: OnReport, *, allow_livelock: bool
     ) -> SynthesisOutcome:
-        """Make the supervisor that a request is about."""
+        """Make the supervisor of a request."""
         options = request.options
         self.made = make_supervisor(
             from_proto.bundle(request.bundle),
@@ -69,7 +69,7 @@ class SynthesisAttempt:
         return self.made
 
     def result_fields(self) -> dict[str, Any]:
-        """The fields that every result has: `status`, `diagnostics`, `reason` and `explanation`."""
+        """Return the fields that every result has: `status`, `diagnostics`, `reason` and `explanation`."""
         made, error = self.made, self.error
         diagnostics = self.refusal.diagnostics if self.refusal else made.diagnostics if made else ()
         if error is not None or made is None:

@@ -17,9 +17,9 @@ class Task:
 
     Attributes:
         kind: Kind of the task.
-        request: The request's message, serialized.
-        key: SHA-256 (64 hexadecimal digits) of all that decides the result: the kind, every file by name and content,
-            the options and the version of RoboSC; with `own_key`, and the caller.
+        request: The serialized message of the request.
+        key: SHA-256 (64 hexadecimal digits) of everything that determines the result: the kind, every file by name and
+            content, the options and the version of RoboSC; in a key by `own_key` also the caller.
         main_file: Name of the main file, for lists.
     """
 
@@ -34,11 +34,11 @@ class TaskLimits:
     """Limits of one task.
 
     Attributes:
-        seconds: Wall-clock time while a worker is busy with it, in seconds.
-        cpu_seconds: Processor time, in seconds.
-        memory_bytes: Bytes of address space, the worker's own included.
-        nodes: Nodes of decision diagrams, all together.
-        result_bytes: Bytes of all messages of the result.
+        seconds: Maximum wall-clock time at a worker, in seconds.
+        cpu_seconds: Maximum CPU time, in seconds.
+        memory_bytes: Maximum address space, including that of the worker itself.
+        nodes: Maximum number of decision diagram nodes.
+        result_bytes: Maximum size of all messages of the result.
     """
 
     seconds: float = 600.0
@@ -57,7 +57,7 @@ class Report:
 
 
 def own_key(key: str, caller: str) -> str:
-    """Return the key of a task for one caller, so that nobody can find out what others have asked for."""
+    """Return the key of a task for one caller, so that callers cannot find out the requests of others."""
     return f"{key}{_OWNER_MARK}{_digest_of(caller)}"
 
 
@@ -112,13 +112,29 @@ class Failure:
 
     Attributes:
         reason: Reason of the failure.
-        message: One sentence for the caller; nothing of the model in it.
-        details: Text for the log of the server alone, such as a traceback.
+        message: One sentence for the caller, without parts of the model.
+        details: Text only for the log of the server, such as a traceback.
     """
 
     reason: Reason
     message: str
     details: str = ""
+
+
+class RefusedError(Exception):
+    """A call that ends without an answer.
+
+    Attributes:
+        reason: Reason why there is no answer.
+        message: One sentence for the caller.
+        retry_after_s: Seconds after which it may be worth another try; None: it is not.
+    """
+
+    def __init__(self, reason: Reason, message: str, retry_after_s: float | None = None) -> None:
+        super().__init__(message)
+        self.reason = reason
+        self.message = message
+        self.retry_after_s = retry_after_s
 
 
 type Outcome = Result | Failure
@@ -127,6 +143,7 @@ __all__ = [
     "Failure",
     "Outcome",
     "Reason",
+    "RefusedError",
     "Report",
     "Result",
     "Task",

@@ -1,4 +1,4 @@
-"""Verification: of a supervisor that is given, and of properties of the robot under its supervisor."""
+"""Verification of a given supervisor, and of properties of the robot under its supervisor."""
 
 from collections.abc import Callable, Mapping
 from typing import Any
@@ -43,7 +43,7 @@ def verification(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnRep
         on_report: Callback that receives reports of the progress.
 
     Raises:
-        NoPropertyError: There is nothing to verify in the texts.
+        NoPropertyError: The texts have no property.
         UnknownEngineError: There is no such engine.
         NodeLimitError: Decision diagrams became too large.
     """

@@ -48,7 +48,7 @@ def run_worker(
         used_bytes: Bytes of address space that this process has.
 
     Raises:
-        SandboxError: It cannot be confined.
+        SandboxError: The process cannot be confined.
     """
     faulthandler.enable(crash_output)
     confinement.prefer_oom_kill()

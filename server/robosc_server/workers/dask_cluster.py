@@ -150,13 +150,13 @@ class DaskWorkers:
     ) -> Outcome:
         """Return the outcome of a task; see `Workers.run`.
 
-        A worker of the cluster that is lost has its task done by another one, once. Reports come at most ten times a
-        second, and of many at once only the last.
+        The task of a lost worker is run again by another worker, once. Reports come at most ten times a second, and of
+        many at once only the last.
 
         Raises:
             WorkersError: The cluster is unavailable or was lost, has no usable worker, or loses its workers before they
                 start the task.
-            WorkerLostError: The starter of processes on a worker ended under it, more than once.
+            WorkerLostError: The fork server of a worker ended during the task, more than once.
         """
         events = _TaskEvents()
         for _ in range(_STARTS):
@@ -215,7 +215,7 @@ class DaskWorkers:
                 async with asyncio.timeout(_CANCEL_S):
                     if future.done():
                         future.release()
-                    else:  # This tells the worker to stop.
+                    else:  # A cancelled future stops its worker.
                         await future.cancel()
                     await asyncio.gather(*works, return_exceptions=True)
 

@@ -25,7 +25,7 @@ BEGUN = "begun"
 REPORTS = "reports"
 CPU_TIME = "spent"
 
-_TELL_EVERY_ASKS = 5  # A tenth of a second.
+_REPORT_EVERY_ASKS = 5  # A tenth of a second.
 _KEPT_REPORTS = 16
 _UNDER_WAY = ("executing", "long-running")
 
@@ -58,7 +58,7 @@ def run_on_cluster(
     Args:
         version: Version of the server.
         task_function: Function that does tasks, `package.module:name`.
-        must_be_confined: True if there are to be no workers where a part of their confinement is not available.
+        must_be_confined: True to run no task on a machine without complete confinement.
         topic: Topic of the reports.
         kind: The task's kind.
         request: Its request.
@@ -75,7 +75,7 @@ def run_on_cluster(
     def is_abandoned() -> bool:
         nonlocal asks
         asks += 1
-        if asks % _TELL_EVERY_ASKS == 0 and kept:
+        if asks % _REPORT_EVERY_ASKS == 0 and kept:
             reports = [kept.popleft() for _ in range(len(kept))]
             sent = [[report.stage, report.message] for report in reports]
             worker.log_event(topic, {"is": REPORTS, "task": name, "reports": sent})
@@ -115,7 +115,7 @@ def mismatch(address: str, theirs: str, ours: str) -> str:
 
 
 def answer(outcome: Outcome) -> bytes:
-    """An outcome as the frames of `frames`."""
+    """Return an outcome as frames of `frames`."""
     if isinstance(outcome, Failure):
         return failure_frame(outcome)
     parts: list[bytes] = []
@@ -128,7 +128,7 @@ def outcome_of(content: bytes, limits: TaskLimits) -> Outcome:
     """Return the outcome of a serialized answer.
 
     Raises:
-        FrameError: It is no answer.
+        FrameError: The bytes are no answer.
     """
     reader = AnswerReader(limits)
     view = memoryview(content)

@@ -20,7 +20,7 @@ def client_context() -> ssl.SSLContext:
     """Return the TLS context that identifies server and scheduler to each other; read from the files each time.
 
     Raises:
-        WorkersError: Dask's settings do not give it, or a file of theirs cannot be used.
+        WorkersError: Dask's settings name no certificate, key or authority, or a file cannot be used.
     """
     settings: Any = Security()  # type: ignore[no-untyped-call]
     try:
@@ -38,9 +38,9 @@ async def tls_fault(host: str, port: int, limit_s: float) -> str | None:
     """Return the reason why TLS with a scheduler fails; None: it works, or no scheduler is reachable.
 
     Args:
-        host: Its host.
-        port: Its port.
-        limit_s: Time that this may take, in seconds.
+        host: Host of the scheduler.
+        port: Port of the scheduler.
+        limit_s: Longest time for the attempt, in seconds.
     """
     try:
         context = client_context()

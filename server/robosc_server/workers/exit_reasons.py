@@ -25,9 +25,9 @@ class ProcessExit:
     """End of a worker's process.
 
     Attributes:
-        exit_code: Its status, or the signal that ended it, negative.
-        cpu_s: Processor time that it took, in seconds.
-        peak_bytes: Most memory that was resident at once.
+        exit_code: Status of the process; negative: the signal that ended it.
+        cpu_s: CPU time of the process, in seconds.
+        peak_bytes: Peak of its resident memory.
     """
 
     exit_code: int

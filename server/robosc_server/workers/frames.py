@@ -66,7 +66,7 @@ class FrameError(Exception):
 
 
 def frame(tag: Tag, payload: bytes) -> bytes:
-    """A frame."""
+    """Return a frame."""
     return HEADER.pack(tag.value, len(payload)) + payload
 
 
@@ -95,12 +95,12 @@ def task_of(head: bytes, request: bytes) -> tuple[Task, TaskLimits]:
 
 
 def report_frame(report: Report) -> bytes:
-    """A report, cut to what is read of it."""
+    """Return the frame of a report, cut to the length that the server reads."""
     return _json_frame(Tag.REPORT, {"stage": report.stage[:_TEXT_LIMIT], "message": report.message[:_TEXT_LIMIT]})
 
 
 def failure_frame(failure: Failure) -> bytes:
-    """A failure, cut to what is read of it: of the details the end, where a traceback has the fault."""
+    """Return the frame of a failure, cut to the length that the server reads; details keep the end of a traceback."""
     values = {
         "reason": str(failure.reason),
         "message": failure.message[:_TEXT_LIMIT],
@@ -110,7 +110,7 @@ def failure_frame(failure: Failure) -> bytes:
 
 
 def too_large(limits: TaskLimits) -> Failure:
-    """The failure of a task whose result is larger than it may be."""
+    """Return the failure of a task whose result exceeds the limit."""
     return Failure(Reason.RESULT_TOO_LARGE, f"the result exceeds the limit of {limits.result_bytes} bytes")
 
 
@@ -131,10 +131,10 @@ class AnswerReader:
         self._bytes = 0
 
     def read_header(self, header: bytes) -> tuple[Tag, int] | Failure:
-        """Tag and length of the payload that comes next, or why the answer must not be read on.
+        """Return the tag and length of the next payload, or a failure if the answer must not be read further.
 
         Raises:
-            FrameError: It is no frame of a worker.
+            FrameError: The bytes are no frame of a worker.
         """
         mark, length = HEADER.unpack(header)
         try:
@@ -149,7 +149,7 @@ class AnswerReader:
             case Tag.REPORT:
                 self._reports += 1
                 if self._reports > REPORTS_BURST + REPORTS_PER_SECOND * (self._clock() - self._begun_s):
-                    raise FrameError(f"{self._reports} reports, which is more than a task has to tell")
+                    raise FrameError(f"{self._reports} reports, which is more than a task may send")
                 if length > _REPORT_BYTES:
                     raise FrameError(f"a report of {length} bytes")
             case Tag.FAILURE:
@@ -163,10 +163,10 @@ class AnswerReader:
         return tag, length
 
     def read(self, tag: Tag, payload: bytes) -> Report | Outcome | None:
-        """Return the content of a frame; None: more of the result is to come.
+        """Return the content of a frame; None: more messages of the result follow.
 
         Raises:
-            FrameError: It says nothing that a worker may say.
+            FrameError: The content is invalid for a worker.
         """
         match tag:
             case Tag.MESSAGE:
@@ -189,7 +189,7 @@ def _failure(values: dict[str, Any]) -> Failure:
     except ValueError:
         raise FrameError("a failure of no known reason") from None
     if reason not in _WORKER_REASONS:
-        raise FrameError(f"a failure whose reason {reason} is not for workers to tell")
+        raise FrameError(f"a failure whose reason {reason} workers may not report")
     return Failure(reason, _text(values, "message", _TEXT_LIMIT), _text(values, "details", _DETAILS_LIMIT))
 
 

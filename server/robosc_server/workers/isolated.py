@@ -82,14 +82,14 @@ def run_isolated(
         task: Task to do.
         limits: Limits of the task.
         on_report: Callback that receives each report, in another thread; must not wait.
-        should_stop: Function that is asked every 20 ms, in this thread; once true, the process is killed.
+        should_stop: Function that is called every 20 ms, in this thread; if it returns True, the process is killed.
         task_function: Function that does tasks, `package.module:name`.
-        on_cpu_time: Callback that receives the processor time of each process that was busy with it, in another thread,
-            maybe after the outcome; see `Workers.run`.
-        must_be_confined: True if it is not to be done where a part of the confinement is not available.
+        on_cpu_time: Callback that receives the CPU time of each process that ran the task, in another thread, maybe
+            after the outcome; see `Workers.run`.
+        must_be_confined: True to run no task on a machine without complete confinement.
 
     Raises:
-        StoppedError: `should_stop` said so.
+        StoppedError: `should_stop` returned True.
         WorkersError: No process can be started.
     """
     background = _background(task_function, must_be_confined)

@@ -25,7 +25,7 @@ if _LIBRARY is not None:
 
 
 def prctl(option: int, *values: int) -> None:
-    """`prctl(2)`.
+    """Call `prctl(2)`.
 
     Raises:
         OSError: The kernel refuses it, or is not Linux.
@@ -36,7 +36,7 @@ def prctl(option: int, *values: int) -> None:
 
 
 def system_call(number: int, *arguments: int | bytes | None) -> int:
-    """A call of the kernel by its number; bytes are handed over by their address.
+    """Make a system call by its number; bytes are passed by their address.
 
     Raises:
         OSError: The kernel refuses it, or is not Linux.
@@ -65,9 +65,9 @@ def drop_capabilities() -> None:
 
 @cache
 def capabilities() -> list[int]:
-    """Sets of capabilities that this process had when it was asked first, or could hand on.
+    """Return the sets of capabilities that this process had at the first call.
 
-    Its forks have the same, and need not ask again.
+    Forks of the process have the same, and need not read them again.
     """
     lines = Path("/proc/self/status").read_text().splitlines()
     return [int(line.split()[1], 16) for line in lines if line.startswith(("CapInh", "CapPrm", "CapEff", "CapAmb"))]

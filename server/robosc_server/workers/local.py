@@ -75,11 +75,11 @@ class LocalWorkers:
     async def run(
         self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime = ignore_cpu_time
     ) -> Outcome:
-        """The outcome of a task; see `Workers.run`.
+        """Run a task and return its outcome; see `Workers.run`.
 
         Raises:
             WorkersError: No process can be started.
-            WorkerLostError: The fork server ended under it, each time.
+            WorkerLostError: The fork server ended during the task, each time.
         """
         for _ in range(_ATTEMPTS):
             with contextlib.suppress(ForkServerLostError):

@@ -99,7 +99,7 @@ class WorkerPool:
         return self._failures >= _FAILING
 
     async def acquire(self) -> WorkerProcess:
-        """A worker for one task; `terminate` it afterwards.
+        """Return a worker for one task; it must be ended by `terminate` afterwards.
 
         Raises:
             WorkersError: No process can be started.

@@ -27,9 +27,9 @@ class WorkerProcess:
     """A worker process for one task.
 
     Attributes:
-        pid: Its number.
-        task: Task that it is busy with; None before it, and once its outcome is known.
-        end: End of the process, as soon as that is known; None: the fork server that could have reported it is gone.
+        pid: Process id.
+        task: Task that it runs; None before the task, and once its outcome is known.
+        end: End of the process, as soon as that is known; None: the fork server that would report it is gone.
     """
 
     def __init__(self, pid: int, connection: socket.socket, descriptor: int, crash_output: int) -> None:
@@ -73,10 +73,10 @@ class WorkerProcess:
         os.close(self._crash_output)
 
     async def run(self, task: Task, limits: TaskLimits, on_report: OnReport) -> Outcome:
-        """The outcome of a task; the process is of no use afterwards.
+        """Run a task and return its outcome; the process cannot be used afterwards.
 
         Raises:
-            ForkServerLostError: It ended with its fork server, which is not the task's fault.
+            ForkServerLostError: The process ended together with its fork server, which the task has not caused.
         """
         kills = _kills_before()
         self.task = task

@@ -58,10 +58,10 @@ class Sandbox:
         return frozenset() if self._rules is None else frozenset({self._rules.descriptor})
 
     def enter(self) -> None:
-        """Confine this process, for good, by all parts that are not missing.
+        """Confine this process permanently by all parts that are not missing.
 
         Raises:
-            SandboxError: Another part is missing.
+            SandboxError: A further part is missing.
         """
         for words, restrict in self._parts.items():
             if words not in self._faults:
@@ -100,7 +100,7 @@ def _failure_of(restrict: Callable[[], None]) -> str:
 
 
 def close_other_descriptors(kept: Set[int]) -> None:
-    """Close every descriptor but those, and standard input, output and error."""
+    """Close every descriptor except the given ones and standard input, output and error."""
     first = _STANDARD_ERROR + 1
     for number in sorted(number for number in kept if number >= first):
         os.closerange(first, number)

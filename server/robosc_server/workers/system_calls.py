@@ -44,7 +44,7 @@ class Architecture:
     """Architecture of a machine.
 
     Attributes:
-        mark: Kernel's name for it (AUDIT_ARCH_...).
+        mark: Number of the kernel for it (AUDIT_ARCH_...).
         numbers: Numbers of the calls that a worker may make, by name.
     """
 
@@ -148,11 +148,11 @@ class _Instruction:
 
 
 def filter_program(architecture: Architecture, pid: int) -> bytes:
-    """The filter of a process: instructions of 8 bytes.
+    """Return the filter of a process: instructions of 8 bytes.
 
     Args:
         architecture: Architecture of the machine.
-        pid: The process's number, which alone it may send signals to.
+        pid: Process id, the only one to which the process may send signals.
     """
     conditions = _conditions(pid)
     program = [

@@ -20,8 +20,8 @@ from pathlib import Path
 from robosc.execution.runtime.event_log import NullLog
 from robosc.execution.runtime.executor import Executor
 from robosc.model.structure import Deployment
+from robosc_bridge.assembly import Machine, assemble
 from robosc_bridge.configuration import load, map_channels
-from robosc_bridge.daemon.assembly import Machine, assemble
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.daemon.supervisors import Source, obtain

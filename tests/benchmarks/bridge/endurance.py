@@ -28,8 +28,8 @@ from figures import text_table  # noqa: E402  # found through the path above
 from robosc.execution.runtime.event_log import NullLog  # noqa: E402
 from robosc.execution.runtime.executor import Executor  # noqa: E402
 from robosc.model.structure import Deployment  # noqa: E402
+from robosc_bridge.assembly import Machine, assemble  # noqa: E402
 from robosc_bridge.configuration import map_channels, parse  # noqa: E402
-from robosc_bridge.daemon.assembly import Machine, assemble  # noqa: E402
 from robosc_bridge.daemon.states import State  # noqa: E402
 from robosc_bridge.daemon.supervisors import Source, obtain  # noqa: E402
 from robosc_bridge.safety import SafetyLayer  # noqa: E402
@@ -82,7 +82,7 @@ def table(hours: float = HOURS, bases: tuple[str, ...] = tuple(CASES)) -> str:
     return text_table("Endurance of the bridge, in virtual time", HEADER, [_row(base, hours) for base in bases])
 
 
-class Watch:
+class BridgeWatch:
     """Counts of what a bridge does.
 
     Args:
@@ -169,7 +169,7 @@ channels:{WANDERER_CHANNELS}"""
         supervisor = obtain(Source(WANDERER, Deployment.CONTROLLER, None, None), lambda text: None)
         mapping = map_channels(supervisor.model, loaded.configuration, loaded.document)
         machine = assemble(loaded.configuration, mapping, supervisor, NullLog(), starts_itself=True, host=host)
-        watch = Watch(machine, host, CASES[base])
+        watch = BridgeWatch(machine, host, CASES[base])
         # Its place is known at any time, only its distance has to be summed up.
         start_s, place_m, driven_m = host.monotonic(), robot.world.pose[:2], 0.0
         loop = host.thread(lambda: _run(machine), "loop")

@@ -9,6 +9,7 @@ from hypothesis import strategies as st
 
 import robosc_bridge.configuration.structure as structure_module
 from robosc.execution.runtime.settings import Settings
+from robosc_bridge.assembly import EXCHANGE_S
 from robosc_bridge.configuration import Configuration, ConfigurationError, load, parse, schema
 from robosc_bridge.configuration.channels import (
     CHANNELS,
@@ -21,7 +22,6 @@ from robosc_bridge.configuration.channels import (
 from robosc_bridge.configuration.decoding import decode
 from robosc_bridge.configuration.document import Document
 from robosc_bridge.configuration.structure import Execution
-from robosc_bridge.daemon.assembly import EXCHANGE_S
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.skills import RotateSettings
 

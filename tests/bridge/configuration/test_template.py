@@ -11,12 +11,12 @@ from hypothesis import strategies as st
 from robosc.language import load_bundle
 from robosc.model.check import check
 from robosc.model.structure import Model
+from robosc_bridge.assembly import safety_limits
 from robosc_bridge.configuration import Configuration, ConfigurationError, init, map_channels, parse
 from robosc_bridge.configuration import template as template_module
 from robosc_bridge.configuration.document import parse_document
 from robosc_bridge.configuration.structure import TurtleBot
 from robosc_bridge.configuration.template import UDEV_RULES, DriveDriver, ScannerDriver, quoted
-from robosc_bridge.daemon.assembly import safety_limits
 from support.models import EXAMPLES, bundle_of
 
 COMBINATIONS = list(

@@ -8,8 +8,8 @@ import pytest
 
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
+from robosc_bridge.assembly import AssemblyError, check_settings, safety_limits
 from robosc_bridge.configuration import map_channels, parse
-from robosc_bridge.daemon.assembly import AssemblyError, check_settings, safety_limits
 from robosc_bridge.daemon.states import State
 from robosc_bridge.errors import BridgeError
 from robosc_bridge.safety import Reason

@@ -8,10 +8,10 @@ from robosc.certification import make_supervisor
 from robosc.execution.runtime.clock import ManualClock
 from robosc.execution.runtime.event_log import MemoryLog
 from robosc.model.structure import Deployment
+from robosc_bridge.assembly import AssemblyError, assemble, check_settings
 from robosc_bridge.configuration import map_channels, parse
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.structure import Configuration
-from robosc_bridge.daemon.assembly import AssemblyError, assemble, check_settings
 from robosc_bridge.daemon.execution import Job
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.states import State
@@ -186,7 +186,7 @@ def check(configuration: Configuration, mapping: ChannelMapping) -> None:
 
 
 def test_a_line_that_nobody_tells_is_lost_is_refused() -> None:
-    with pytest.raises(AssemblyError, match=r"'correction' \('/line'\) is mapped to 'line', and nothing tells when"):
+    with pytest.raises(AssemblyError, match=r"'correction' \('/line'\) is mapped to 'line', and no message reports a"):
         check(*mapped(lost="{channel: none}"))
     check(*mapped("execution: {max_age_s: {/line: 0.5}}\n", lost="{channel: none}"))
     check(*mapped())

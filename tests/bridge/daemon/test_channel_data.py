@@ -5,7 +5,7 @@ from typing import Any
 
 import pytest
 
-from robosc_bridge.daemon.robot.channel_data import odometry_data, scan_data
+from robosc_bridge.daemon.channel_data import odometry_data, scan_data
 from robosc_bridge.devices.interface import BINS, DriveReading, Pose, RawScan, Scan, Velocity
 
 

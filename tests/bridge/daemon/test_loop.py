@@ -268,7 +268,7 @@ def test_a_turn_that_fails_unheard_is_a_fault() -> None:
     scene.live(0.3, 0.3)
     scene.daemon.post(OperatorCommand.STOP)
     scene.live(0.2, 0.3)
-    assert scene.daemon.problem.startswith("a rotation has failed, and no message of the model tells it so: ")
+    assert scene.daemon.problem.startswith("a rotation has failed, and the model has no message for that: ")
 
 
 def test_the_scan_from_before_the_start_is_decided_on_whatever_the_model_says_of_its_age() -> None:

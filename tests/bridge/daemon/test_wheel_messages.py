@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 
 from robosc.execution.runtime.protocol import DataDoesNotFit
-from robosc_bridge.daemon.robot.channel_data import angle_of, finite, is_default, velocity_of
+from robosc_bridge.daemon.channel_data import angle_of, finite, is_default, velocity_of
 from robosc_bridge.devices.interface import Velocity
 
 

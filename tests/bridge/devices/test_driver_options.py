@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from robosc_bridge.devices.options import DriverOptionError, checked_options, option_types
+from robosc_bridge.driver_options import DriverOptionError, checked_options, option_types
 from robosc_bridge.driver_registry import Driver, Kind, find_driver
 
 PAGE = (Path(__file__).parents[3] / "docs" / "bridge-drivers.md").read_text(encoding="utf-8")

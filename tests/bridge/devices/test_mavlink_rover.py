@@ -213,7 +213,7 @@ def test_a_robot_that_was_moved_while_closed_is_where_it_was(bench: Bench) -> No
 
 
 def test_place_and_attitude_do_where_there_is_no_odometry(bench: Bench) -> None:
-    bench.rover.tells_motion = False
+    bench.rover.reports_motion = False
     bench.start()
     bench.drive(Velocity(0.2, 0.6), 0.5)
     reading = bench.drive(Velocity(-0.2, 0.6), 0.4)

@@ -9,8 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from robosc_bridge.assembly import AssemblyError, drive_base
 from robosc_bridge.configuration import parse
-from robosc_bridge.daemon.assembly import AssemblyError, drive_base
 from robosc_bridge.devices.dynamixel import DynamixelBase
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Pose, Velocity
 from robosc_bridge.devices.opencr import OpenCrBase

@@ -84,7 +84,7 @@ def test_a_program_that_dies_is_told_with_its_last_words(tmp_path: Path) -> None
 def test_a_program_that_says_nothing_is_given_up(tmp_path: Path) -> None:
     text = "import signal; signal.pause()"
     with Program("silent", script(tmp_path, text), tmp_path, is_asked=True) as program:
-        with pytest.raises(ScenarioError, match=r"silent did not tell 'x' in 0\.2 s"):
+        with pytest.raises(ScenarioError, match=r"silent did not print 'x' in 0\.2 s"):
             program.wait_for("x", 0.2)
         with pytest.raises(ScenarioError, match=r"silent did not answer in 0\.1 s"):
             program.answer(0.1)

@@ -7,8 +7,8 @@ import pytest
 from robosc.language import load_bundle
 from robosc.model.check import check
 from robosc.model.structure import Deployment
+from robosc_bridge.assembly import check_settings
 from robosc_bridge.configuration import map_channels, parse
-from robosc_bridge.daemon.assembly import check_settings
 from robosc_experiments import line, maze
 from robosc_experiments.maze import run_maze
 from robosc_experiments.scenario import ScenarioError

@@ -6,11 +6,11 @@ import math
 import pytest
 
 from robosc.execution.runtime.event_log import NullLog
+from robosc_bridge.assembly import assemble
 from robosc_bridge.configuration import map_channels, parse
-from robosc_bridge.daemon.assembly import assemble
 from robosc_bridge.daemon.states import State
+from robosc_bridge.devices.dry_base import DryBase
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Pose, Velocity
-from robosc_bridge.first_drive.dry_base import DryBase
 from robosc_simulated import SimulatedTurtleBot3
 from robosc_simulated.virtual_host import VirtualHost
 from support.daemons import supervisor_of

@@ -42,7 +42,7 @@ def test_times_and_limits() -> None:
         f"with a confirmation count within {command_handler.REPEATED_S:g} s",
         f"not answered within {command_handler.ANSWER_LIMIT_S:g} s",
         f"Without one for {driving.SILENCE_S:g} s",
-        f"Without it for {session.STATION_LIMIT_S:g} s a text",
+        f"After {session.STATION_LIMIT_S:g} s without a heartbeat, a text",
         f"has been idle for {session.IDLE_S * 1000:g} ms",
         f"of more than {status_texts.MOST_WAITING} chunks that wait",
         f"At most {session.MESSAGES_PER_S:g} messages a second",

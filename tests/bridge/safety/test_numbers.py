@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 
 from robosc_bridge import driver_registry
+from robosc_bridge.assembly import KEYS, safety_limits
 from robosc_bridge.configuration import ConfigurationError, parse
 from robosc_bridge.configuration.structure import schema
-from robosc_bridge.daemon.assembly import KEYS, safety_limits
 from robosc_bridge.driver_registry import Driver, DriverFeatures, Kind, available_drivers, features_of, register
 from robosc_bridge.safety import SCAN_TIMEOUTS_S, SafetyLimits
 from robosc_bridge.safety.limits import BOUNDS, REVOLUTIONS, SCAN_TIMEOUT_S

@@ -138,7 +138,7 @@ def test_messages_come_as_often_as_they_are_asked_for() -> None:
     assert math.isnan(told[0].values["pose_covariance"][0])
     station.rover.has_origin = False
     assert "ODOMETRY" not in [packet.name for packet in station.passing(0.5)]
-    station.rover.tells_motion = False
+    station.rover.reports_motion = False
     assert station.result(511, 331, 100_000) == UNSUPPORTED
 
 

@@ -237,15 +237,15 @@ def test_a_state_to_begin_in_is_chosen_and_kept(tmp_path: Path) -> None:
     asyncio.run(run())
 
 
-def test_chance_and_trouble(tmp_path: Path) -> None:
+def test_chance_and_findings(tmp_path: Path) -> None:
     async def run() -> None:
         async with serving(played(tmp_path / "tank.cif")) as url, opened(url) as page:
             await page.told("run")
             told = await done(page, "walk", steps=30, seed=2)
             assert (told["steps"], told["lines"]) == (30, ["30 events by chance, seed 2"])
             assert all(entry["transitions"] for entry in page.entries())
-            told = await done(page, "walk", steps=1000, seed=1, until_trouble=True)
-            assert told["kind"] == "trouble" and told["lines"][0].startswith("blocked at tank.c_fill after ")
+            told = await done(page, "walk", steps=1000, seed=1, until_finding=True)
+            assert told["kind"] == "finding" and told["lines"][0].startswith("blocked at tank.c_fill after ")
 
     asyncio.run(run())
 
@@ -414,7 +414,7 @@ def test_a_model_without_a_supervisor_and_one_with_errors(tmp_path: Path, capsys
     [
         (["--log", "run.jsonl", "--model", "tank.cif"], "--log: event logs are of robots, not of automata"),
         (["--ros2", "--model", "tank.gen"], "--ros2: a node is generated from a model of a robot"),
-        (["--bridge", "127.0.0.1:1", "--model", "tank.cif"], "a bridge tells its model itself"),
+        (["--bridge", "127.0.0.1:1", "--model", "tank.cif"], "a bridge sends its model itself"),
         (["tank.wmod", "--scene", "room"], "--scene: automata are nowhere"),
         (["tank.cif", "-L", "."], "-L: automata import no libraries"),
         (["tank.cif", "--deployment", "layer"], "--deployment: automata are not a node"),

@@ -15,8 +15,8 @@ from robosc.cli.output import CommandError
 from robosc.execution.runtime.event_log import json_line
 from robosc_api.security import add_client_arguments
 from robosc_bridge.configuration import parse
-from robosc_bridge.daemon.endpoints import is_remote, is_startable
 from robosc_bridge.daemon.view_settings import ADDRESS, settings_of
+from robosc_bridge.endpoints import is_remote, is_startable
 from robosc_view import command
 from support.hostile_models import products
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
@@ -92,7 +92,7 @@ def test_wrong_use(files: tuple[Path, Path], tmp_path: Path) -> None:
 
     assert "what is shown?" in why()
     assert "needs --model" in why("--log", log)
-    assert "tells its model itself" in why("--bridge", "127.0.0.1:1", "--model", model)
+    assert "sends its model itself" in why("--bridge", "127.0.0.1:1", "--model", model)
     assert "--ros2" in why("--bridge", "127.0.0.1:1", "--namespace", "x")
     assert "cannot read" in why("--log", str(tmp_path / "none"), "--model", model)
     assert "there is no file" in why("--log", log, "--model", str(tmp_path / "none.rscd"))

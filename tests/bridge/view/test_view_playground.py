@@ -378,7 +378,7 @@ def test_events_happen_with_their_data_and_are_taken_back() -> None:
     asyncio.run(run())
 
 
-def test_chance_and_trouble() -> None:
+def test_chance_and_findings() -> None:
     async def run() -> None:
         async with looking(Playing()) as page:
             told = await page.told("run")
@@ -389,9 +389,9 @@ def test_chance_and_trouble() -> None:
                 step.event for step in twin.walk(12, 3)
             ]
             told = await done(page, "restart")
-            told = await done(page, "walk", steps=1000, seed=0, until_trouble=True)
+            told = await done(page, "walk", steps=1000, seed=0, until_finding=True)
             twin.restart()
-            assert (told["kind"], told["lines"]) == ("trouble", [str(twin.walk_until_trouble(1000, 0))])
+            assert (told["kind"], told["lines"]) == ("finding", [str(twin.walk_until_finding(1000, 0))])
             assert told["steps"] == len(twin)
             for _ in range(4):
                 told = await done(page, "walk", steps=5000, seed=1)

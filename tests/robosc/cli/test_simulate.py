@@ -123,17 +123,17 @@ def test_for_machines(capsys: pytest.CaptureFixture[str]) -> None:
     assert end["message"].startswith("wrong.txt:1: 'halt.request' is not allowed now: Base is in idle, not in moving")
 
 
-def test_chance_is_the_same_again_and_trouble_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_chance_is_the_same_again_and_a_finding_is_reported(capsys: pytest.CaptureFixture[str]) -> None:
     outputs = []
     for seed in ("4", "4", "5"):
         assert main(["simulate", "gate.rscd", "--random", "20", "--seed", seed]) == 0
         outputs.append(capsys.readouterr().out)
     assert outputs[0] == outputs[1] != outputs[2]
     assert len(re.findall(r"^ *\d+  ", outputs[0], re.MULTILINE)) == 20
-    assert main(["simulate", "gate.rscd", "--until-trouble", "500", "--json"]) == 1
+    assert main(["simulate", "gate.rscd", "--until-finding", "500", "--json"]) == 1
     *_, end = map(json.loads, capsys.readouterr().out.splitlines())
-    assert (end["status"], end["trouble"]["kind"], end["trouble"]["event"]) == ("trouble", "blocked", "move.request")
-    words = ["--until-trouble", "200", "--trouble", "deadlock", "--trouble", "unknown"]
+    assert (end["status"], end["finding"]["kind"], end["finding"]["event"]) == ("finding", "blocked", "move.request")
+    words = ["--until-finding", "200", "--finding", "deadlock", "--finding", "unknown"]
     assert main(["simulate", "gate.rscd", *words]) == 0
 
 
@@ -152,8 +152,8 @@ def test_a_saved_log_is_taken_as_events_and_checked(capsys: pytest.CaptureFixtur
         (["--events", "none.txt"], 2, "cannot read none.txt: No such file or directory"),
         (["--events", "gate.rscd"], 1, "gate.rscd:1: what follows robot is neither JSON nor name=value: Gate {"),
         (["--random", "0"], 2, "invalid number of events from 1 to 1000000 value: '0'"),
-        (["--trouble", "deadlock"], 2, "--trouble says what --until-trouble looks for: it needs that"),
-        (["--json"], 2, "--json and --save need events: --events, --random or --until-trouble"),
+        (["--finding", "deadlock"], 2, "--finding says what --until-finding looks for: it needs that"),
+        (["--json"], 2, "--json and --save need events: --events, --random or --until-finding"),
         (["--random", "3", "--save", "x.txt"], 2, "x.txt: the name of a saved run ends in .jsonl"),
         (["--random", "3", "--save", "none/x.py"], 2, "cannot write none/x.py: No such file or directory"),
     ],
@@ -187,7 +187,7 @@ def test_commands_from_a_file(capsys: pytest.CaptureFixture[str], monkeypatch: p
         history
         random 2 7
         random 25 7
-        until-trouble 50 3
+        until-finding 50 3
         save run.jsonl
         restart
         help
@@ -229,7 +229,7 @@ def test_commands_from_a_file(capsys: pytest.CaptureFixture[str], monkeypatch: p
         ("undo 0", "N is a number from 1 to 1000000: undo [N]"),
         ("random", "N is a number from 1 to 1000000: random N [SEED]"),
         ("random x", "'x' is not a whole number: random N [SEED]"),
-        ("until-trouble 1 2 3", "too many words: until-trouble [N] [SEED]"),
+        ("until-finding 1 2 3", "too many words: until-finding [N] [SEED]"),
         ("save", "save to which file?"),
         ("save x.doc", "x.doc: the name of a saved run ends in .jsonl (an event log) or .py (a test)"),
         ("state now", "state takes nothing more"),
@@ -250,7 +250,7 @@ def test_completion(folder: Path) -> None:
     assert made is not None
     shell = Shell(Run(made), ModelOfTest(folder / "gate.rscd"))
     first = shell.words_after("")
-    assert {"scan.response ", "until-trouble ", "quit "} <= set(first)
+    assert {"scan.response ", "until-finding ", "quit "} <= set(first)
     assert "move.request " not in first
     assert shell.words_after("why ") == ["move.request", "halt.request"]
     assert shell.words_after("scan.response ") == ["front=", "class="]

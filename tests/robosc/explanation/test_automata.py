@@ -24,7 +24,7 @@ from robosc.automata import (
 from robosc.automata.state import Subject, subjects
 from robosc.cif import check_cif, load_cif
 from robosc.explanation import Explanation, RequestError, SystemWords, explain_synthesis, explanation_text
-from robosc.explanation.explanations import StateReport, StateValues
+from robosc.explanation.parts import StateReport, StateValues
 from robosc.explanation.requests import SystemQuestionReader
 from robosc.explanation.requirement_automata import as_conditions
 from robosc.expressions import Binary, Constant, IntegerType, StateTest, Unary, VariableRead

@@ -13,7 +13,8 @@ from robosc.automata.state import Subject, subjects
 from robosc.errors import UnsupportedModelError
 from robosc.explanation import Explanation, ModelWords, RequestError, explain_synthesis, explanation_text
 from robosc.explanation.constraints import ConstraintKind, relaxable_constraints, without_ranges
-from robosc.explanation.explanations import EventReport, document
+from robosc.explanation.explanations import document
+from robosc.explanation.parts import EventReport
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model, is_tau
 from robosc.source import Location

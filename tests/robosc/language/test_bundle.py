@@ -1,4 +1,4 @@
-"""Tests of the places of libraries, of the files that become part of a bundle, and of files that cannot be read."""
+"""Tests of the libraries of a text, their places, the files of a bundle, and files that cannot be read."""
 
 import os
 from pathlib import Path
@@ -7,6 +7,7 @@ import pytest
 
 from robosc.errors import LanguageError
 from robosc.language import load_bundle
+from robosc.language.bundle import declared_libraries, imported_libraries
 from robosc.model.check import check
 
 LIBRARY = "library {name} {{ component {component} {{ incoming message {message} with type: none }} }}"
@@ -155,3 +156,36 @@ def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path) -> None:
     path = tmp_path / "model.rscd"
     path.write_bytes(b"\xef\xbb\xbfrobot R { component C { incoming message m with type: none } }")
     assert check(load_bundle(path)).diagnostics == ()
+
+
+@pytest.mark.parametrize(
+    ("text", "libraries"),
+    [
+        ("library Lib { }", {"Lib"}),
+        ("library ^state { }", {"state"}),
+        ("library Lib", {"Lib"}),
+        ("// library Not {\nlibrary /* x */ Lib { component }", {"Lib"}),
+        ('robot R { component C { incoming message m with identifier: "library Not {" } }', set()),
+        ("'it\\'s library Not' library Lib {", {"Lib"}),
+        ("/* library Not */", set()),
+        # Where something is never closed, more may have been meant.
+        ("/* library /* Lib", {"Lib"}),
+        ("'\nlibrary Lib { 'it' }", {"Lib"}),
+        ("mylibrary Not { ^library Not", set()),
+    ],
+)
+def test_declared_libraries(text: str, libraries: set[str]) -> None:
+    assert declared_libraries(text) == libraries
+
+
+def test_imported_libraries_come_in_the_order_of_the_text() -> None:
+    text = "component A from Two import X component B from One import Y component C from Two import Z // from No import"
+    assert imported_libraries(text) == ("Two", "One")
+    assert imported_libraries("on response from m interface i use T from p") == ()
+
+
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize("piece", ["/*", "'\\", '"\\', "library ", "from x "])
+def test_hidden_text_is_looked_at_once(piece: str) -> None:
+    assert imported_libraries(piece * 300_000) == ()
+    assert len(declared_libraries(piece * 300_000)) <= 1

@@ -18,7 +18,7 @@ from robosc.model.check import check
 from robosc.model.interfaces import headers_of as known_headers
 from robosc.model.message_fields import Fault
 from robosc.source import Bundle, SourceFile
-from robosc.targets.ros.errors import ROS2_ERRORS
+from robosc.targets.ros.package import ROS2_ERRORS
 from robosc.targets.ros.runtime.messages import SetupError, check_shape, headers_of
 from support.models import checked, marked_place
 

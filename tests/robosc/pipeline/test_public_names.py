@@ -21,7 +21,7 @@ VALUES = [
         "SystemSupervisor",
         "SystemSynthesis",
     ),
-    *("Trouble", "TroubleKind", "Verification", "VerificationStatus"),
+    *("Verification", "VerificationStatus", "WalkFinding", "WalkFindingKind"),
 ]
 ERRORS = [
     *(

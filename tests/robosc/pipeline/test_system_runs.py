@@ -15,7 +15,7 @@ from robosc.automata import DiscreteVariable, EventCondition, InputVariable, Rol
 from robosc.automata.compile import State
 from robosc.expressions import Binary, Constant, EnumType, IntegerType, StateTest, Unary
 from robosc.pipeline.system_runs import initial_states_in_words
-from robosc.pipeline.walking import TroubleKind
+from robosc.pipeline.walking import WalkFindingKind
 from support.effort import examples
 from support.naive_system import NaiveSystem
 from support.random_systems import system_seeds, wide_system
@@ -196,9 +196,9 @@ def test_walks_go_along_the_graph(seed: int) -> None:
     places = [names.index(item) for item in (initial, *(step.state.parts for step in steps))]
     assert {(a, step.event, b) for a, step, b in zip(places, steps, places[1:], strict=False)} <= set(graph.transitions)
     assert robosc.simulate(supervisor, initial=initial).walk(STEPS, seed) == steps
-    # Nonblocking, so that trouble is only what is forbidden.
-    trouble = run.walk_until_trouble(50, seed)
-    assert trouble is None or (trouble.kind is TroubleKind.BLOCKED and trouble.event in run.blocked())
+    # Nonblocking, so that the only findings are blocked requests.
+    finding = run.walk_until_finding(50, seed)
+    assert finding is None or (finding.kind is WalkFindingKind.BLOCKED and finding.event in run.blocked())
 
 
 def test_a_line_by_hand() -> None:

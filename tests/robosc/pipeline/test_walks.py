@@ -1,4 +1,4 @@
-"""Undo, redo and walks by chance: against runs that begin anew, the replay of logs, and a slow look for trouble."""
+"""Undo, redo and walks by chance: against runs that begin anew, the replay of logs, and a slow search for findings."""
 
 import io
 import itertools
@@ -15,7 +15,7 @@ from robosc.event_logs.replay import Replay
 from robosc.model.structure import Deployment
 from robosc.pipeline.received_data import NO_DATA
 from robosc.pipeline.saved_runs import event_log
-from robosc.pipeline.walking import TroubleKind
+from robosc.pipeline.walking import WalkFindingKind
 from robosc.supervisor import Supervisor
 from support.effort import seeds
 from support.random_supervisors import random_supervisor
@@ -135,10 +135,10 @@ def test_there_is_a_reason_if_and_only_if_an_event_cannot_happen(seed: int) -> N
 
 @pytest.mark.random
 @pytest.mark.parametrize("seed", seeds(20))
-def test_trouble_is_what_a_slow_look_at_the_run_finds(seed: int) -> None:
+def test_a_finding_is_what_a_slow_look_at_the_run_finds(seed: int) -> None:
     core = random_supervisor(seed)
     run = robosc.simulate(core)
-    trouble = run.walk_until_trouble(STEPS, seed, {TroubleKind.DEADLOCK, TroubleKind.WAITING})
+    finding = run.walk_until_finding(STEPS, seed, {WalkFindingKind.DEADLOCK, WalkFindingKind.WAITING})
     found = []
     for count in range(len(run) + 1):
         twin = again(core, run.history[:count])
@@ -150,11 +150,11 @@ def test_trouble_is_what_a_slow_look_at_the_run_finds(seed: int) -> None:
         if is_marked or any(twin.is_controllable(event) for event in twin.possible):
             continue
         if not twin.possible:
-            found.append((TroubleKind.DEADLOCK, count))
+            found.append((WalkFindingKind.DEADLOCK, count))
         elif not busy:
-            found.append((TroubleKind.WAITING, count))
-    assert found == ([] if trouble is None else [(trouble.kind, trouble.steps)])
-    assert trouble is None or trouble.steps == len(run)
+            found.append((WalkFindingKind.WAITING, count))
+    assert found == ([] if finding is None else [(finding.kind, finding.steps)])
+    assert finding is None or finding.steps == len(run)
 
 
 def supervisor_of(text: str, deployment: Deployment = Deployment.CONTROLLER) -> robosc.Supervisor:
@@ -180,33 +180,33 @@ DOOR = """robot R {
 }"""
 
 
-def test_a_walk_tells_each_trouble_once_and_goes_on() -> None:
+def test_a_walk_reports_each_finding_once_and_goes_on() -> None:
     run = robosc.simulate(supervisor_of(DOOR))
-    first = run.walk_until_trouble(100, 3)
+    first = run.walk_until_finding(100, 3)
     told = [first]
     while told[-1] is not None and len(told) < 50:
-        told.append(run.walk_until_trouble(100, 3))
+        told.append(run.walk_until_finding(100, 3))
     texts = [str(item) for item in told[:-1] if item is not None]
     assert told[-1] is None
-    waiting = [item for item in told if item is not None and item.kind is TroubleKind.WAITING]
+    waiting = [item for item in told if item is not None and item.kind is WalkFindingKind.WAITING]
     (only,) = waiting
     assert "it can only wait for seen.response" in str(only)
     assert any(text.startswith("blocked at shut.request after ") and "Light.n is" in text for text in texts)
     run.restart()
-    assert run.walk_until_trouble(100, 3) == first
+    assert run.walk_until_finding(100, 3) == first
 
 
 def test_only_the_kinds_that_are_asked_for_are_told() -> None:
     run = robosc.simulate(supervisor_of(DOOR))
-    found = run.walk_until_trouble(100, 0, {TroubleKind.BLOCKED})
+    found = run.walk_until_finding(100, 0, {WalkFindingKind.BLOCKED})
     assert found is not None
-    assert found.kind is TroubleKind.BLOCKED
+    assert found.kind is WalkFindingKind.BLOCKED
     # A request that is blocked has not happened.
     assert found.steps == len(run)
-    assert robosc.simulate(supervisor_of(DOOR)).walk_until_trouble(100, 0, {TroubleKind.UNKNOWN}) is None
+    assert robosc.simulate(supervisor_of(DOOR)).walk_until_finding(100, 0, {WalkFindingKind.UNKNOWN}) is None
 
 
-def test_something_unknown_is_trouble() -> None:
+def test_something_unknown_is_a_finding() -> None:
     text = """robot R {
         component S {
             outgoing message level with identifier: "/level", type: integer
@@ -220,14 +220,14 @@ def test_something_unknown_is_trouble() -> None:
         provide tell with 3 + S.n
     }"""
     run = robosc.simulate(supervisor_of(text))
-    found = run.walk_until_trouble(200, 1)
+    found = run.walk_until_finding(200, 1)
     assert found is not None
-    assert found.kind is TroubleKind.UNKNOWN
+    assert found.kind is WalkFindingKind.UNKNOWN
     assert "unknown" in str(found)
     run.restart()
     # A request whose data is unknown is not issued by chance; by hand it is, and says so.
     run.step("level.response", 0)
-    found_at = [found.event for seed in range(20) if (found := run.walk_until_trouble(1, seed)) is not None]
+    found_at = [found.event for seed in range(20) if (found := run.walk_until_finding(1, seed)) is not None]
     assert "tell.request" in found_at
     assert "tell.request" not in [step.event for step in run.walk(20)]
     run.restart()
@@ -270,7 +270,7 @@ def test_a_walk_ends_where_nothing_can_happen() -> None:
     run = robosc.simulate(supervisor_of(text))
     assert [step.event for step in run.walk(10)] == ["go.request"]
     assert run.walk(10) == ()
-    assert run.walk_until_trouble() is None
+    assert run.walk_until_finding() is None
     assert (run.possible, run.undo() is not None, run.possible) == ((), True, ("go.request",))
     assert run.redo() is not None
     assert run.redo() is None

@@ -7,11 +7,10 @@ from pathlib import Path
 
 import pytest
 
-from robosc_server.failures import RefusedError
 from robosc_server.jobs import Caller, JobLimits, QueueLimits, runner
 from robosc_server.store import JobFilter, JobRecord, JobState, StoreUnavailableError
 from robosc_server.store.records import STEP
-from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskKind
+from robosc_server.tasks.task import Failure, Reason, RefusedError, Report, Result, TaskKind
 from support.held_time import HeldLoop, on_held_time
 from support.job_parts import (
     ME,

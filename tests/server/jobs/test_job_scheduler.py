@@ -8,9 +8,8 @@ import hypothesis.strategies as st
 import pytest
 from hypothesis import given, settings
 
-from robosc_server.failures import RefusedError
 from robosc_server.jobs.scheduler import Place, QueueLimits, Scheduler
-from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskLimits
+from robosc_server.tasks.task import Failure, Reason, RefusedError, Report, Result, TaskLimits
 from support.effort import examples
 from support.job_workers import ScriptedWorkers, task_of
 

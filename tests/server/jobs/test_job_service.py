@@ -16,13 +16,12 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc_api.v1 import jobs_pb2 as pb
-from robosc_server.failures import RefusedError
 from robosc_server.jobs import Caller, JobLimits, QueueLimits, caller_of
 from robosc_server.jobs.convert import page_position, page_token, result_response
 from robosc_server.jobs.manager import JobManager
 from robosc_server.jobs.service import Context, JobService
 from robosc_server.store import JobFilter, JobRecord, JobState, StoreUnavailableError
-from robosc_server.tasks.task import Reason, TaskKind
+from robosc_server.tasks.task import Reason, RefusedError, TaskKind
 from support.effort import examples
 from support.job_parts import Choices, Parts, in_loop, offered, parts
 from support.job_workers import messages_for, task_message

@@ -10,11 +10,10 @@ import pytest
 from hypothesis import given, settings
 from sqlalchemy import CursorResult
 
-from robosc_server.failures import RefusedError
 from robosc_server.jobs import Caller, JobLimits, retention
 from robosc_server.store import JobState, open_store
 from robosc_server.store.eviction import choose_evicted
-from robosc_server.tasks.task import Reason, Result
+from robosc_server.tasks.task import Reason, RefusedError, Result
 from support.effort import examples
 from support.job_parts import ME, Choices, Times, ended, in_loop, is_in, parts, sweep_by_hand
 from support.job_workers import task_of

@@ -4,7 +4,7 @@ from contextlib import ExitStack
 from dataclasses import replace
 from typing import Any
 
-from robosc_server.jobs.watchers import PROGRESS_PER_SECOND, Watch, Watchers
+from robosc_server.jobs.watchers import PROGRESS_PER_SECOND, JobWatch, Watchers
 from robosc_server.store import JobRecord, JobState
 from robosc_server.tasks.task import TaskKind
 from support.held_time import HeldLoop, on_held_time
@@ -18,7 +18,7 @@ def state(revision: int, state: JobState = JobState.RUNNING) -> JobRecord:
     return replace(QUEUED, state=state, revision=revision)
 
 
-async def told(watch: Watch) -> int:
+async def told(watch: JobWatch) -> int:
     record = await watch.next_record()
     assert record is not None
     return record.revision
@@ -28,7 +28,7 @@ def timers(loop: Any) -> list[Any]:
     return [timer for timer in loop._scheduled if not timer.cancelled()]
 
 
-def has_news(watch: Watch) -> bool:
+def has_news(watch: JobWatch) -> bool:
     return watch._has_news.is_set()
 
 

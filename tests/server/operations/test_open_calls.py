@@ -14,9 +14,8 @@ from robosc_api.security import Quota, Scope, make_token
 from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc, synthesis_pb2_grpc
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server import application
-from robosc_server.failures import RefusedError
 from robosc_server.operations.open_calls import HEALTH_CALLS_PER_CALLER, CallLimits, OpenCalls
-from robosc_server.tasks.task import Reason
+from robosc_server.tasks.task import Reason, RefusedError
 from support.job_workers import StartedWorkers
 from support.service import served
 from support.strangers import Stranger, strangers

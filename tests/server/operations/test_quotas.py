@@ -8,10 +8,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc_api.security import Quota, Scope, TokenFile, make_token
-from robosc_server.failures import RefusedError
 from robosc_server.jobs.scheduler import QueueLimits, Scheduler
 from robosc_server.operations.quotas import Bucket, Quotas
-from robosc_server.tasks.task import Reason, Report, TaskLimits
+from robosc_server.tasks.task import Reason, RefusedError, Report, TaskLimits
 from support.job_workers import ScriptedWorkers, task_of
 
 

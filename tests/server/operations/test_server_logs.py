@@ -10,7 +10,7 @@ import structlog
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc_server.failures import public_failure
+from robosc_server.operations.failures import public_failure
 from robosc_server.operations.logs import REQUEST_ID, log_fault, request_id_of
 from robosc_server.operations.settings import LogFormat, LogLevel
 from robosc_server.tasks.task import Failure, Reason
@@ -130,7 +130,7 @@ def test_how_a_worker_died_is_logged_and_an_exception_in_it_is_not() -> None:
         f'  File "/x/robosc_server/tasks/run.py", line 3, in {MARKER}\n',
         f'  File "/{MARKER}/robosc_server/tasks/run.py", line 3, in x\n',
         f"{MARKER}: {MARKER}",
-        f"robosc_server.failures.{MARKER}: no",
+        f"robosc_server.operations.failures.{MARKER}: no",
         f"builtins.{MARKER}",
         MARKER,
     ],

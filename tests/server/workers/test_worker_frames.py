@@ -120,5 +120,5 @@ def test_a_failure_is_cut_and_cleaned() -> None:
 
 @pytest.mark.parametrize("reason", [Reason.UNAUTHENTICATED, Reason.SERVER_BUSY, Reason.NO_SUCH_JOB])
 def test_a_worker_may_not_speak_for_the_server(reason: Reason) -> None:
-    with pytest.raises(FrameError, match="not for workers to tell"):
+    with pytest.raises(FrameError, match="workers may not report"):
         read(failure_frame(Failure(reason, "what?")))

@@ -11,6 +11,7 @@ from typing import Any
 from robosc.model.structure import Communication, CommunicationKind
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
+from robosc_bridge.daemon.executor_inputs import Listeners, Supervised
 from robosc_bridge.daemon.programs.items import (
     CallFailed,
     CallMade,
@@ -25,7 +26,6 @@ from robosc_bridge.daemon.programs.items import (
     Program,
     Replied,
 )
-from robosc_bridge.daemon.robot.executor_inputs import Listeners, Supervised
 
 _log = logging.getLogger(__name__)
 
@@ -78,25 +78,25 @@ class ProgramChannel:
     # The model's side.
 
     def forget(self) -> None:
-        """A run is over, or a new one begins: calls and goals of before mean nothing any more."""
+        """Forget the calls and goals of the last run, when a run ends or a new one begins."""
         for number in [number for number, item in self._open.items() if item.is_goal]:
             self._cancel(number)
         self._open.clear()
 
     def send(self, communication: Communication, data: Any) -> None:
-        """The model sends a message."""
+        """Send a message of the model to all programs."""
         self._clients.send_all(MessageSent(communication.name, communication.identifier, data))
 
     def call(self, communication: Communication, number: int, data: Any) -> str:
-        """The model calls a service; why nobody is asked."""
+        """Send a call of the model to the program that serves it; return why there is none, or an empty text."""
         return self._ask(communication, number, data, is_goal=False)
 
     def send_goal(self, communication: Communication, number: int, data: Any) -> bool:
-        """The model asks for an action; whether somebody is asked."""
+        """Send a goal of the model to the program that serves its action; return True if there is one."""
         return not self._ask(communication, number, data, is_goal=True)
 
     def cancel(self, number: int) -> None:
-        """The model wants a goal to end."""
+        """Cancel a goal of the model."""
         for own, item in self._open.items():
             if item.is_goal and item.number == number:
                 self._cancel(own)
@@ -124,7 +124,7 @@ class ProgramChannel:
     # The programs' side.
 
     def attach(self, program: Program) -> None:
-        """A program is there: what it serves that nobody serves yet is asked of it from now on."""
+        """Assign to a new program the services and actions that it offers and that no other program serves."""
         for name in sorted(program.serves):
             if name not in self._services:
                 self._clients.refuse(
@@ -136,7 +136,7 @@ class ProgramChannel:
                 self._servers[name] = program
 
     def detach(self, program: Program, executor: Supervised | None) -> None:
-        """A program is gone: what it was asked for has failed."""
+        """Let the open calls and goals of a program that is gone fail."""
         self._servers = {name: server for name, server in self._servers.items() if server is not program}
         lost = [own for own, item in self._open.items() if item.program is program]
         for item in [self._open.pop(own) for own in lost]:
@@ -148,14 +148,14 @@ class ProgramChannel:
                 executor.on_call_failed(item.number, why)
 
     def receive(self, item: MessageReceived, executor: Supervised | None) -> None:
-        """A program tells the model something; while nothing is executed, nobody listens."""
+        """Pass a program's message to the model; it is dropped while nothing is executed."""
         if item.identifier not in self._heard:
             self._clients.refuse(item.program, f"the model hears nothing on '{item.identifier:.255}' from programs")
         elif executor is not None:
             executor.receive(item.identifier, item.data)
 
     def take(self, item: Answer, executor: Supervised | None) -> None:
-        """A program says what has become of a call or goal of the model."""
+        """Pass a program's answer to a call or goal on to the executor."""
         asked = self._open.get(item.number)
         is_goal = not isinstance(item, Replied | CallFailed)
         if executor is None or asked is None or asked.program is not item.program or asked.is_goal is not is_goal:

@@ -85,7 +85,7 @@ class ProgramInbox:
         self._waiting: dict[Program, _Waiting] = {}
 
     def put(self, item: FromProgram) -> None:
-        """Tell the loop something; waits for nobody but another `put` or `take`."""
+        """Put an item of a program into the inbox; waits for nothing but another `put` or `take`."""
         # Here and not in the loop: looking through data takes time.
         is_always_taken = isinstance(item, Attached | Detached)
         arrived, weight = (item, 0) if is_always_taken else self._looked_through(item)
@@ -119,7 +119,7 @@ class ProgramInbox:
         return not self._waiting
 
     def take(self) -> Arrived | None:
-        """The next of what waits, one of each program in turn; None: nothing does."""
+        """Return the next item, one of each program in turn; None: no item waits."""
         with self._lock:
             if not self._waiting:
                 return None

@@ -27,7 +27,7 @@ class _Weighed:
         return weight_bytes(self.data)
 
 
-# What the loop tells a program, as the model's other side.
+# Items that the loop sends to a program which serves communications of the model.
 
 
 @dataclass(frozen=True)
@@ -50,7 +50,7 @@ class CallMade(_Weighed):
 
 @dataclass(frozen=True)
 class GoalMade(_Weighed):
-    """The model asks for an action that this program serves; `GoalAccepted`, then a `GoalEnded` are awaited."""
+    """The model sends a goal of an action that this program serves; `GoalAccepted`, then `GoalEnded` are awaited."""
 
     name: str
     number: int
@@ -65,7 +65,7 @@ class CancelMade:
     number: int
 
 
-# What the loop tells a program, as the caller of a supervision layer.
+# Items that the loop sends to a program which calls a supervision layer.
 
 
 @dataclass(frozen=True)
@@ -163,7 +163,7 @@ class Program:
     may_request: bool = False
 
 
-# What a program tells the loop.
+# Items that a program sends to the loop.
 
 
 @dataclass(frozen=True)

@@ -33,7 +33,7 @@ _MAXIMUM_BITS = 64
 
 
 def why_not_plain(data: Any) -> str:
-    """Return the reason why data of a program is not taken at all.
+    """Return the reason why data of a program is refused as a whole.
 
     One sentence; empty: the data is plain and of a reasonable size.
     """
@@ -77,7 +77,7 @@ def weight_bytes(data: Any) -> int:
 
 
 def why_not_shaped(shape: Shape, data: Any) -> str:
-    """Return the reason why data is not what a channel takes, one sentence; empty: it is.
+    """Return the reason why data does not have the shape of a channel, one sentence; empty: it has.
 
     A part that is left out, or None, is the default.
 
@@ -89,7 +89,7 @@ def why_not_shaped(shape: Shape, data: Any) -> str:
 
 
 def why_not_typed(model: Model, type_: Type | None, data: Any) -> str:
-    """Return the reason why data is not what a model expects, one sentence; empty: it is.
+    """Return the reason why data does not have the type that a model expects, one sentence; empty: it has.
 
     Parts that the model does not name are not judged.
 
@@ -124,9 +124,9 @@ def completed(model: Model, type_: Type | None, data: Any) -> Any:
 
 
 def accepted(model: Model, type_: Type | None, shape: Shape) -> Shape:
-    """Return, of the shapes that a channel takes, the one in which a model sees the data.
+    """Return the shape of a channel that the type of a model has, if the channel accepts several shapes.
 
-    The data that the model reads is the data that is acted on.
+    So the wheels act on the same data that the model reads.
 
     Args:
         model: Model that the type belongs to.
@@ -212,7 +212,7 @@ def _words(model: Model, type_: Type | None) -> str:
 
 
 def is_number(data: Any) -> bool:
-    """Return True if data is a number: true and false are none."""
+    """Return True if data is a number; booleans are no numbers."""
     return isinstance(data, int | float) and not isinstance(data, bool)
 
 

@@ -13,6 +13,7 @@ from robosc.model.structure import Communication, CommunicationKind, Model
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import CHANNELS, Channel, RotateChannel, channel_name
 from robosc_bridge.configuration.shapes import Shape
+from robosc_bridge.daemon.channel_data import angle_of
 from robosc_bridge.daemon.programs.items import (
     CallRequested,
     CancelRequested,
@@ -21,7 +22,6 @@ from robosc_bridge.daemon.programs.items import (
     MessageRequested,
 )
 from robosc_bridge.daemon.programs.plain_data import accepted, completed, is_number, why_not_shaped, why_not_typed
-from robosc_bridge.daemon.robot.channel_data import angle_of
 from robosc_bridge.skills.rotate import MAXIMUM_ANGLE_RAD
 
 MAXIMUM_ID = 255
@@ -72,7 +72,7 @@ class RequestChecker:
         """Return an item of a program as the layer receives it: data that is left out is zero, false or empty.
 
         Raises:
-            InvalidRequestError: The item asks for something that makes no sense, whatever the layer does.
+            InvalidRequestError: The item is an invalid request, whatever the state of the layer.
         """
         if not isinstance(item, ProgramRequest):
             return item

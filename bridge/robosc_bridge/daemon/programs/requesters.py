@@ -84,7 +84,7 @@ class Requesters:
         self._goals: dict[_Id, str] = {}
 
     def forget(self) -> None:
-        """A run is over, or a new one begins: what is still awaited of the one before never comes."""
+        """Forget the requests of the last run, when a run ends or a new one begins: their answers never come."""
         for (program, call_id), _ in self._calls.items():
             self._clients.send(program, Answered(call_id, None, is_default=True))
         for (program, goal_id), _ in self._goals.items():
@@ -94,14 +94,14 @@ class Requesters:
         self._goals.clear()
 
     def detach(self, program: Program, layer: Layer | None) -> None:
-        """A program is gone: what it asked for ends, and it is told nothing of that."""
+        """End what a program that is gone has asked for, without an answer to it."""
         if layer is not None:
             self._end(program, layer, _GONE)
         self._calls = {item: name for item, name in self._calls.items() if item[0] is not program}
         self._goals = {item: name for item, name in self._goals.items() if item[0] is not program}
 
     def overflow(self, program: Program, layer: Layer) -> None:
-        """Some of what a program sent was lost, maybe what ends something: all that it asked for ends."""
+        """End all requests of a program some of whose items were lost: one of them may have been a stop or cancel."""
         self._end(program, layer, _TOO_MUCH)
 
     def _end(self, program: Program, layer: Layer, reason: str) -> None:
@@ -129,7 +129,7 @@ class Requesters:
     # What programs ask for.
 
     def take(self, item: ProgramRequest, layer: Layer | None) -> None:
-        """A program asks for something."""
+        """Pass a program's request to the layer, or refuse it."""
         program = item.program
         why = self._why_refused(item)
         if why:
@@ -172,7 +172,7 @@ class Requesters:
                 self._clients.send(program, Blocked(self._checker.identifier(CommunicationKind.ACTION, action)))
 
     def _why_refused(self, item: ProgramRequest) -> str:
-        """Return the reason why a program's request makes no sense now, one sentence; empty: it does."""
+        """Return the reason why a program's request is invalid now, one sentence; empty: it is valid."""
         match item:
             case CallRequested(program=program, call_id=own_id) | GoalRequested(program=program, goal_id=own_id):
                 own = program, own_id
@@ -182,42 +182,42 @@ class Requesters:
                 return "" if is_own else f"'{goal_id:.255}' is not a goal of '{action:.255}' in progress"
         return ""
 
-    # What the layer tells.
+    # Reports of the layer.
 
     def pass_on(self, identifier: str, message: Any) -> None:
-        """A message of the robot, after the supervisor has seen it."""
+        """Pass a message of the robot on to all programs, after the supervisor has received it."""
         self._clients.send_all(PassedOn(identifier, message))
 
     def blocked(self, identifier: str) -> None:
-        """A request on an identifier was held back."""
+        """Report to a program that its request on an identifier was held back."""
         self._was_blocked = True
         if self._asker is not None:
             self._clients.send(self._asker, Blocked(identifier))
 
     def answer(self, communication: str, call_id: _Id, data: Any) -> None:
-        """The service's reply to a call."""
+        """Send the reply of a service to the program that called it."""
         self._calls.pop(call_id, None)
         self._clients.send(call_id[0], Answered(call_id[1], data, is_default=False))
 
     def answer_default(self, communication: str, call_id: _Id) -> None:
-        """A default reply to a call that was held back or has failed."""
+        """Send the default reply to a call that was held back or has failed."""
         self._calls.pop(call_id, None)
         self._clients.send(call_id[0], Answered(call_id[1], None, is_default=True))
 
     def accept_goal(self, communication: str, goal_id: _Id) -> None:
-        """A goal is let through."""
+        """Report to a program that its goal is let through."""
         self._clients.send(goal_id[0], GoalTaken(goal_id[1]))
 
     def reject_goal(self, communication: str, goal_id: _Id) -> None:
-        """A goal is held back."""
+        """Report to a program that its goal is held back."""
         self._goals.pop(goal_id, None)
         self._clients.send(goal_id[0], GoalRejected(goal_id[1]))
 
     def pass_feedback(self, communication: str, goal_id: _Id, data: Any) -> None:
-        """Feedback of a goal."""
+        """Send the feedback of a goal to its program."""
         self._clients.send(goal_id[0], FeedbackPassed(goal_id[1], data))
 
     def end_goal(self, communication: str, goal_id: _Id, outcome: str, data: Any) -> None:
-        """An accepted goal has ended for its caller."""
+        """Report the end of an accepted goal to its program."""
         self._goals.pop(goal_id, None)
         self._clients.send(goal_id[0], GoalOver(goal_id[1], outcome, data))

@@ -11,8 +11,7 @@ from typing import Any
 
 from robosc_bridge.configuration import channels
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
-from robosc_bridge.daemon.programs.channel import ProgramChannel
-from robosc_bridge.daemon.robot.channel_data import (
+from robosc_bridge.daemon.channel_data import (
     battery_data,
     finite,
     imu_data,
@@ -22,7 +21,8 @@ from robosc_bridge.daemon.robot.channel_data import (
     shaped,
     velocity_of,
 )
-from robosc_bridge.daemon.robot.executor_inputs import Listeners, Supervised
+from robosc_bridge.daemon.executor_inputs import Listeners, Supervised
+from robosc_bridge.daemon.programs.channel import ProgramChannel
 from robosc_bridge.daemon.robot.motion import MotionTarget
 from robosc_bridge.daemon.robot.rotations import Rotations, service_response
 from robosc_bridge.daemon.robot.stop_switch import StopSwitch
@@ -75,7 +75,7 @@ class RobotAdapter:
         self._buttons: Mapping[str, bool] = {}
 
     def forget(self) -> None:
-        """A run of an executor begins or is over: what an earlier one asked for is none of its business."""
+        """Forget the requests of the last run, when a run of the executor ends or a new one begins."""
         self._pending.clear()
         self._rotations.forget()
         self._program_channel.forget()
@@ -83,10 +83,10 @@ class RobotAdapter:
     # The executor's side.
 
     def prepare(self, communication: str, data: Any) -> Any:
-        """The request itself: plain data, whose numbers must be finite.
+        """Return the data of a request, whose numbers must be finite.
 
         Raises:
-            DataDoesNotFit: One is not.
+            DataDoesNotFit: A number is not finite.
         """
         return finite(communication, data)
 
@@ -95,7 +95,7 @@ class RobotAdapter:
         return is_default(message)
 
     def publish(self, communication: str, message: Any) -> None:
-        """Do what a message asks for."""
+        """Carry out a message of the supervisor on its channel."""
         item = self._by_name[communication]
         match self._channels[communication]:
             case channels.DriveChannel():
@@ -114,7 +114,7 @@ class RobotAdapter:
                 pass  # `none`: dropped on purpose.
 
     def publish_default(self, identifier: str) -> None:
-        """The all-default message: on the drive, a standstill, which a rotation by an angle does not mind."""
+        """Carry out the all-default message: on the drive a standstill, which does not end a rotation by an angle."""
         item = self._by_identifier[identifier]
         match self._channels[item.name]:
             case channels.DriveChannel():
@@ -130,7 +130,7 @@ class RobotAdapter:
                 pass  # `none`: dropped on purpose.
 
     def call(self, communication: str, request_id: int, message: Any) -> None:
-        """Do what a service is called for."""
+        """Carry out a call of a service on its channel."""
         item = self._by_name[communication]
         match self._channels[communication]:
             case channels.StopChannel():
@@ -148,7 +148,7 @@ class RobotAdapter:
                 )
 
     def send_goal(self, communication: str, goal_id: int, message: Any) -> None:
-        """Begin what an action is asked for."""
+        """Begin the action of a goal on its channel."""
         item = self._by_name[communication]
         match self._channels[communication]:
             case channels.RotateChannel() as channel if not self._rotations.is_under_way:
@@ -160,7 +160,7 @@ class RobotAdapter:
                 self._pending.append(lambda executor: executor.on_goal_ended(goal_id, "rejected"))
 
     def cancel_goal(self, communication: str, goal_id: int) -> None:
-        """End what an action asked for."""
+        """End the action of a goal."""
         if isinstance(self._channels[communication], channels.GrpcChannel):
             self._program_channel.cancel(goal_id)
         else:
@@ -172,7 +172,7 @@ class RobotAdapter:
         self._motion.stop(self._clock(), reason)
 
     def abandon(self, communication: str, reason: str) -> None:
-        """End a motion because whoever asked for it is gone."""
+        """End a motion whose requester is gone."""
         if self._rotations.asked_by == communication:
             self._rotations.end(reason, is_own=True)
 
@@ -183,7 +183,7 @@ class RobotAdapter:
     # The devices' side.
 
     def on_drive_reading(self, reading: DriveReading, executor: Supervised) -> None:
-        """The drive base told something: buttons first, then where the robot is."""
+        """Pass on a reading of the drive base: the buttons first, then the position."""
         self._motion.on_drive_reading(reading)
         self._saw_buttons(reading.buttons, executor)
         for identifier, _ in self._listeners.of(channels.OdometryChannel):
@@ -197,17 +197,17 @@ class RobotAdapter:
     def watch_buttons(self, buttons: Mapping[str, bool]) -> None:
         """Handle the operator's buttons while no supervisor is executed."""
         self._switch.on_buttons([name for name, is_held in buttons.items() if is_held], None)
-        # What was pressed meanwhile is no event for the next run, but bumpers are told at its start.
+        # Buttons pressed meanwhile are no events of the next run, but the state of bumpers is sent at its start.
         self._buttons = {}
 
     def on_scan(self, scan: Scan, executor: Supervised) -> None:
-        """A full revolution of the LiDAR."""
+        """Pass on a full revolution of the LiDAR."""
         for identifier, _ in self._listeners.of(channels.ScannerChannel):
             executor.receive(identifier, scan_data(scan))
         self.deliver_pending(executor)
 
     def on_line(self, sighting: Sighting, executor: Supervised) -> None:
-        """The camera shows the line, or none."""
+        """Pass on whether the camera shows the line, and where."""
         correction = sighting.correction_rad_s
         kind = channels.LineLostChannel if correction is None else channels.LineChannel
         for identifier, _ in self._listeners.of(kind):
@@ -215,7 +215,7 @@ class RobotAdapter:
         self.deliver_pending(executor)
 
     def on_device_change(self, device: Device, text: str, executor: Supervised, *, is_lost: bool) -> None:
-        """A device is lost, or back again."""
+        """Report to the model that a device is lost, or back again."""
         event = "lost" if is_lost else "back"
         for identifier, channel in self._listeners.of(channels.FaultChannel):
             if channel.event == event and channel.device in (str(device), "any"):
@@ -224,21 +224,21 @@ class RobotAdapter:
             self._rotations.end("the drive base is lost")
 
     def on_key(self, key: str, executor: Supervised) -> None:
-        """A key was typed in the terminal."""
+        """Handle a key that was typed in the terminal."""
         for identifier, channel in self._listeners.of(channels.KeyChannel):
             if channel.key == key:
                 executor.receive(identifier, None)
         self.deliver_pending(executor)
 
     def deliver_pending(self, executor: Supervised) -> None:
-        """Tell the executor what has become of its requests."""
+        """Report the outcomes of its requests to the executor."""
         self._rotations.poll()
         while self._pending:
             self._pending.popleft()(executor)
             self._rotations.poll()
 
     def report_rotation(self, executor: Supervised) -> None:
-        """Tell how far a rotation is that an action asked for."""
+        """Send the feedback of the rotation under way, if an action asked for it."""
         self._rotations.report(executor)
 
     def _saw_buttons(self, buttons: Mapping[str, bool], executor: Supervised) -> None:

@@ -11,7 +11,7 @@ from robosc_bridge.skills import Rotate, RotateState
 
 
 class MotionTarget:
-    """One target at a time; the last one counts.
+    """Target of the motion: a velocity, a rotation or a standstill; the last one that was set counts.
 
     Args:
         rotate: The skill that rotates.
@@ -36,7 +36,7 @@ class MotionTarget:
 
     @property
     def reason(self) -> str:
-        """Reason why the last rotation failed; empty: it did not."""
+        """Reason why the last rotation failed; empty: it did not fail."""
         return self._rotate.reason
 
     def drive(self, velocity: Velocity, now_s: float) -> None:
@@ -65,12 +65,12 @@ class MotionTarget:
             self._pass(self._wish, now_s)
 
     def on_drive_reading(self, reading: DriveReading) -> None:
-        """The drive base told where it is: a rotation goes on."""
+        """Go on with a rotation from a new reading of the drive base."""
         if self._rotate.is_rotating:
             self._pass(self._rotate.update(reading.pose.heading_rad, reading.time_s), reading.time_s)
 
     def refresh(self, now_s: float) -> None:
-        """The loop is at work: what was wanted is still wanted."""
+        """Repeat the wanted motion to the safety layer, in each cycle of the loop."""
         if self._rotate.is_rotating:
             # For its time limit only: without a new heading nobody knows how far it is.
             self._rotate.update(None, now_s)

@@ -7,8 +7,8 @@ from typing import Any
 
 from robosc.model.structure import Communication, CommunicationKind
 from robosc_bridge.configuration.channels import RotateChannel, RotatedChannel
-from robosc_bridge.daemon.robot.channel_data import angle_of
-from robosc_bridge.daemon.robot.executor_inputs import Listeners, Supervised
+from robosc_bridge.daemon.channel_data import angle_of
+from robosc_bridge.daemon.executor_inputs import Listeners, Supervised
 from robosc_bridge.daemon.robot.motion import MotionTarget
 
 _log = logging.getLogger(__name__)
@@ -32,8 +32,8 @@ class Rotations:
 
     Args:
         motion: Motion of the wheels.
-        listeners: Identifiers that receive the end of a cycle that a message asked for.
-        owe: Function that takes reports to the executor, for the time when it is not at work.
+        listeners: Identifiers that receive the end of a rotation that a message asked for.
+        owe: Function that takes a report, which reaches the executor when it is not at work.
         on_failed: Function that is called with the reason of a failed rotation, if the model gets no message of it.
         service_timeout_s: Time after which a call fails for the executor, in seconds; None: never.
         clock: Clock that returns the time, in seconds.
@@ -58,7 +58,7 @@ class Rotations:
 
     @property
     def is_under_way(self) -> bool:
-        """True if somebody waits for the end of a cycle."""
+        """True if a rotation is under way whose end must be reported."""
         return self._rotation is not None
 
     @property
@@ -67,7 +67,7 @@ class Rotations:
         return None if self._rotation is None else self._rotation.asked.name
 
     def forget(self) -> None:
-        """A new run: who asked for a rotation in an earlier one is not told."""
+        """Forget the rotation under way, for a new run: its end is not reported to the run that asked for it."""
         self._rotation = None
 
     def begin(self, asked: Communication, channel: RotateChannel, number: int | None, message: Any) -> None:
@@ -87,7 +87,7 @@ class Rotations:
         self._motion.rotate(math.radians(angle) if channel.unit == "degrees" else angle, self._clock())
 
     def end(self, reason: str, *, is_own: bool = False) -> None:
-        """End a rotation that is under way: it has failed; `is_own`: because the model asked for another motion."""
+        """End the rotation under way as failed; `is_own`: because the model asked for another motion."""
         if self._rotation is not None:
             self._motion.stop(self._clock(), reason)
             self.poll(is_own=is_own)
@@ -101,7 +101,7 @@ class Rotations:
             self._owe(lambda executor: executor.on_goal_ended(number, "cancelled"))
 
     def poll(self, *, is_own: bool = False) -> None:
-        """Check whether a rotation has ended; if so, whoever asked for it is told later."""
+        """Check whether a rotation has ended; if so, its end is reported later to whoever asked for it."""
         rotation = self._rotation
         if rotation is not None and self._motion.is_rotating and self._clock() >= rotation.end_s:
             self._motion.stop(self._clock(), "the rotation takes longer than a call may")
@@ -131,7 +131,7 @@ class Rotations:
             self._on_failed(reason)
 
     def report(self, executor: Supervised) -> None:
-        """Tell how far a rotation is that an action asked for."""
+        """Send the feedback of the rotation under way, if an action asked for it."""
         rotation = self._rotation
         if rotation is not None and rotation.number is not None and rotation.asked.kind is CommunicationKind.ACTION:
             left = self._motion.remaining_rad * (1.0 if rotation.channel.direction == "left" else -1.0)
@@ -141,5 +141,5 @@ class Rotations:
 
 
 def service_response(reason: str) -> dict[str, Any]:
-    """The answer of the bridge's own services and actions: whether it is done, or why not."""
+    """Return the answer of the bridge's own services and actions: done, or the reason why not."""
     return {"success": not reason, "message": reason}

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Collection
 
 from robosc_bridge.configuration.channels import EmergencyStopChannel
-from robosc_bridge.daemon.robot.executor_inputs import Listeners, Supervised
+from robosc_bridge.daemon.executor_inputs import Listeners, Supervised
 from robosc_bridge.skills import EmergencyStop, StopEvent
 
 STOP_HELD = "a button that stops the robot is pressed"
@@ -44,22 +44,22 @@ class StopSwitch:
         self._take(self._skill.update(held_buttons=held), executor)
 
     def on_key(self, key: str, executor: Supervised | None) -> None:
-        """A key was typed in the terminal."""
+        """Handle a key that was typed in the terminal."""
         self._take(self._skill.update(keys=(key,)), executor)
 
     def stop(self, executor: Supervised | None) -> None:
-        """The operator stops the robot from elsewhere."""
+        """Stop the robot on a call of a remote operator."""
         self._take(self._skill.update(remote=StopEvent.STOP), executor)
 
     def resume(self, executor: Supervised | None) -> str:
-        """The operator lets it go on from elsewhere; why it cannot."""
+        """Let the robot continue on a call of a remote operator; return why it cannot, or an empty text."""
         if not self._skill.is_stopped:
             return "no operator has stopped the robot"
         event = self._skill.update(remote=StopEvent.RESUME)
         return STOP_HELD if event is None else self._take(event, executor)
 
     def begin(self, executor: Supervised) -> None:
-        """A new run has begun: a stop from before it still holds."""
+        """Begin a new run, in which an earlier stop still holds."""
         if self._skill.is_stopped:
             self._report(StopEvent.STOP, executor)
 

@@ -2,7 +2,7 @@
 
 
 class Backoff:
-    """Waits that grow.
+    """Waiting times that double with each failure.
 
     Args:
         first_s: Waiting time after the first failure, in seconds.

@@ -11,7 +11,7 @@ from robosc_bridge.skills.settings import LineSettings
 
 
 def needs_camera(mapping: ChannelMapping) -> bool:
-    """Return True if a communication is mapped to what the camera shows, or to its faults.
+    """Return True if a communication is mapped to the line or to the faults of the camera.
 
     A fault of `any` device alone needs no camera.
     """
@@ -24,13 +24,13 @@ def needs_camera(mapping: ChannelMapping) -> bool:
 
 
 def camera_problems(line: LineSettings, mapping: ChannelMapping, settings: Settings) -> list[str]:
-    """Return the problems with how the line is to be seen; nobody may follow a line whose loss nobody reports."""
+    """Return the problems of the camera and of channels of the line: a model that reads it must learn of its loss."""
     found = []
     if needs_camera(mapping) and line.camera == "simulated":
-        found.append("skills.line.camera: tell where the simulator serves its pictures, as simulated:PATH")
+        found.append("skills.line.camera: write where the simulator serves its pictures, as simulated:PATH")
     if not mapping.mapped_to(LineLostChannel):
         found += [
-            f"'{item.name}' ('{item.identifier}') is mapped to 'line', and nothing tells when the line is lost: map a "
+            f"'{item.name}' ('{item.identifier}') is mapped to 'line', and no message reports a lost line: map a "
             f"message to 'line_lost', or set execution.max_age_s for '{item.identifier}'"
             for item, _ in mapping.mapped_to(LineChannel)
             if item.max_age is None and item.identifier not in settings.max_age_s

@@ -58,7 +58,7 @@ class CameraWorker:
         self._silent_end_s = 0.0
 
     def step(self, now_s: float) -> float:
-        """Open it, or wait for a picture."""
+        """Open the camera, or wait for a picture."""
         try:
             if self._is_open:
                 return self._look()
@@ -90,7 +90,7 @@ class CameraWorker:
         return now_s
 
     def _watch(self, picture: GreyRows | None) -> None:
-        """Tell what a picture shows, or that none has come for too long."""
+        """Report the line that a picture shows, or that no picture has come for too long."""
         now_s = self._clock()
         line = self._detector.update(picture, now_s)
         if line is None:
@@ -117,7 +117,7 @@ class CameraWorker:
         """Do nothing: no step waits for long."""
 
     def close(self) -> None:
-        """Give the camera back."""
+        """Close the camera."""
         try:
             self._camera.close()
         except Exception:

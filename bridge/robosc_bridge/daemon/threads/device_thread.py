@@ -5,7 +5,7 @@ from robosc_bridge.host import Host
 
 
 class DeviceThread:
-    """Thread that takes a worker's steps when they are due, or at once when told to hurry.
+    """Thread that takes a worker's steps when they are due, or at once after `hurry`.
 
     Args:
         worker: Worker whose steps are taken.
@@ -27,18 +27,18 @@ class DeviceThread:
         return self._thread.is_alive()
 
     def start(self) -> None:
-        """Begin."""
+        """Start the thread."""
         self._thread.start()
 
     def hurry(self) -> None:
-        """Take the next step now, and wake the one under way: something has changed that must not wait."""
+        """Take the next step now, and wake the step under way, after a change that must not wait."""
         with self._condition:
             self._is_hurried = True
             self._condition.notify()
         self._worker.wake()
 
     def stop(self, limit_s: float) -> bool:
-        """End after the step under way, with the worker closed; whether that was done in time."""
+        """End the thread after the step under way, and close the worker; return True if that was done in time."""
         with self._condition:
             self._is_over = True
             self._condition.notify()

@@ -39,7 +39,7 @@ class FrameErrorMonitor:
         self._frames = self._bad = 0
 
     def poll(self, now_s: float) -> FrameErrorReport | None:
-        """Return the change of the frames up to now; None: nothing has changed."""
+        """Return a report if the line has become noisy or sound since the last call; None: it has not changed."""
         if self._begin_s is None:
             self._begin(now_s)
             return None

@@ -58,7 +58,7 @@ class ResetDone:
 
 @dataclass(frozen=True)
 class SafetyNotice:
-    """Report that the reasons why the safety layer lets nothing through, or something else about it, have changed.
+    """Report that the reasons or warnings of the safety layer have changed.
 
     Attributes:
         reasons: Reasons why the robot may not move; empty: it may.
@@ -71,7 +71,7 @@ class SafetyNotice:
 
 @dataclass(frozen=True)
 class Sighting:
-    """Report of what the camera shows of the line, or that it shows nothing at all.
+    """Report of the line in a picture of the camera, or that there is no picture.
 
     Attributes:
         time_s: Time when the picture had come, or was missed, in seconds.

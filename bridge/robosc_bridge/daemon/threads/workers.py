@@ -64,19 +64,19 @@ class DriveCommand(Protocol):
 
     @property
     def velocity(self) -> Velocity:
-        """Zero whenever something forbids to move."""
+        """Velocity to command; zero if there is a reason not to move."""
 
     @property
     def is_torque_wanted(self) -> bool:
-        """True if the motors are to hold."""
+        """True if torque is to be on."""
 
     @property
     def reasons(self) -> tuple[Reason, ...]:
-        """Reasons why it may not move."""
+        """Reasons why the robot may not move."""
 
     @property
     def warnings(self) -> tuple[Caution, ...]:
-        """Warnings that a person should know."""
+        """Warnings for a person."""
 
 
 class SafetyGate(Protocol):
@@ -86,16 +86,16 @@ class SafetyGate(Protocol):
         """Return the command for the drive base now."""
 
     def on_drive_reading(self, reading: DriveReading) -> None:
-        """The drive base told something."""
+        """Handle a reading of the drive base."""
 
     def drive_failed(self) -> None:
-        """The drive base did not answer."""
+        """Handle an exchange in which the drive base did not answer."""
 
     def on_scan(self, now_s: float, ranges_m: Sequence[float]) -> None:
-        """A full revolution came, with a range for each degree."""
+        """Handle a full revolution, with a range for each degree."""
 
     def on_noise(self, is_noisy: bool) -> None:
-        """Take the report whether many frames of the scanner are damaged."""
+        """Handle the report whether many frames of the scanner are damaged."""
 
 
 class Worker(Protocol):
@@ -104,13 +104,13 @@ class Worker(Protocol):
     name: str
 
     def step(self, now_s: float) -> float:
-        """Do what is due; when the next step is."""
+        """Do the work that is due; return the time of the next step."""
 
     def wake(self) -> None:
-        """Let a step that waits in its thread go on with what is new, or end soon; called from other threads."""
+        """Let a step that waits in its thread handle news, or end soon; called from other threads."""
 
     def close(self) -> None:
-        """Give everything back; never raises."""
+        """Close the device; never raises."""
 
 
 class DriveWorker:
@@ -175,7 +175,7 @@ class DriveWorker:
         self._reported: frozenset[MotorFault] = frozenset()
 
     def is_cycling(self, now_s: float) -> bool:
-        """Return True if its steps come to an end, each in its time; asked by other threads."""
+        """Return True if no step takes longer than it may; called from other threads."""
         return now_s - self.stepped_s <= (_EXCHANGE_LIMIT_S if self.is_exchanging else _STEP_LIMIT_S)
 
     def reset(self) -> None:
@@ -183,7 +183,7 @@ class DriveWorker:
         self._is_reset_wanted = True
 
     def step(self, now_s: float) -> float:
-        """Open it, or exchange once."""
+        """Open the drive base, or make one exchange with it."""
         self.stepped_s = now_s
         try:
             return self._step(now_s)
@@ -324,7 +324,7 @@ class DriveWorker:
         return min(self._open_at_s, now_s + _CLOSED_S)
 
     def wake(self) -> None:
-        """Let an exchange under way command what the safety layer lets through now."""
+        """Let an exchange under way command the velocity that the safety layer lets through now."""
         self._is_newer = True
         if self._attentive is not None:
             try:
@@ -333,7 +333,7 @@ class DriveWorker:
                 _log.exception("the drive base's driver failed when it was woken")
 
     def close(self) -> None:
-        """Stop the wheels, torque off, give the line back."""
+        """Stop the wheels, switch torque off, and close the line."""
         _closed(self._base)
 
 
@@ -379,7 +379,7 @@ class ScannerWorker:
         self._frames = FrameErrorMonitor(scanner.counters, bad_frames_share)
 
     def step(self, now_s: float) -> float:
-        """Open it, or listen for a rotation."""
+        """Open the scanner, or wait for a revolution."""
         try:
             if self._is_open:
                 self._listen()
@@ -443,11 +443,11 @@ class ScannerWorker:
         return self._clock() + retry_s
 
     def wake(self) -> None:
-        """Let it listen no longer."""
+        """End a wait for a revolution."""
         self._scanner.wake()
 
     def close(self) -> None:
-        """Stop its motor, give the line back."""
+        """Stop its motor, and close the line."""
         _closed(self._scanner)
 
 

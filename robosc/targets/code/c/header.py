@@ -29,8 +29,7 @@ from robosc.targets.code.c.provide import request_field, request_struct
 from robosc.targets.code.c.received import unknown_name
 from robosc.targets.code.c.text import comment, declared, pointer_to, safe
 from robosc.targets.code.c.unit import Unit, plain_type
-from robosc.targets.code.text import indent
-from robosc.targets.model_text import requirement_texts
+from robosc.targets.text import indent, requirement_texts
 
 
 def head(supervisor: Supervisor, begin: str = "/* ", rest: str = "   ", end: str = " */") -> str:

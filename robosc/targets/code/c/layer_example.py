@@ -6,7 +6,7 @@ from robosc.targets.code.c.layer import request_parameters
 from robosc.targets.code.c.layout import Layout
 from robosc.targets.code.c.received import unknown_name
 from robosc.targets.code.c.unit import Unit
-from robosc.targets.code.text import indent
+from robosc.targets.text import indent
 
 _BLOCKED = """\
 static bool print_blocked(void *context, const char *identifier, {prefix}_refusal_t why)

@@ -4,6 +4,7 @@ from collections.abc import Iterator
 
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import Constant, Expression, Received, StringType, leaves
+from robosc.model.received import path_type
 from robosc.model.structure import Model, ObjectValue
 from robosc.supervisor import Supervisor
 from robosc.targets.code.c.example import example_file
@@ -17,7 +18,6 @@ from robosc.targets.code.c.text import is_nested_too_deeply
 from robosc.targets.code.c.unit import make_unit
 from robosc.targets.code.naming import package_name
 from robosc.targets.files import GeneratedFiles
-from robosc.targets.paths import path_type
 from robosc.targets.registry import GenerateOptions
 
 _MAXIMUM_TEXT = 4095

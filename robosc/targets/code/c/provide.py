@@ -11,7 +11,7 @@ from robosc.targets.code.c.unit import Reading, Unit, plain_type
 from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, operation, variable
 from robosc.targets.code.provide import first_provided
 from robosc.targets.code.statements import Assign, Block, Let, Return, when
-from robosc.targets.code.text import indent
+from robosc.targets.text import indent
 
 _GIVEN = Return(TRUE_CODE)
 

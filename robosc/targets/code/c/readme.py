@@ -4,7 +4,7 @@ from robosc.model.structure import CommunicationKind, EventKind
 from robosc.targets.code.c.header import batch, receive_head, reply_head
 from robosc.targets.code.c.layer import request_heads
 from robosc.targets.code.c.unit import Unit
-from robosc.targets.model_text import requirements_chapter
+from robosc.targets.text import requirements_chapter
 
 _BUILD = """\
 ## Build

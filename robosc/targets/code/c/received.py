@@ -9,7 +9,7 @@ from robosc.targets.code.c.unit import Lvalue, Reading, Unit
 from robosc.targets.code.expressions import TRUE_CODE, Code, Sort, call, literal, operation, variable
 from robosc.targets.code.received import ReceivedReader
 from robosc.targets.code.statements import Assign, Do, If, Let, Return, Statement, when
-from robosc.targets.code.text import indent
+from robosc.targets.text import indent
 
 NAMES = frozenset({"data", "notes", "s", "old", "skipped", "r"})
 """Names that functions use on their own."""

@@ -23,7 +23,7 @@ from robosc.targets.code.c.text import comment, string_literal
 from robosc.targets.code.c.unit import Reading, Unit
 from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, double, variable
 from robosc.targets.code.steps import initial_state
-from robosc.targets.code.text import indent
+from robosc.targets.text import indent
 
 _ENGINE = "log releases goals steps policies decisions safe_stop time replies lifecycle".split()
 _LAYER_ENGINE = "log releases goals steps safe_stop callers time replies layer lifecycle".split()

@@ -4,7 +4,7 @@ from robosc.targets.code.c.expressions import c_type, code_text
 from robosc.targets.code.c.text import comment, declared
 from robosc.targets.code.expressions import Sort, operation, variable
 from robosc.targets.code.statements import Assign, Block, Comment, Do, If, Let, Return, Statement
-from robosc.targets.code.text import indent
+from robosc.targets.text import indent
 
 
 def unused(*names: str) -> list[Statement]:

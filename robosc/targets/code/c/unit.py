@@ -23,7 +23,7 @@ from robosc.expressions import (
     VariableRead,
     leaves,
 )
-from robosc.model.received import Path
+from robosc.model.received import Path, path_type
 from robosc.model.structure import Model
 from robosc.supervisor import Supervisor
 from robosc.targets.code.c.expressions import CWriter, c_type, code_text, number_code, unknown_as, unknown_text
@@ -47,8 +47,7 @@ from robosc.targets.code.expressions import (
     words_of,
 )
 from robosc.targets.code.statements import Block, codes
-from robosc.targets.code.text import indent
-from robosc.targets.paths import path_type
+from robosc.targets.text import indent
 
 
 @dataclass(frozen=True, slots=True)

@@ -9,7 +9,7 @@ from robosc.targets.code.python.layout import Layout
 from robosc.targets.code.python.statements import method
 from robosc.targets.code.python.text import comment, docstring
 from robosc.targets.code.statements import Block, codes
-from robosc.targets.code.text import indent
+from robosc.targets.text import indent
 
 
 class PythonDiagrams(Diagrams):

@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from enum import IntEnum
 
 from robosc.expressions import ArrayPart, Quantifier, Reduction, Type
-from robosc.model.received import Path
+from robosc.model.received import Path, path_type
 from robosc.model.structure import Model
 from robosc.targets.code.expression_writer import ExpressionWriter, read_nothing
 from robosc.targets.code.expressions import (
@@ -28,7 +28,6 @@ from robosc.targets.code.expressions import (
     place,
     variable,
 )
-from robosc.targets.paths import path_type
 
 
 class Precedence(IntEnum):

@@ -30,8 +30,7 @@ from robosc.targets.code.python.strategy import forgetting_lines, mode_tables, s
 from robosc.targets.code.python.when import matches_method
 from robosc.targets.code.python.writer import Writer, make_writer
 from robosc.targets.code.steps import initial_state
-from robosc.targets.code.text import indent, printable
-from robosc.targets.model_text import requirement_texts
+from robosc.targets.text import indent, printable, requirement_texts
 
 
 def header(supervisor: Supervisor) -> str:

@@ -4,7 +4,7 @@ from functools import reduce
 
 from robosc.errors import InternalError
 from robosc.expressions import ArrayType, BooleanType, DoubleType, EnumType, IntegerType, ObjectType, StringType, Type
-from robosc.model.received import Path
+from robosc.model.received import Path, path_text
 from robosc.model.structure import EnumDefinition
 from robosc.targets.code.expressions import (
     FALSE_CODE,
@@ -24,8 +24,7 @@ from robosc.targets.code.python.naming import PythonNamer
 from robosc.targets.code.python.statements import statement_lines
 from robosc.targets.code.received import ReceivedReader
 from robosc.targets.code.statements import Assign, If, Let, Return, when
-from robosc.targets.code.text import indent
-from robosc.targets.paths import path_text
+from robosc.targets.text import indent
 
 _PLAIN: dict[type, str] = {
     DoubleType: "read_double",

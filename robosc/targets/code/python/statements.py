@@ -6,7 +6,7 @@ from robosc.targets.code.expressions import Code, variable
 from robosc.targets.code.python.expressions import code_text
 from robosc.targets.code.python.text import comment, docstring
 from robosc.targets.code.statements import Assign, Block, Comment, Do, If, Let, Return, Statement
-from robosc.targets.code.text import indent
+from robosc.targets.text import indent
 
 
 def method(name: str, words: str, body: Block, parameters: Sequence[Code] = ()) -> list[str]:

@@ -7,7 +7,7 @@ other, so whatever is read after it may have been written is first copied to a l
 from collections.abc import Iterator, Sequence
 
 from robosc.expressions import ArrayType, DoubleType, Expression, IntegerType, StateTest, Type, VariableRead, leaves
-from robosc.model.received import Path, converted_paths
+from robosc.model.received import Path, converted_paths, path_text
 from robosc.targets.code.expressions import (
     FALSE_CODE,
     TRUE_CODE,
@@ -29,7 +29,6 @@ from robosc.targets.code.python.statements import method
 from robosc.targets.code.python.writer import Writer
 from robosc.targets.code.statements import Assign, Block, Do, If, Let, Return, Statement, when
 from robosc.targets.code.steps import StepWriter
-from robosc.targets.paths import path_text
 
 _DATA, _SKIPPED, _FOUND = variable("data"), variable("skipped"), variable("found")
 

@@ -2,7 +2,7 @@
 
 import textwrap
 
-from robosc.targets.code.text import printable
+from robosc.targets.text import printable
 
 _WIDTH = 88
 

@@ -2,7 +2,7 @@
 
 from alembic import context
 
-from robosc_server.store.migrations.table import VERSION_TABLE
+from robosc_server.store.migrate import VERSION_TABLE
 
 context.configure(connection=context.config.attributes["connection"], version_table=VERSION_TABLE)
 context.run_migrations()

@@ -11,7 +11,7 @@ CHUNK_BYTES = 64 * 1024
 
 
 def listing(files: GeneratedFiles) -> list[pb.GeneratedFile]:
-    """The files by path, without their content."""
+    """Return the list of files by path, without their content."""
     found = []
     for path, text in files.items():
         content = text.encode("utf-8")
@@ -22,7 +22,7 @@ def listing(files: GeneratedFiles) -> list[pb.GeneratedFile]:
 
 
 def digest_of(files: Iterable[pb.GeneratedFile]) -> bytes:
-    """SHA-256 over all files of a list."""
+    """Return the SHA-256 over all files of a list."""
     total = hashlib.sha256()
     for file in files:
         total.update(file.path.encode("utf-8") + b"\0" + bytes([file.executable]) + file.digest)
@@ -30,7 +30,7 @@ def digest_of(files: Iterable[pb.GeneratedFile]) -> bytes:
 
 
 def file_chunks(files: GeneratedFiles) -> Iterator[pb.FileChunk]:
-    """The content of all files in chunks, file by file."""
+    """Yield the content of all files in chunks, file by file."""
     for number, text in enumerate(files.values()):
         content = text.encode("utf-8")
         for offset in range(0, len(content), CHUNK_BYTES):
@@ -38,6 +38,6 @@ def file_chunks(files: GeneratedFiles) -> Iterator[pb.FileChunk]:
 
 
 def content_chunks(content: bytes) -> Iterator[bytes]:
-    """Some content, in chunks."""
+    """Yield a content in chunks."""
     for offset in range(0, len(content), CHUNK_BYTES):
         yield content[offset : offset + CHUNK_BYTES]

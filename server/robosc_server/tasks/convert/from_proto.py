@@ -16,14 +16,14 @@ from robosc_api.v1 import synthesis_pb2 as pb
 
 
 class OptionError(Exception):
-    """Options that cannot be; one sentence for the caller."""
+    """Invalid options; one sentence for the caller."""
 
 
 _DEPLOYMENTS = {pb.DEPLOYMENT_CONTROLLER: Deployment.CONTROLLER, pb.DEPLOYMENT_LAYER: Deployment.LAYER}
 
 
 def bundle(message: pb.Bundle) -> Bundle:
-    """The texts, libraries and interfaces by name: their order in a request means nothing."""
+    """Return the texts, libraries and interfaces by name; their order in a request has no meaning."""
     kind = Bundle if message.language in (pb.LANGUAGE_UNSPECIFIED, pb.LANGUAGE_ROBOSC) else LoadedAutomata
     return kind(
         main=source_file(message.main),
@@ -34,7 +34,7 @@ def bundle(message: pb.Bundle) -> Bundle:
 
 
 def source_file(message: pb.SourceFile) -> SourceFile:
-    """One text."""
+    """Return one text."""
     return SourceFile(message.name, message.text)
 
 
@@ -48,7 +48,7 @@ def deployment(options: pb.SynthesisOptions) -> Deployment | None:
 
 
 def engine_name(options: pb.SynthesisOptions) -> str:
-    """The engine that is asked for."""
+    """Return the name of the requested engine."""
     return options.engine or "auto"
 
 
@@ -70,7 +70,7 @@ def synthesis_options(options: pb.SynthesisOptions, maximum_nodes: int) -> Synth
 
 
 def verified_states(options: pb.SynthesisOptions) -> int:
-    """States up to which a supervisor that is made is verified one by one."""
+    """Return the number of states up to which a new supervisor is verified state by state."""
     return options.verified_states if options.HasField("verified_states") else DEFAULT_STATES
 
 

@@ -25,7 +25,7 @@ STATUSES = {
 
 
 def findings(diagnostics: Iterable[Diagnostic]) -> list[pb.Diagnostic]:
-    """All findings, in their order."""
+    """Return all findings, in their order."""
     return [
         pb.Diagnostic(
             severity=_SEVERITIES[item.severity],
@@ -48,7 +48,7 @@ def _related(place: RelatedPlace) -> pb.RelatedPlace:
 
 
 def statistics(found: Statistics) -> pb.Statistics:
-    """Figures of the work."""
+    """Return the statistics of the work."""
     return pb.Statistics(
         engine=found.engine,
         state_bits=found.state_bits,
@@ -58,7 +58,7 @@ def statistics(found: Statistics) -> pb.Statistics:
 
 
 def summary(supervisor: Supervisor) -> pb.Summary:
-    """A supervisor in figures and words."""
+    """Return the summary of a supervisor, in numbers and texts."""
     system = to_automata(supervisor.model, supervisor.deployment)
     controllable = sum(event.is_controllable for event in system.events)
     return pb.Summary(

@@ -51,13 +51,13 @@ class DryBase:
         self._moved_s = self._clock()
 
     def set_torque(self, is_on: bool) -> None:
-        """Note it; the motors are not told."""
+        """Record whether torque is wanted; nothing is sent to the motors."""
         self._is_torque_wanted = is_on
         self._velocity = STANDSTILL
         _log.info("dry run: the motors would %s", "hold" if is_on else "let go")
 
     def exchange(self, velocity: Velocity) -> DriveReading:
-        """Read everything, and tell the velocity instead of sending it."""
+        """Read the drive base, and log the velocity instead of sending it."""
         reading = self._base.exchange(STANDSTILL)
         self._move(reading.time_s)
         self._velocity = velocity if self._is_torque_wanted else STANDSTILL

@@ -22,7 +22,6 @@ from robosc_api.security import SecurityError, check_listening
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
 from robosc_bridge.configuration.structure import Configuration, Safety, Scanner
-from robosc_bridge.daemon.endpoints import Endpoint, LivenessMonitor, file_problems, is_remote, is_startable
 from robosc_bridge.daemon.execution import Job
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.loop import Daemon
@@ -35,9 +34,10 @@ from robosc_bridge.daemon.threads.reports import Device
 from robosc_bridge.daemon.threads.workers import DriveWorker, ScannerWorker
 from robosc_bridge.daemon.timing import Timing
 from robosc_bridge.daemon.view_settings import settings_of as view_settings
+from robosc_bridge.devices.dry_base import DryBase
 from robosc_bridge.devices.interface import DriveBase, RangeScanner, Velocity
-from robosc_bridge.devices.options import checked_options
 from robosc_bridge.devices.robots import ROBOTS, Body, Robot
+from robosc_bridge.driver_options import checked_options
 from robosc_bridge.driver_registry import (
     Driver,
     DriverFeatures,
@@ -47,8 +47,8 @@ from robosc_bridge.driver_registry import (
     make_drive_base,
     make_range_scanner,
 )
+from robosc_bridge.endpoints import Endpoint, LivenessMonitor, file_problems, is_remote, is_startable
 from robosc_bridge.errors import BridgeError
-from robosc_bridge.first_drive.dry_base import DryBase
 from robosc_bridge.host import Host
 from robosc_bridge.protocol.mavlink_signing import SigningError
 from robosc_bridge.remote import settings_of
@@ -89,7 +89,7 @@ _THREAD_LIMIT_S = 10.0
 
 
 class AssemblyError(BridgeError):
-    """A configuration asks for something that cannot be made; the message says what."""
+    """A configuration asks for a part that cannot be made; the message names it."""
 
 
 def safety_limits(configuration: Configuration) -> SafetyLimits:
@@ -382,7 +382,7 @@ def assemble(
         raise AssemblyError(f"to wait in standby, the bridge needs {needed}")
     limits = safety_limits(configuration)
     safety = SafetyLayer(limits)
-    # Who can be reached can be told to start again.
+    # A bridge with an endpoint can be started again by a call.
     is_layer = deployment is Deployment.LAYER
     job = Job(
         supervisor,

@@ -24,21 +24,21 @@ class Endpoint(Protocol):
 
     @property
     def name(self) -> str:
-        """For the log."""
+        """Name of the endpoint, for the log."""
 
     @property
     def is_alive(self) -> bool:
         """True if the endpoint serves: from `start` until `stop`, unless it has failed."""
 
     def start(self) -> None:
-        """Begin to serve; nothing moves yet.
+        """Begin to serve; the robot does not move yet.
 
         Raises:
-            BridgeError: It cannot, such as on an address that is in use.
+            BridgeError: The endpoint cannot serve, such as on an address that is in use.
         """
 
     def stop(self) -> None:
-        """End what is under way and every thread within some seconds; never raises, may be called again."""
+        """End all calls and threads of the endpoint within some seconds; never raises, may be called again."""
 
 
 class LivenessMonitor:
@@ -54,11 +54,11 @@ class LivenessMonitor:
         self._reported: set[str] = set()
 
     def watch(self, endpoint: Endpoint) -> None:
-        """From now on this one, too: who cannot be reached cannot be told to stop."""
+        """Watch this endpoint, too: a robot whose endpoint has ended takes no stop from it."""
         self._endpoints = (*self._endpoints, endpoint)
 
     def are_alive(self) -> bool:
-        """Return True if none has ended; report each endpoint that has, once."""
+        """Return True if no thread and no endpoint has ended; log each endpoint that has ended, once."""
         ended = [endpoint.name for endpoint in self._endpoints if not endpoint.is_alive]
         for name in ended:
             if name not in self._reported:

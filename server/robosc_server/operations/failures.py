@@ -6,7 +6,7 @@ import grpc
 
 from robosc_api.failures import failure_metadata
 from robosc_server.operations.logs import log_fault
-from robosc_server.tasks.task import Failure, Reason
+from robosc_server.tasks.task import Failure, Reason, RefusedError
 
 MAXIMUM_MESSAGE_BYTES = 1000
 """Maximum size of a sentence for a caller, in bytes of UTF-8; percent-encoded it is up to three times as long."""
@@ -36,22 +36,6 @@ _CODES = {
     Reason.TOKEN_EXPIRED: grpc.StatusCode.UNAUTHENTICATED,
     Reason.PERMISSION_DENIED: grpc.StatusCode.PERMISSION_DENIED,
 }
-
-
-class RefusedError(Exception):
-    """A call that ends without an answer.
-
-    Attributes:
-        reason: Reason why there is no answer.
-        message: One sentence for the caller.
-        retry_after_s: Seconds after which it may be worth another try; None: it is not.
-    """
-
-    def __init__(self, reason: Reason, message: str, retry_after_s: float | None = None) -> None:
-        super().__init__(message)
-        self.reason = reason
-        self.message = message
-        self.retry_after_s = retry_after_s
 
 
 def code_of(reason: Reason) -> grpc.StatusCode:

@@ -11,22 +11,22 @@ class Supervised(Protocol):
     """Input of an executor of either deployment."""
 
     def receive(self, identifier: str, data: Any) -> None:
-        """A message came."""
+        """Take a message."""
 
     def on_reply(self, request_id: int, data: Any) -> None:
-        """A call was answered."""
+        """Take the answer to a call."""
 
     def on_call_failed(self, request_id: int, reason: str) -> None:
-        """A call failed."""
+        """Take the failure of a call."""
 
     def on_goal_accepted(self, goal_id: int) -> None:
-        """A goal is under way."""
+        """Take the acceptance of a goal."""
 
     def on_feedback(self, goal_id: int, data: Any) -> None:
         """Take the progress of a goal."""
 
     def on_goal_ended(self, goal_id: int, outcome: str, data: Any = None) -> None:
-        """A goal has ended."""
+        """Take the end of a goal."""
 
 
 class Listeners:

@@ -1,8 +1,22 @@
-"""Parts of a model as a user writes them, for comments and pages of generated code."""
+"""Text of generated files: lines of any language, and parts of a model as a user writes them."""
 
 from robosc.expressions.text import expression_text
 from robosc.model.structure import Invariant, Model, ObjectValue, Provide, ProvidedValue, Requirement
-from robosc.targets.code.text import printable
+
+
+def indent(lines: list[str], levels: int = 1) -> list[str]:
+    """The lines, further right; empty ones stay empty."""
+    return [f"{'    ' * levels}{line}" if line else "" for line in lines]
+
+
+def ascii_line(text: str) -> str:
+    """A text as one line of printable ASCII; everything else stands as an escape of Python."""
+    return "".join(char if " " <= char <= "~" else char.encode("unicode_escape").decode("ascii") for char in text)
+
+
+def printable(text: str) -> str:
+    """A text for a comment or a docstring of generated code: one line, ASCII, no quotes that could end it."""
+    return ascii_line(text).replace("\\", "\\\\").replace('"""', "'''")
 
 
 def requirement_texts(model: Model) -> list[str]:

@@ -1,4 +1,4 @@
-"""`robosc-server health`: ask the server that the same settings have started how it is."""
+"""`robosc-server health`: query the health of the server that runs with the same settings."""
 
 import argparse
 import sys
@@ -23,7 +23,7 @@ exit status:
 
 
 def make_parser() -> Parser:
-    """The parser of the command."""
+    """Return the parser of the command."""
     parser = Parser(
         prog="robosc-server health",
         description="Query the gRPC health check of the server that was started with the same settings.",
@@ -41,7 +41,7 @@ def make_parser() -> Parser:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Ask; returns the exit status."""
+    """Query the health; returns the exit status."""
     given = make_parser().parse_args(argv)
     try:
         condition = _ask(settings_of(given), given.service, given.timeout, is_alive_enough=given.alive)

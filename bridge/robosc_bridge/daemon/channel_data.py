@@ -91,7 +91,7 @@ def battery_data(reading: DriveReading, *, is_percent: bool) -> dict[str, Any]:
 
 
 def shaped(communication: Communication, value: Any) -> Any:
-    """A single value as the model reads it: by itself, as the field `data` of a message, or as nothing at all."""
+    """Return a value in the form that the model reads: alone, as the field `data` of a message, or None for no data."""
     match communication.response:
         case ObjectType():
             return {"data": value}
@@ -101,7 +101,7 @@ def shaped(communication: Communication, value: Any) -> Any:
 
 
 def velocity_of(message: Any) -> Velocity:
-    """The velocity that a message of the channel `drive` asks for; what is left out is 0."""
+    """Return the velocity that a message of the channel `drive` asks for; parts that are left out are 0."""
     twist = message if isinstance(message, dict) else {}
     twist = twist.get("twist", twist) or {}
     linear, angular = twist.get("linear") or {}, twist.get("angular") or {}
@@ -109,17 +109,17 @@ def velocity_of(message: Any) -> Velocity:
 
 
 def angle_of(message: Any) -> float:
-    """The angle that a message, call or goal of the channel `rotate` asks for, in its unit."""
+    """Return the angle that a message, call or goal of the channel `rotate` asks for, in the unit of the channel."""
     if isinstance(message, dict):
         message = message.get("data", message.get("angle"))
     return float(message or 0.0)
 
 
 def finite(communication: str, data: Any) -> Any:
-    """The data itself.
+    """Return the data, if all of its numbers are finite.
 
     Raises:
-        DataDoesNotFit: A number of it is not finite.
+        DataDoesNotFit: A number is not finite.
     """
     for number in _numbers(data):
         if not math.isfinite(number):

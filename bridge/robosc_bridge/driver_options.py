@@ -20,7 +20,7 @@ class DriverOptionError(BridgeError, ValueError):
 def option_types(driver: Driver) -> dict[str, Any] | None:
     """The type of every option that a file can give; None: the driver takes whatever it is given.
 
-    What is no data, such as a function, is for programs alone and left out.
+    Arguments that are no data, such as functions, are only for programs and left out.
     """
     signature = inspect.signature(driver.make)
     if any(parameter.kind is parameter.VAR_KEYWORD for parameter in signature.parameters.values()):
@@ -44,14 +44,14 @@ def _is_data(kind: Any) -> bool:
 
 
 def checked_options(driver: Driver, options: Mapping[str, Any]) -> dict[str, Any]:
-    """The options as the driver takes them.
+    """Return the options in the types of the driver's arguments.
 
     Args:
         driver: Driver that takes them.
         options: Options of a configuration.
 
     Raises:
-        DriverOptionError: There is no such option, or its value is of another type; says which there are.
+        DriverOptionError: There is no such option, or its value is of another type; the message lists the options.
     """
     for name in _SAID_ELSEWHERE:
         if name in options:

@@ -1,0 +1,75 @@
+"""Steps of `robosc simulate`: events as a person writes them, and what they led to in lines."""
+
+import json
+import sys
+from collections.abc import Iterable, Mapping
+from typing import TYPE_CHECKING
+
+from robosc.source import visible
+
+if TYPE_CHECKING:
+    from robosc.certification.supervisor_file import StateInWords
+    from robosc.pipeline.manual_run import ManualRun
+    from robosc.pipeline.simulation import Run
+    from robosc.pipeline.steps import Step
+    from robosc.pipeline.system_runs import SystemRun
+
+
+def take_event(run_: "Run | SystemRun", name: str, data: object, target: str) -> "Step":
+    """Take an event as a person wrote it.
+
+    Args:
+        run_: The run.
+        name: Name of the event.
+        data: Data that it carries; NO_DATA for none.
+        target: Parts of the state that it is to lead to; of automata.
+
+    Raises:
+        RoboscError: It cannot happen so.
+    """
+    from robosc.pipeline.received_data import NO_DATA
+    from robosc.pipeline.simulation import Run
+    from robosc.pipeline.system_runs import ChoiceError, state_parts
+
+    event, given = run_.event_called(name), () if data is NO_DATA else (data,)
+    if isinstance(run_, Run):
+        return run_.step(event, *given)
+    try:
+        return run_.step(event, *given, to=state_parts(run_.supervisor.system, target) if target else None)
+    except ChoiceError as error:
+        choose = f"; choose one: {name} -> {parts_text(error.example)}" if error.example else ""
+        raise ChoiceError(f"{error.problem}{choose}") from error
+
+
+def parts_text(parts: Mapping[str, object]) -> str:
+    """Parts of a state as a person writes them: `Buffer = full, Buffer.count = 2`."""
+    from robosc.explanation.notation import value_text
+
+    return ", ".join(f"{name} = {value_text(value)}" for name, value in parts.items())  # type: ignore[arg-type]
+
+
+def write_lines(lines: Iterable[str]) -> None:
+    """Write lines to standard output, as a terminal can show them."""
+    sys.stdout.write("".join(visible(line) + "\n" for line in lines))
+
+
+def step_lines(number: int, step: "Step", before: "StateInWords") -> list[str]:
+    """A step in lines: the event with its data, what it changed, what a request sends, and what was unknown."""
+    from robosc.pipeline.steps import changes_text, event_text
+
+    lines = [f"{number:4}  {': '.join(filter(None, (event_text(step), changes_text(before, step.state))))}"]
+    if step.provided is not None:
+        lines.append(f"      sends {json.dumps(step.provided, default=str)}")
+    lines += [f"      unknown: {item}" for item in step.unknown]
+    lines += [f"      unknown: {item} keeps its value" for item in step.skipped]
+    return lines
+
+
+def state_lines(run_: "ManualRun") -> list[str]:
+    """Return the state and what can happen in it, in lines."""
+    others = [event for event in run_.possible if not run_.is_controllable(event)]
+    return [
+        f"now       {run_.state}{' (marked)' if run_.is_marked else ''}",
+        f"allowed   {', '.join(run_.enabled) or 'nothing'}",
+        f"can come  {', '.join(others) or 'nothing'}",
+    ]

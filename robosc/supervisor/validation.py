@@ -30,6 +30,7 @@ from robosc.expressions import (
 )
 from robosc.expressions.inference import Scope, has_type, is_assignable
 from robosc.model.structure import (
+    Assumption,
     Behaviour,
     Communication,
     CommunicationKind,
@@ -37,6 +38,8 @@ from robosc.model.structure import (
     Deployment,
     EnumDefinition,
     EventKind,
+    Goal,
+    GoalForm,
     Model,
     ObjectDefinition,
     ObjectValue,
@@ -101,6 +104,7 @@ def validate(supervisor: Supervisor) -> None:
             with _at(f"component {component.name}"):
                 _validate_component(component, names)
         _validate_requirements(model, names)
+        _validate_goals(model, names)
         for number, provide in enumerate(model.provides, start=1):
             with _at(f"provide statement {number} (for {provide.communication})"):
                 _validate_provide(provide, names)
@@ -398,6 +402,25 @@ def _validate_requirements(model: Model, names: _Names) -> None:
             _require_boolean(invariant.expression, names.scope)
 
 
+def _validate_goals(model: Model, names: _Names) -> None:
+    for number, goal in enumerate(model.goals, start=1):
+        with _at(f"goal {number}"):
+            _validate_aim(goal, names)
+    for number, assumption in enumerate(model.assumptions, start=1):
+        with _at(f"assumption {number}"):
+            if assumption.form is GoalForm.ONCE:
+                raise InvalidSupervisorError("an assumption has not the form 'once'")
+            _validate_aim(assumption, names)
+
+
+def _validate_aim(aim: Goal | Assumption, names: _Names) -> None:
+    """A trigger stands in the one form that has it; conditions are boolean, and read no received data."""
+    if (aim.trigger is not None) != (aim.form is GoalForm.LEADS_TO):
+        raise InvalidSupervisorError("the form 'leads to' has a trigger, and no other form has one")
+    for expression in aim.expressions:
+        _require_boolean(expression, names.scope)
+
+
 def _validate_provide(provide: Provide, names: _Names) -> None:
     _validate_provided(provide.value, _request_type(provide.communication, names), names)
     if provide.condition is not None:
@@ -426,7 +449,7 @@ def _validate_provided(value: ProvidedValue, type_: Type, names: _Names) -> None
 def _validate_synthesis_variables(model: Model, names: _Names) -> None:
     """Check that all that synthesis reads is in synthesis and finite.
 
-    That is all that guards, requirements, data conditions and synthesis variables read.
+    That is all that guards, requirements, goals, assumptions, data conditions and synthesis variables read.
     """
     variables = {
         (component.name, variable.name): variable
@@ -452,6 +475,9 @@ def _synthesis_expressions(
         yield requirement.expression, None
     for invariant in model.invariants:
         yield invariant.expression, None
+    aims: tuple[Goal | Assumption, ...] = (*model.goals, *model.assumptions)
+    for aim in aims:
+        yield from ((expression, None) for expression in aim.expressions)
     for provide in model.provides:
         if provide.condition is not None:
             yield provide.condition, None

@@ -1,4 +1,4 @@
-"""What a strategy remembers and chooses, as statements that all languages share."""
+"""Memory and choices of a strategy, as statements that all languages share."""
 
 from robosc.automata.executable import ExecutableSystem
 from robosc.automata.goal_memory import MEMORY

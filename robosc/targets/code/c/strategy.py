@@ -1,4 +1,4 @@
-"""Generated functions of a strategy: what it remembers of goals, and what it chooses."""
+"""Generated functions of a strategy: its memory of goals, and its choices."""
 
 from robosc.automata.goal_memory import MEMORY
 from robosc.supervisor import Strategy

@@ -1,4 +1,4 @@
-"""Generated methods of a strategy: what it remembers of goals, and what it chooses."""
+"""Generated methods of a strategy: its memory of goals, and its choices."""
 
 from robosc.supervisor import Strategy
 from robosc.targets.code.expressions import Sort, literal

@@ -112,9 +112,11 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
     if token == "if" and tokens.texts[at - 1] == "not":
         # Without its end it is no conditional, so that `not` is a name.
         return True
-    # What follows tells that `3 needs x` wants a name, and `integer < x` something else than this word.
+    # What follows tells that `3 needs x` wants a name, and `integer < x` something else than this word; and that an
+    # item begins behind a name `not`.
     is_next = offset(text, *stops) == tokens.starts[at + 1]
-    return is_next and (following == "needs" or token in ("integer", "double"))
+    is_item = token in ("goal", "assume") and tokens.texts[at - 1] == "not"
+    return is_next and (following == "needs" or token in ("integer", "double") or is_item)
 
 
 def offset(text: str, line: int, column: int) -> int:

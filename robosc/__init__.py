@@ -11,7 +11,7 @@ As a Python API, it is these functions, one for each command (`robosc.pipeline`,
     run = robosc.simulate(result.supervisor)
     robosc.generate(result.supervisor, "ros2").write("out")
 
-The names are imported on use: who only reads a supervisor's file does not load the synthesizer.
+The names are imported on use: a program that only reads a supervisor's file does not load the synthesizer.
 """
 
 from typing import TYPE_CHECKING

@@ -1,7 +1,7 @@
-"""The engines of dd, loaded without what they would only draw with.
+"""The engines of dd, loaded without the package that they only draw with.
 
-dd imports networkx wherever that is installed, to offer its graphs; that takes three times as long as the rest of it,
-and nobody here asks for one. dd goes on without it.
+dd imports networkx if it is installed, to offer its graphs. This import takes three times as long as the rest of dd,
+and RoboSC uses no such graph. dd works without networkx.
 """
 
 import importlib
@@ -27,7 +27,7 @@ def load_dd(name: str) -> ModuleType:
     with _LOCK:
         if _DRAWS in sys.modules:
             return importlib.import_module(whole)
-        # What Python is told to take for missing (https://docs.python.org/3/reference/import.html#the-module-cache).
+        # None makes Python take the module for missing (https://docs.python.org/3/reference/import.html#the-module-cache).
         sys.modules[_DRAWS] = None  # type: ignore[assignment]
         try:
             return importlib.import_module(whole)

@@ -1,7 +1,7 @@
-"""The graph of everything the controlled system may do: as JSON values, as a table, as a drawing.
+"""The graph of all states and transitions of the controlled system: as JSON values, as a table, as a drawing.
 
-Everything allowed is in it, not only what an executor would choose. It works on plants, requirements and
-added conditions alone, so it says nothing that synthesis could have hidden.
+The graph has everything that is allowed, not only what an executor would choose. It is made from plants, requirements
+and added conditions alone, independently of synthesis.
 """
 
 from collections.abc import Callable, Mapping
@@ -198,7 +198,7 @@ def graph_columns(system: System, model: Model | None) -> tuple[str, ...]:
 
 
 def marks(system: System, model: Model) -> Callable[[Mapping[str, str], Mapping[str, str]], bool]:
-    """Return a function that tells from the states of components and the locations of communications what is marked."""
+    """Return a function that decides from component states and communication locations whether a state is marked."""
     components = {name: system.automaton(name).marked for name in _named_automata(system, model)}
     called = {item.name: system.automaton(communication_plant_name(item)).marked for item in _called(model)}
     return lambda at, location: (
@@ -208,7 +208,7 @@ def marks(system: System, model: Model) -> Callable[[Mapping[str, str], Mapping[
 
 
 def _named_automata(system: System, model: Model | None) -> list[str]:
-    """The automata that are told by their own names: components, or all where there is no model."""
+    """The automata that are shown under their own names: the components, or all automata if there is no model."""
     if model is None:
         return [automaton.name for automaton in system.automata]
     return [item.name for item in model.components if item.behaviour]

@@ -1,6 +1,6 @@
 """Pictures by Graphviz (E. R. Gansner and S. C. North, Software: Practice and Experience 30(11), 2000, pp. 1203-1233).
 
-Its program `dot` is no dependency: who has it gets pictures, and the rest is told how to get it.
+The program `dot` is no dependency: without it there are no pictures, and a message says how to install it.
 """
 
 import shutil

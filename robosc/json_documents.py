@@ -1,4 +1,4 @@
-"""JSON documents for machines: the same text wherever they are made, on the command line or in a service."""
+"""JSON documents for machines: the command line and the service write the same text."""
 
 import json
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,7 +1,7 @@
 """The record of a robot's motion: poses, velocities and events, as JSON Lines, which a simulator writes.
 
-A sample every 50 ms of the world, what happens when it happens, and the end, with a sample before it where the robot
-was elsewhere since; each line is written at once:
+The record has a sample every 50 ms of simulated time, each happening at its time, and the end, after a last sample if
+the robot has moved since. Each line is written at once:
 
     {"time": 1767225600.05, "world_s": 0.05, "x_m": 0.0, "y_m": 0.0, "heading_rad": 0.0, "linear_m_s": 0.1, ...}
     {"time": 1767225612.4, "world_s": 12.4, "happening": "goal", "x_m": 1.2, "y_m": 0.61}

@@ -1,4 +1,4 @@
-"""Names of a package that are imported on use, so that whoever needs one of them does not load all modules."""
+"""Names of a package that are imported on use, so that a program that needs one of them does not load all modules."""
 
 import importlib
 from collections.abc import Callable, Mapping

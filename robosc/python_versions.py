@@ -1,6 +1,6 @@
 """Versions of Python that RoboSC runs on, as `requires-python` of its metadata has them.
 
-Older Pythons read this module to tell that they are too old: it has nothing that Python 3.10 does not know.
+Older versions of Python read this module to report that they are too old: its syntax is that of Python 3.10.
 """
 
 OLDEST = (3, 12)

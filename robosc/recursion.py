@@ -1,4 +1,4 @@
-"""Limit of Python's recursion depth: it belongs to the whole interpreter, so everyone who needs more asks here."""
+"""Limit of Python's recursion depth: it is one limit for the whole interpreter, so all code raises it here."""
 
 import sys
 

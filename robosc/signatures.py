@@ -1,13 +1,12 @@
-"""Signatures of supervisor files: who has one vouches for every byte of the file (semantics 3.12).
+"""Signatures of supervisor files: the owner of the key vouches for every byte of the file (semantics 3.12).
 
-A signature stands in a file of its own beside the supervisor (`X.rsup.sig`), so that the supervisor's bytes stay what
-they are for everything else that reads them. It is Ed25519 (S. Josefsson, I. Liusvaara, RFC 8032, 2017) over a line
-that says what is signed, and the file. What the supervisor is for stands in the file: its whole model, the deployment
-and the digest of the texts; the signature binds them with the rest.
+A signature is in a file of its own beside the supervisor (`X.rsup.sig`), so that the supervisor's file is not changed.
+It is an Ed25519 signature (S. Josefsson, I. Liusvaara, RFC 8032, 2017) over a line that names the purpose, and the
+file. The file contains the whole model, the deployment and the digest of the texts, so the signature covers them, too.
 
-Keys are in the formats of other tools: a public one is a line as OpenSSH's (`ssh-ed25519 AAAA... comment`, so that
-`ssh-keygen -lf` tells its fingerprint), a private one PKCS #8 in PEM, readable by its owner alone. The package
-`cryptography` makes, reads and checks them all; it is imported when a signature is needed (extra `signing`).
+Keys have the formats of other tools. A public key is a line of OpenSSH (`ssh-ed25519 AAAA... comment`), so that
+`ssh-keygen -lf` prints its fingerprint. A private key is PKCS #8 in PEM, readable only by its owner. The package
+`cryptography` makes, reads and checks keys and signatures; it is imported when it is needed (extra `signing`).
 """
 
 import base64

@@ -1,4 +1,4 @@
-"""Source texts and places in them: what every diagnostic points at."""
+"""Source texts and places in them, to which every diagnostic refers."""
 
 from dataclasses import dataclass
 from functools import lru_cache

@@ -1,4 +1,4 @@
-"""Tables in HTML: what results show of themselves in a notebook."""
+"""Tables in HTML, as which results are displayed in a notebook."""
 
 from collections.abc import Iterable, Sequence
 from itertools import islice

@@ -2,8 +2,8 @@
 
 Built-in drivers are listed here; an installed distribution adds its own through the entry-point group
 `robosc_bridge.devices` (name = driver, value = `module:attribute` of a `Driver`), a program through `register`. A
-configuration is checked against the features without any device's code: so this module imports none, and `make` of a
-plug-in had better import what it needs when it is called.
+configuration is checked against the features without the code of devices: so this module imports none, and `make` of a
+plug-in should import its modules only when it is called.
 """
 
 import importlib
@@ -84,11 +84,11 @@ class Driver:
 
     Attributes:
         kind: Kind of device; `make` returns a `DriveBase` or a `RangeScanner` accordingly.
-        name: Name that it is asked for by.
+        name: Name of the driver in configurations.
         description: One line for a person.
         make: Function that makes one, without opening anything. Its arguments are `path`, of a drive base `robot`,
             and the options of the configuration, which are the driver's own.
-        features: Features of the device; None: it does not say, and whatever a configuration maps is taken to be there.
+        features: Features of the device; None: not declared, so that everything in a configuration counts as present.
     """
 
     kind: Kind
@@ -166,7 +166,7 @@ def register(driver: Driver) -> None:
 
 
 def available_drivers(kind: Kind) -> tuple[DriverInfo, ...]:
-    """Every driver of a kind, by name; those of plug-ins are imported, and left out where they cannot be."""
+    """Return every driver of a kind, by name; plug-ins are imported, and left out if their import fails."""
     infos: dict[str, DriverInfo] = {}
     for entry in entry_points(group=ENTRY_POINT_GROUP):
         try:

@@ -1,10 +1,9 @@
 """Access rules of the page: names of this server, origins, and the token.
 
-A page of another site that a browser shows on this machine can send requests here. It is kept out in three ways: the
-header `Host` must be a name of this server, so that a name of somebody else that is made to lead here is of no use
-(DNS
-rebinding); a WebSocket must come from a page of this server (`Origin`); and what makes the robot move needs a token
-that changes with each start and stands in no page but the one that was opened with it.
+A page of another site, shown by a browser on this machine, can send requests to this server. It is kept out in three
+ways: the header `Host` must be a name of this server, so that a foreign name that resolves to this machine is of no use
+(DNS rebinding); a WebSocket must come from a page of this server (`Origin`); and requests that move the robot need a
+token that changes with each start, and that only a page has which was opened with it.
 """
 
 import ipaddress
@@ -43,11 +42,11 @@ class Access:
 
     @property
     def address(self) -> str:
-        """The address to open in a browser on this machine, with the token."""
+        """Address to open in a browser on this machine, with the token."""
         return f"{self._scheme}://{joined(self._shown_host(), self._port)}/?token={self.token}"
 
     def is_ours(self, host: str | None) -> bool:
-        """Return True if a header `Host` names this server; numbers need no name service, so nobody can bend them."""
+        """Return True if a header `Host` names this server, or is an IP address, which needs no name service."""
         try:
             name, port = split_address(
                 host if host and ":" in host.rpartition("]")[2] else f"{host}:{self._default_port()}"
@@ -65,7 +64,7 @@ class Access:
         return number.is_loopback or not self._is_loopback
 
     def is_own_page(self, origin: str | None, host: str | None) -> bool:
-        """Return True if a header `Origin` is a page that this server has sent, by the name it was asked under."""
+        """Return True if a header `Origin` names a page of this server, under the name of the request."""
         return bool(host) and origin == f"{self._scheme}://{host}"
 
     def is_token(self, text: object) -> bool:

@@ -1,4 +1,4 @@
-"""Automata without a model of RoboSC, as a page shows them: to be drawn, and with the edges that an event takes."""
+"""Automata without a model of RoboSC, for the page: their drawings, and the edges that an event takes."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
@@ -50,7 +50,7 @@ def robot_of_automata(supervisor: SystemSupervisor, play: Mapping[str, Any]) -> 
 
     Args:
         supervisor: Supervisor of the automata.
-        play: Parts of what a page can have happen, besides the events.
+        play: Further parts of what a page can play, besides the events.
     """
     system = supervisor.system
     components, drawn = [], {}
@@ -147,7 +147,7 @@ class EdgesTaken:
                 self._edges.setdefault(edge.event, {}).setdefault(item.name, []).append((number, way, guard))
 
     def of(self, before: StateInWords, step: Step) -> list[int]:
-        """Return the edges that a step took from a state; of an automaton that has several none is reported."""
+        """Return the edges that a step took from a state; none for an automaton with several possible edges."""
         parts = before.parts
         state = tuple(parts[name] for name in self._subjects)
         found = []
@@ -160,7 +160,7 @@ class EdgesTaken:
 
 
 def distinct_initial_states(system: System, states: Sequence[StateInWords]) -> tuple[StateInWords, ...]:
-    """The states to begin in that differ in more than input variables, which events change at any time."""
+    """Return the initial states that differ in more than input variables, which events change at any time."""
     inputs = _input_names(system)
     found: dict[tuple[Any, ...], StateInWords] = {}
     for state in states:
@@ -170,7 +170,7 @@ def distinct_initial_states(system: System, states: Sequence[StateInWords]) -> t
 
 
 def distinguishing_parts(states: Sequence[StateInWords]) -> tuple[str, ...]:
-    """Some states, each by the values that tell it apart from the others, as `robosc simulate` takes it."""
+    """Return the values by which each state differs from the others, in the form that `robosc simulate` accepts."""
     parts = [state.parts for state in states]
     varying = [name for name in parts[0] if len({item[name] for item in parts}) > 1] if parts else []
     return tuple(", ".join(f"{name} = {value_text(item[name])}" for name in varying) for item in parts)

@@ -1,4 +1,4 @@
-"""The process that synthesizes automata for a page: what is wanted comes on standard input, what was made goes out.
+"""The process that synthesizes automata for a page: the request comes on standard input, the result goes out.
 
 It answers with a pickled `SynthesizedModel`, or with the reason why there is none, which only its parent reads.
 """
@@ -26,10 +26,10 @@ MAXIMUM_FINDINGS = 10
 
 
 def playable_automata(model: LoadedAutomata, found: SystemSynthesis) -> SynthesizedModel | str:
-    """Return what a page plays with; or the reason why there is nothing, a line for each part of it.
+    """Return the automata that a page plays with, or the reason why there are none, in lines.
 
     Raises:
-        UnsupportedModelError: There are too many states to begin in.
+        UnsupportedModelError: There are too many initial states.
     """
     if found.supervisor is None:
         return _reason(found)
@@ -57,7 +57,7 @@ def _reason(found: SystemSynthesis) -> str:
 
 
 def main() -> None:
-    """Answer what is wanted."""
+    """Answer the request."""
     wanted = msgspec.json.decode(sys.stdin.buffer.read())
     text = wanted.pop("text")
     arguments = argparse.Namespace(

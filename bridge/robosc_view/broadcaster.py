@@ -53,7 +53,7 @@ class Viewer:
         self._lost = 0
 
     def define(self, text: str) -> None:
-        """Another robot: what is known of the one before is of no use any more."""
+        """Take the definition of another robot, and drop what waits about the one before."""
         self._lost += len(self._events)
         self._events.clear()
         self._bytes = 0
@@ -62,43 +62,43 @@ class Viewer:
         self._news.set()
 
     def source_lost(self, text: str) -> None:
-        """The source is lost, until there is a robot again."""
+        """Note that the source is lost, until there is a robot again."""
         self._gone = text
         self._news.set()
 
     def jump(self) -> None:
-        """The replay is elsewhere: what waits is about another place."""
+        """Drop what waits, since the replay has jumped to another position."""
         self._events.clear()
         self._bytes = self._lost = 0
         self._update = self._scan = None
 
     def show(self, text: str) -> None:
-        """The latest update."""
+        """Take the latest update."""
         self._update = text
         self._news.set()
 
     def show_scan(self, text: str) -> None:
-        """The latest scan."""
+        """Take the latest scan."""
         self._scan = text
         self._news.set()
 
     def show_position(self, text: str) -> None:
-        """The latest position."""
+        """Take the latest position."""
         self._position = text
         self._news.set()
 
     def show_run(self, text: str) -> None:
-        """The latest of a run that is stepped by hand."""
+        """Take the latest message about a run that is stepped by hand."""
         self._run = text
         self._news.set()
 
     def answer(self, text: str) -> None:
-        """Send an answer to this page alone."""
+        """Send an answer only to this page."""
         self._answers.append(text)
         self._news.set()
 
     def append_events(self, entries: list[str], lost: int) -> None:
-        """Entries; the oldest are dropped and counted where too many wait."""
+        """Take entries; the oldest are dropped and counted if too many wait."""
         self._lost += lost
         for entry in entries:
             self._events.append(entry)
@@ -109,7 +109,7 @@ class Viewer:
         self._news.set()
 
     async def take(self) -> list[str]:
-        """Wait for something, and take all of it: messages in the order in which they are to be sent."""
+        """Wait for messages, and return all of them in the order in which they must be sent."""
         await self._news.wait()
         self._news.clear()
         found: list[str] = []
@@ -131,10 +131,10 @@ class Viewer:
 
 
 class RobotCache:
-    """Prepares robots, and keeps the last one: pages that are opened again need not wait for it.
+    """Cache of the last prepared robot, so that pages that are opened again need not wait for it.
 
     Args:
-        robot: One that is known already; None: none is.
+        robot: Robot that is known already; None: none is.
     """
 
     def __init__(self, robot: Robot | None = None) -> None:
@@ -142,7 +142,7 @@ class RobotCache:
         self._lock = asyncio.Lock()
 
     async def prepared(self, robot: Robot) -> PreparedRobot:
-        """The prepared robot."""
+        """Return the prepared robot."""
         async with self._lock:
             if self._kept is None or self._kept.robot != robot:
                 # In another thread, since the graphs of a large robot take their time.
@@ -151,7 +151,7 @@ class RobotCache:
 
 
 class Broadcaster:
-    """A source, and its viewers; it is the source's sink.
+    """Sink of a source, which passes everything on to the viewers.
 
     Args:
         source: Source that reports.
@@ -175,11 +175,11 @@ class Broadcaster:
 
     @property
     def is_watched(self) -> bool:
-        """True if anybody is watching."""
+        """True if there are viewers."""
         return bool(self._viewers)
 
     def join(self) -> Viewer:
-        """One more who looks."""
+        """Add a viewer."""
         viewer = Viewer()
         if self._builder is not None and self._prepared is not None:
             viewer.define(self._prepared.text)
@@ -194,7 +194,7 @@ class Broadcaster:
         return viewer
 
     async def leave(self, viewer: Viewer) -> None:
-        """One less; with the last one the source rests."""
+        """Remove a viewer; without viewers the source is stopped."""
         self._viewers.discard(viewer)
         if not self._viewers:
             await self.close()
@@ -261,7 +261,7 @@ class Broadcaster:
         self._is_dirty.set()
 
     def append_events(self, batch: EventBatch, first: int | None = None) -> None:
-        """Entries of the event log."""
+        """Receive entries of the event log."""
         if self._builder is None:
             return
         entries = self._builder.entries(batch, first)
@@ -269,13 +269,13 @@ class Broadcaster:
             viewer.append_events(entries, batch.lost)
 
     def show_scan(self, scan: LaserScan) -> None:
-        """A revolution of the LiDAR."""
+        """Receive a revolution of the LiDAR."""
         text = scan_text(scan)
         for viewer in self._viewers:
             viewer.show_scan(text)
 
     def replay_jumped(self) -> None:
-        """The replay is elsewhere: all of the place follows."""
+        """Receive a jump of the replay; everything about the new position follows."""
         for viewer in self._viewers:
             viewer.jump()
 

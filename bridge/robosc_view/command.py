@@ -210,7 +210,7 @@ def run(arguments: argparse.Namespace) -> int:
     """Serve the page until a signal comes.
 
     Raises:
-        CommandError: It cannot be served, or there is nothing to show.
+        CommandError: The page cannot be served, or there is nothing to show.
     """
     from robosc_view.sources import ViewError, require_view
 

@@ -30,7 +30,7 @@ _CONTROLLABLE = frozenset({"request", "cancel", "reset"})
 
 
 class DefinitionError(ValueError):
-    """Error: the definition from a source makes no sense; one sentence."""
+    """The definition from a source is invalid; one sentence."""
 
 
 class ShapeTransition(msgspec.Struct, frozen=True):
@@ -43,7 +43,7 @@ class ShapeTransition(msgspec.Struct, frozen=True):
 
     @property
     def event(self) -> str:
-        """The event, as the log names it; a silent step has no name here."""
+        """Name of the event in the log; empty for a silent step."""
         return f"{self.communication}.{self.type}" if self.communication else ""
 
 
@@ -80,10 +80,10 @@ class Shape(msgspec.Struct, frozen=True):
 
 
 def shape_of(value: Any) -> Shape:
-    """A definition out of plain values.
+    """Return a definition from plain values.
 
     Raises:
-        DefinitionError: It is none.
+        DefinitionError: The values are no definition.
     """
     try:
         return msgspec.convert(value, Shape)
@@ -121,7 +121,7 @@ class Robot:
         can_command: True if it can be stopped and commanded through the source.
         log: The log that is replayed; None: it is live.
         scene: Walls and line on the floor, and the way of a recorded run, for the map; None: not known.
-        play: Events that a page can have happen, with the data that they carry; None: it is not stepped by hand.
+        play: Events that a page can take, with the data that they carry; None: the robot is not stepped by hand.
         automata: Components by name that are automata without a model.
     """
 
@@ -166,7 +166,7 @@ def robot_of(
         can_command: True if it can be stopped and commanded.
         log: The log that is replayed.
         scene: Scene for the map.
-        play: Events that a page can have happen.
+        play: Events that a page can take.
     """
     model = supervisor.model
     topic = state_topic(model)
@@ -191,7 +191,7 @@ def robot_of(
 
 
 def communications_of(shape: Shape) -> tuple[CommunicationInfo, ...]:
-    """The communications that a definition names; the direction of messages follows from its transitions."""
+    """Return the communications that a definition names; the direction of messages follows from its transitions."""
     received = {
         transition.communication
         for component in shape.components
@@ -227,7 +227,7 @@ def table_of(shape: Shape) -> Table:
 
 
 def definition_text(robot: Robot) -> str:
-    """The message `definition`; lays out every automaton, which takes its time."""
+    """Return the message `definition`; every automaton is laid out, which takes time."""
     model = None if robot.supervisor is None else robot.supervisor.model
     message = {
         "type": "definition",

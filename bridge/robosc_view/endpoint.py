@@ -15,13 +15,13 @@ class ViewEndpoint(ServedEndpoint):
 
     Args:
         operations: The daemon.
-        settings: Settings of where and how it is served.
+        settings: Settings of the server.
 
     Raises:
         ViewError: The extra `view` is not installed, or there is no such scene.
 
     Attributes:
-        url: URL to open in a browser, with the token; empty: it does not listen yet.
+        url: URL to open in a browser, with the token; empty: the endpoint does not listen yet.
     """
 
     def __init__(self, operations: Operations, settings: ViewSettings) -> None:
@@ -40,7 +40,7 @@ class ViewEndpoint(ServedEndpoint):
         """Listen.
 
         Raises:
-            ViewError: It cannot.
+            ViewError: The endpoint cannot listen.
         """
         super().start()
         _log.info("the live view: %s", self.url)

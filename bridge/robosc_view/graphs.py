@@ -87,10 +87,10 @@ class Arrow:
     """A transition to be drawn.
 
     Attributes:
-        number: Its number in the model's definition.
-        source: The state it leaves.
-        target: The state it goes to.
-        label: Its text.
+        number: Number of the transition in the model's definition.
+        source: State that it leaves.
+        target: State that it enters.
+        label: Text of the transition.
         kind: `controllable`, `uncontrollable` or `silent`.
     """
 
@@ -114,7 +114,7 @@ class _Box:
 
 
 def layout(nodes: Sequence[Node], arrows: Sequence[Arrow]) -> dict[str, Any] | None:
-    """The drawing, in pixels, as the page receives it; None: the automaton is too large for one.
+    """Return the drawing for the page, in pixels; None: the automaton is too large for one.
 
     The place of a state or label is its middle; the points of an edge go from border to border.
     """
@@ -124,7 +124,7 @@ def layout(nodes: Sequence[Node], arrows: Sequence[Arrow]) -> dict[str, Any] | N
 
 
 def layers_of(nodes: Sequence[Node], arrows: Sequence[Arrow]) -> dict[str, int]:
-    """The layer of each state, the initial one's 0: an edge that is not turned round leads to a later one."""
+    """Return the layer of each state; the initial one has 0, and edges that are not reversed lead to a later one."""
     after: dict[str, list[str]] = {node.name: [] for node in nodes}
     for arrow in arrows:
         if arrow.source != arrow.target:
@@ -278,7 +278,7 @@ class _Drawing:
         return found
 
     def as_json(self) -> dict[str, Any]:
-        """The drawing as JSON values."""
+        """Return the drawing as JSON values."""
         states = [self._state(place, node) for place, node in enumerate(self._nodes)]
         edges = [self._edge(arrow, way) for arrow, way in zip(self._arrows, self._ways, strict=True)]
         by_name = {state["name"]: state for state in states}
@@ -354,7 +354,7 @@ def _width(arrow: Arrow) -> float:
 
 
 def shortened(label: str) -> str:
-    """A label that is not too long."""
+    """Return a label, shortened if it is too long."""
     return label if len(label) <= MAXIMUM_LABEL else label[: MAXIMUM_LABEL - 3] + "..."
 
 

@@ -30,15 +30,15 @@ _SHOWN_APART = ("time", "kind", "event", "controllable", "state", "decision_us",
 
 
 class PreparedRobot:
-    """Data made of a robot once, since it takes its time: laid out graphs, and what its requests need.
+    """Data that is computed once for a robot, since it takes time: laid out graphs, and the judge of its requests.
 
     Args:
         robot: Robot as the source defines it.
 
     Attributes:
-        robot: The same.
+        robot: Robot as the source defines it.
         text: The message `definition`.
-        requests: Judge of its requests; None: nobody knows its supervisor.
+        requests: Judge of its requests; None: the supervisor is not known.
     """
 
     def __init__(self, robot: Robot) -> None:
@@ -49,7 +49,7 @@ class PreparedRobot:
 
 
 class MessageBuilder:
-    """Reporter of what one robot does.
+    """Builder of the messages about one robot.
 
     Args:
         prepared: Robot, prepared for it.
@@ -102,7 +102,7 @@ class MessageBuilder:
         return _text(message)
 
     def entries(self, batch: EventBatch, first: int | None = None) -> list[str]:
-        """Return entries of the event log, each as the JSON text that stands in the message `events`.
+        """Return entries of the event log, each as a JSON text for the message `events`.
 
         Args:
             batch: Entries that happened.
@@ -116,7 +116,7 @@ class MessageBuilder:
         return [self._entry(entry) for entry in batch.entries]
 
     def begin(self, components: Mapping[str, Any]) -> None:
-        """The entries that follow begin in a state that is known."""
+        """Take the known state in which the next entries begin."""
         self._tracker.begin(components)
 
     def _entry(self, entry: Entry) -> str:
@@ -200,15 +200,15 @@ class TransitionTracker:
         self._before: Mapping[str, str | None] = {}
 
     def forget(self) -> None:
-        """The state is not known any more."""
+        """Forget the state, which is no longer known."""
         self._before = {}
 
     def begin(self, components: Mapping[str, Any]) -> None:
-        """The state is this one; an empty one is the initial state."""
+        """Set the state; an empty one is the initial state."""
         self._before = _states(components) or dict(self._initial)
 
     def of(self, entry: Mapping[str, Any]) -> Iterator[tuple[str, int]]:
-        """Components and numbers of the transitions of an entry."""
+        """Return the components and numbers of the transitions of an entry."""
         kind = entry.get("kind")
         if "transitions" in entry:
             # Numbers come with the entry only from the bridge's own sources; in a log they may be anything.
@@ -276,24 +276,24 @@ def _word(value: Any, depth: int = 0) -> str:
 
 
 def scan_text(scan: LaserScan) -> str:
-    """The message `scan`."""
+    """Return the message `scan`."""
     ranges = [round(value, 3) if math.isfinite(value) else None for value in scan.ranges_m]
     pose = None if scan.pose is None else [_number(value) for value in scan.pose]
     return _text({"type": "scan", "ranges_m": ranges, "pose": pose})
 
 
 def events_text(entries: Sequence[str], lost: int) -> str:
-    """The message `events`, of entries as `MessageBuilder.entries` made them."""
+    """Return the message `events` for entries that `MessageBuilder.entries` has made."""
     return f'{{"type":"events","entries":[{",".join(entries)}],"lost":{lost}}}'
 
 
 def position_text(time_s: float, speed: float, *, is_playing: bool) -> str:
-    """The message `position`."""
+    """Return the message `position`."""
     return _text({"type": "position", "time_s": time_s, "is_playing": is_playing, "speed": speed})
 
 
 def run_text(run: "ManualRun", entries: int, report: RunReport, beginning: int = 0) -> str:
-    """The message `run`: what can happen in a run that is stepped by hand, and what was just done.
+    """Return the message `run`: the possible events of a run that is stepped by hand, and what was just done.
 
     Args:
         run: The run.
@@ -321,22 +321,22 @@ def run_text(run: "ManualRun", entries: int, report: RunReport, beginning: int =
 
 
 def saved_text(name: str, text: str) -> str:
-    """The message `saved`: a file for whoever asked for it."""
+    """Return the message `saved`: a file for the page that requested it."""
     return _text({"type": "saved", "name": name, "text": text})
 
 
 def refused_text(what: str, why: str) -> str:
-    """The message `refused`."""
+    """Return the message `refused`."""
     return _text({"type": "refused", "what": what, "why": why})
 
 
 def done_text(what: str) -> str:
-    """The message `done`."""
+    """Return the message `done`."""
     return _text({"type": "done", "what": what})
 
 
 def source_lost_text(why: str) -> str:
-    """The message `gone`."""
+    """Return the message `gone`."""
     return _text({"type": "gone", "why": why})
 
 

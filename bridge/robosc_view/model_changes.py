@@ -1,4 +1,4 @@
-"""Changes between two makes of a model, in sentences for whoever has just saved its file."""
+"""Changes between two versions of a model, in sentences for the person who has just saved its file."""
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
@@ -12,7 +12,7 @@ MAXIMUM_CHANGES = 30
 
 
 def model_changes(before: SynthesizedModel, after: SynthesizedModel) -> tuple[str, ...]:
-    """Return what has become another: states, events, conditions of the supervisor, findings."""
+    """Return the changes of states, events, conditions of the supervisor and findings."""
     old, new = _synthesized(before), _synthesized(after)
     found = [*_sizes(old, new), *_events(old, new), *_conditions(old, new), *_findings(before.findings, after.findings)]
     if not found:

@@ -14,7 +14,7 @@ _DIGITS = 4
 
 
 class MotionTrace:
-    """Motion as the page shows it: in the coordinates of its map.
+    """Motion of the robot in the coordinates of the page's map.
 
     Args:
         motion: The record.

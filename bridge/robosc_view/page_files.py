@@ -23,10 +23,10 @@ TYPES = {
 
 @dataclass(frozen=True, slots=True)
 class PageFiles:
-    """The page.
+    """Files of the page.
 
     Attributes:
-        index: Its text, without a token.
+        index: Text of the page, without a token.
         assets: Type and bytes of the other files, by name.
     """
 
@@ -34,15 +34,15 @@ class PageFiles:
     assets: dict[str, tuple[str, bytes]]
 
     def with_token(self, token: str) -> str:
-        """The page for somebody who has shown the token."""
+        """Return the page for a browser that has sent the token."""
         return self.index.replace(TOKEN_PLACE, f'<meta name="robosc-token" content="{token}">', 1)
 
 
 def read_page(folder: Path = FOLDER) -> PageFiles:
-    """The files of a folder.
+    """Return the files of a folder.
 
     Raises:
-        ViewError: They are not there, or are not such a page.
+        ViewError: A file is missing or invalid.
     """
     try:
         found = {item.name: _read(item) for item in sorted(folder.iterdir()) if item.suffix in TYPES}

@@ -1,4 +1,4 @@
-"""The source for a model that nothing executes: whoever opens a page steps it by hand, each a run of its own.
+"""The source for a model that is not executed: a person steps it by hand, and each page has its own run.
 
 The run is that of `robosc simulate`: events with data, undo and redo, walks by chance and until there is a finding,
 kept as an event log or a test. For automata, a person also chooses the initial state and the outcome of an event.
@@ -64,10 +64,10 @@ def packed(text: str) -> str | None:
 
 
 def unpacked(text: str) -> str:
-    """The model's text that stands in a link.
+    """Return the model's text in a link.
 
     Raises:
-        RefusedError: There is none.
+        RefusedError: The link has no model.
     """
     try:
         content = base64.urlsafe_b64decode(text + "=" * (-len(text) % 4))
@@ -85,8 +85,8 @@ class StoredRun:
     """A run of a page.
 
     Attributes:
-        own: Model of the link that it plays with; None: the watched one.
-        history: Steps that were taken.
+        own: Model of a link that the run uses; None: the watched one.
+        history: Steps that the run has taken.
         beginning: Parts of the state that it has begun in.
     """
 
@@ -96,20 +96,20 @@ class StoredRun:
 
 
 class StoredRuns:
-    """Runs of pages, for pages that come back: after a lost connection, or loaded again. The oldest are forgotten."""
+    """Runs of pages that may come back after a lost connection or a reload. The oldest are forgotten."""
 
     def __init__(self) -> None:
         self._runs: OrderedDict[str, StoredRun] = OrderedDict()
 
     def keep(self, page: str, run: StoredRun) -> None:
-        """Keep what a page has done."""
+        """Store the run of a page."""
         self._runs[page] = run
         self._runs.move_to_end(page)
         while len(self._runs) > MAXIMUM_KEPT:
             self._runs.popitem(last=False)
 
     def of(self, page: str) -> StoredRun:
-        """Return the run that was kept of a page; an empty one where none was."""
+        """Return the stored run of a page; an empty one if there is none."""
         return self._runs.get(page, StoredRun())
 
 
@@ -120,7 +120,7 @@ class Playground:
         watched: The model.
         kept: Runs of pages that may come back.
         file: File of the model, for saved tests; None: it has none.
-        make: Function that makes a model of a text and its language: of a link that is opened.
+        make: Function that makes a model from the text and language of a link.
         scene: Scene for the map.
         clock: Function that returns the time of what is reported, in seconds since 1970-01-01 UTC.
     """
@@ -178,7 +178,7 @@ class Playground:
                     await self._show(sink, RunReport("wrong", (str(error),)))
 
     def submit(self, command: RunCommand) -> None:
-        """Submit a command for the run; it is done after those before it.
+        """Submit a command for the run; it is carried out after the commands before it.
 
         Raises:
             RefusedError: Too much waits already.
@@ -188,7 +188,7 @@ class Playground:
         self._commands.put_nowait(command)
 
     async def order(self, command: OperatorCommand, by: str) -> None:
-        """Not here: nothing is executed.
+        """Refuse a command for the robot: no robot is running.
 
         Raises:
             RefusedError: Always.
@@ -196,7 +196,7 @@ class Playground:
         raise RefusedError("nothing is executed here")
 
     def control_replay(self, command: ReplayCommand) -> None:
-        """Not here.
+        """Refuse to control a replay: there is none.
 
         Raises:
             RefusedError: Always.
@@ -437,7 +437,7 @@ def _run_of(made: SynthesizedModel, beginning: int) -> tuple[Run | SystemRun, Ed
 
 
 def playable(made: SynthesizedModel, scene: Any = None) -> Robot:
-    """Return the robot of a model that is played with."""
+    """Return the robot of a model that is stepped by hand."""
     play: dict[str, Any] = {
         "language": made.language,
         "link": None if made.text is None else packed(made.text),

@@ -1,4 +1,4 @@
-"""The source for a bridge elsewhere, over its gRPC service; each stream is read in a thread of its own."""
+"""The source for a bridge in another process, over its gRPC service; each stream is read in a thread of its own."""
 
 import asyncio
 import contextlib
@@ -53,7 +53,7 @@ class RemoteBridge:
     Args:
         address: `HOST:PORT` of its service.
         credentials: Certificates and token.
-        scene: For the map.
+        scene: Scene for the map.
     """
 
     def __init__(self, address: str, credentials: Credentials, scene: Any = None) -> None:
@@ -68,8 +68,8 @@ class RemoteBridge:
         """Pass on the responses of the bridge to the sink, until cancelled.
 
         Raises:
-            SourceLostError: It cannot be reached any more.
-            SourceWrongError: It refuses, or is none.
+            SourceLostError: The bridge cannot be reached any more.
+            SourceWrongError: The bridge refuses, or the address is that of another program.
         """
         if self._defining is None or self._defining.done():
             self._defining = _background_task(self._asked(lambda client: robot_from(client.definition(), self._scene)))
@@ -86,10 +86,10 @@ class RemoteBridge:
             watch.close()
 
     async def order(self, command: OperatorCommand, by: str) -> None:
-        """Want something of the bridge.
+        """Give a command to the bridge, and return when it is done.
 
         Raises:
-            RefusedError: It does not do it.
+            RefusedError: The bridge refuses the command.
         """
         try:
             if command is OperatorCommand.STOP:
@@ -101,7 +101,7 @@ class RemoteBridge:
             raise RefusedError(str(error)) from error
 
     def control_replay(self, command: ReplayCommand) -> None:
-        """Not here: it is live.
+        """Refuse to control a replay: the source is live.
 
         Raises:
             RefusedError: Always.
@@ -192,13 +192,13 @@ class _Watch:
         self._thread.start()
 
     async def next(self) -> WatchResponse:
-        """The next response; raises what ended the stream."""
+        """Return the next response; raises the error that ended the stream."""
         response = await self._next
         self._next = self._loop.create_future()
         return response
 
     def go_on(self) -> None:
-        """The response was passed on."""
+        """Let the thread read on, since the response was passed on."""
         self._go.release()
 
     def close(self) -> None:
@@ -238,10 +238,10 @@ def _pass_on(response: WatchResponse, sink: Sink) -> None:
 
 
 def robot_from(answer: Any, scene: Any = None) -> Robot:
-    """The robot that a bridge defines.
+    """Return the robot that a bridge defines.
 
     Raises:
-        DefinitionError: It makes no sense.
+        DefinitionError: The definition is invalid.
     """
     supervisor = _supervisor(answer)
     channels = {item.name: item.channel for item in answer.communications}
@@ -282,7 +282,7 @@ def _supervisor(answer: Any) -> Supervisor | None:
 
 
 def status_of(snapshot: Snapshot) -> Status:
-    """A snapshot of the bridge."""
+    """Return the status in a snapshot of the bridge."""
     components = {
         item.name: {"state": item.state, "variables": MessageToDict(item.variables)} for item in snapshot.components
     }

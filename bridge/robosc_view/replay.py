@@ -1,4 +1,4 @@
-"""The source for an event log: any of its moments, and all of it again as it happened, at any speed.
+"""The source for an event log: it shows any moment of the log, and replays the log at any speed.
 
 The log states the state of the components after each event. The states of services and actions follow from the events:
 each event leads to one location of the protocol, whatever the location before.
@@ -60,12 +60,12 @@ class Recording:
 
     Args:
         run: The log.
-        supervisor: It was written under, with its model.
-        scene: For the map.
-        motion: Motion of the robot in the map; None: nobody has recorded it.
+        supervisor: Supervisor under which the log was written, with its model.
+        scene: Scene for the map.
+        motion: Motion of the robot in the map; None: it was not recorded.
 
     Raises:
-        ViewError: The log is empty, or one of another model.
+        ViewError: The log is empty, or belongs to another model.
     """
 
     def __init__(
@@ -99,16 +99,16 @@ class Recording:
         return bisect_right(self.times_s, time_s)
 
     def frame(self, number: int) -> Frame:
-        """The state after so many entries."""
+        """Return the state after a number of entries."""
         return self._frames[number]
 
     def last(self, number: int) -> Mapping[str, int]:
-        """The last transition of each component that has taken one, after so many entries."""
+        """Return the last transition of each component that has taken one, after a number of entries."""
         return self._last.after(number)
 
 
 class LastTaken:
-    """Transition that each component took last, after any number of entries, since the model began.
+    """Last transition of each component, after any number of entries since the start of the model.
 
     Args:
         tracker: Tracker of the transitions that entries take; in the initial state.
@@ -129,7 +129,7 @@ class LastTaken:
                 transitions.append(transition)
 
     def after(self, count: int) -> dict[str, int]:
-        """Numbers of the transitions by component, after so many entries."""
+        """Return the numbers of the transitions by component, after a number of entries."""
         begin = self._begins[bisect_right(self._begins, count) - 1]
         found = {}
         for component, (counts, transitions) in self._taken.items():
@@ -178,7 +178,7 @@ def _frames(run: LoggedRun, model: Model) -> list[Frame]:
 
 
 def first_frame(model: Model) -> Frame:
-    """The state before anything has happened."""
+    """Return the state before the first entry."""
     components = {
         component.name: {
             "state": component.behaviour.initial,
@@ -191,7 +191,7 @@ def first_frame(model: Model) -> Frame:
 
 
 class Player:
-    """Position of a replay; knows no clock.
+    """Position of a replay, independent of any clock.
 
     Args:
         recording: Recording that is replayed.
@@ -199,7 +199,7 @@ class Player:
     Attributes:
         time_s: Position in the log's time.
         speed: Seconds of the log in a second.
-        is_playing: True if it goes on by itself.
+        is_playing: True if the replay advances with time.
     """
 
     def __init__(self, recording: Recording) -> None:
@@ -209,7 +209,7 @@ class Player:
         self.is_playing = False
 
     def control_replay(self, command: ReplayCommand) -> None:
-        """Move, go on or stand still."""
+        """Seek, play or pause."""
         recording = self._recording
         match command:
             case Seek(time_s=time_s):
@@ -222,7 +222,7 @@ class Player:
                 self.is_playing = False
 
     def advance(self, passed_s: float) -> None:
-        """Some time has passed."""
+        """Advance the position by the time that has passed."""
         if self.is_playing:
             self.time_s = min(self.time_s + passed_s * self.speed, self._recording.end_s)
             self.is_playing = self.time_s < self._recording.end_s
@@ -268,7 +268,7 @@ class Replay:
                 shown = self._go_on(sink, shown)
 
     async def order(self, command: OperatorCommand, by: str) -> None:
-        """Not here: it is over.
+        """Refuse a command for the robot: the run is over.
 
         Raises:
             RefusedError: Always.
@@ -276,7 +276,7 @@ class Replay:
         raise RefusedError("what is replayed cannot be commanded")
 
     def control_replay(self, command: ReplayCommand) -> None:
-        """Move in the log; done with the next step."""
+        """Seek, play or pause; takes effect with the next step."""
         if len(self._commands) >= MOST_AT_ONCE:
             del self._commands[0]
         self._commands.append(command)

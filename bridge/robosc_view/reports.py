@@ -9,7 +9,7 @@ from robosc.execution.runtime.event_log import Entry
 
 
 class SourceKind(StrEnum):
-    """Source of what is shown."""
+    """Kind of source."""
 
     BRIDGE = "bridge"
     ROS2 = "ros2"
@@ -22,11 +22,11 @@ class CommunicationInfo:
     """A communication of the model.
 
     Attributes:
-        name: Its name.
+        name: Name of the communication.
         component: Component that declares it.
         kind: `incoming message`, `outgoing message`, `service` or `action`.
-        identifier: Its topic, service or action.
-        channel: Channel that it is mapped to in a bridge; empty: nothing is known of that.
+        identifier: Name of its topic, service or action.
+        channel: Channel that it is mapped to in a bridge; empty: unknown.
     """
 
     name: str
@@ -42,8 +42,8 @@ class LogSpan:
 
     Attributes:
         begin_s: Time of its first entry, in seconds since 1970-01-01 UTC.
-        end_s: Time of its last one.
-        count: Its entries.
+        end_s: Time of its last entry.
+        count: Number of its entries.
     """
 
     begin_s: float
@@ -84,20 +84,20 @@ class Status:
     """Status of the robot: what it is doing.
 
     Attributes:
-        time_s: Time when that was so, in seconds since 1970-01-01 UTC.
+        time_s: Time of the status, in seconds since 1970-01-01 UTC.
         state: State of the bridge; empty: there is none.
-        problem: The fault that has stopped it; empty: none.
+        problem: Fault that has stopped the robot; empty: none.
         reasons: Reasons why nothing moves.
-        warnings: Warnings that a person should know though it moves.
+        warnings: Warnings for a person that do not stop the robot.
         stops: Reasons why nothing is requested.
         devices: Devices, with True for each that works.
         components: State and variables of each component with a behaviour; empty: nothing is executed.
         communications: Location of services and actions, as far as they are known.
-        enabled: Names of the communications that may be requested, as the executor says; None: nobody says so.
+        enabled: Names of the communications that may be requested, as the executor reports; None: not reported.
         drive: Report of the drive base; None: none.
-        age_s: Age of this when it came, in seconds.
-        last: Number of the transition that each component took last; of one that is not named none is known. None:
-            the entries show it.
+        age_s: Age of the status when it came, in seconds.
+        last: Number of the transition that each component took last; unknown for components that are not named. None:
+            it follows from the entries.
         latencies: Times that the bridge measures of itself: name, 50th and 99th percentile and maximum in milliseconds.
     """
 
@@ -138,7 +138,7 @@ class Choice:
 
     Attributes:
         event: The event.
-        line: The event with its data, as it was wanted.
+        line: The event with its data, as it was requested.
         ways: States that it can lead to, each by the values in which it differs from the others.
     """
 

@@ -43,7 +43,7 @@ class Stop:
 
 @dataclass(frozen=True, slots=True)
 class RobotCommand:
-    """Command that is wanted of the robot.
+    """Command for the robot.
 
     Attributes:
         command: The command.
@@ -60,7 +60,7 @@ class TakeEvent:
 
     Attributes:
         line: The event with its data, as in a file of events.
-        way: Number of the state that it leads to, of those that were reported; None: there is one.
+        way: Number of the state that it leads to, among those that were reported; None: there is only one.
     """
 
     line: str
@@ -109,10 +109,10 @@ class Form(StrEnum):
 
 @dataclass(frozen=True, slots=True)
 class Save:
-    """Keep what has happened.
+    """Save the run.
 
     Attributes:
-        form: Form in which it is kept.
+        form: Form in which it is saved.
     """
 
     form: Form
@@ -120,12 +120,12 @@ class Save:
 
 @dataclass(frozen=True, slots=True)
 class LoadModel:
-    """Play with the model of a link.
+    """Load the model of a link.
 
     Attributes:
-        packed: Part of the link that holds it.
+        packed: Part of the link that contains the model.
         language: Language of the model.
-        token: Token that is shown for it: a link that somebody else has made is not to set this machine to work.
+        token: Token for the request, so that a foreign link cannot start a synthesis on this machine.
     """
 
     packed: str
@@ -135,10 +135,10 @@ class LoadModel:
 
 @dataclass(frozen=True, slots=True)
 class Resume:
-    """Go on with the run that this page had before its connection was lost, or before it was loaded again.
+    """Continue the run that this page had before its connection was lost, or before a reload.
 
     Attributes:
-        page: Name that the page has given itself.
+        page: Name that the page has chosen for itself.
     """
 
     page: str
@@ -149,7 +149,7 @@ RunCommand = TakeEvent | HistoryMove | Restart | Walk | Save | LoadModel | Resum
 
 @runtime_checkable
 class ManualSource(Source, Protocol):
-    """A source whose run a page leads by hand."""
+    """Source whose run is stepped by hand from a page."""
 
     def submit(self, command: RunCommand) -> None:
         """Submit a command for the run.
@@ -166,7 +166,7 @@ def parse_request(text: str) -> PageRequest:
     """Return the request in a text.
 
     Raises:
-        RefusedError: It makes no sense.
+        RefusedError: The request is invalid.
     """
     try:
         document = json.loads(text, parse_constant=_refuse)

@@ -74,11 +74,11 @@ class _Received:
 
 
 class StateReader:
-    """Reads the texts of the topic; needs no ROS.
+    """Reader of the topic's messages; needs no ROS.
 
     Args:
-        supervisor: Of the node, with its model; None: not known.
-        scene: For the map.
+        supervisor: Supervisor of the node, with its model; None: not known.
+        scene: Scene for the map.
     """
 
     def __init__(self, supervisor: Supervisor | None, scene: Any = None) -> None:
@@ -96,7 +96,7 @@ class StateReader:
             time_s: Time when it came, in seconds since 1970-01-01 UTC.
 
         Raises:
-            DefinitionError: It makes no sense, or is of another model.
+            DefinitionError: The message is invalid, or belongs to another model.
         """
         if len(text) > MAXIMUM_CHARACTERS:
             raise DefinitionError(f"a message on /state has more than {MAXIMUM_CHARACTERS} characters")
@@ -247,9 +247,9 @@ class StateTopic:
     """The topic of a node.
 
     Args:
-        namespace: Before `/state`, such as `/robot1`; empty: none.
-        supervisor: Of the node, with its model; None: not known.
-        scene: For the map.
+        namespace: Namespace of `/state`, such as `/robot1`; empty: none.
+        supervisor: Supervisor of the node, with its model; None: not known.
+        scene: Scene for the map.
     """
 
     def __init__(self, namespace: str = "", supervisor: Supervisor | None = None, scene: Any = None) -> None:
@@ -261,8 +261,8 @@ class StateTopic:
         """Pass on the messages of the node to the sink, until cancelled.
 
         Raises:
-            SourceLostError: Nothing is heard of it.
-            SourceWrongError: There is no ROS 2, or what is heard makes no sense.
+            SourceLostError: No messages come.
+            SourceWrongError: There is no ROS 2, or a message is invalid.
         """
         listener = _Listener(self._topic, StateReader(self._supervisor, self._scene), asyncio.get_running_loop())
         listener.start()
@@ -283,7 +283,7 @@ class StateTopic:
             listener.close()
 
     async def order(self, command: OperatorCommand, by: str) -> None:
-        """Not here: a node hears its own topics alone.
+        """Refuse a command for the robot: a node listens only to its own topics.
 
         Raises:
             RefusedError: Always.
@@ -291,7 +291,7 @@ class StateTopic:
         raise RefusedError("a ROS 2 node cannot be commanded from here")
 
     def control_replay(self, command: ReplayCommand) -> None:
-        """Not here: it is live.
+        """Refuse to control a replay: the source is live.
 
         Raises:
             RefusedError: Always.

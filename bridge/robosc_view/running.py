@@ -27,7 +27,7 @@ class RunningBridge:
 
     Args:
         operations: The daemon.
-        scene: For the map.
+        scene: Scene for the map.
     """
 
     def __init__(self, operations: Operations, scene: Mapping[str, Any] | None = None) -> None:
@@ -65,10 +65,10 @@ class RunningBridge:
             subscription.close()
 
     async def order(self, command: OperatorCommand, by: str) -> None:
-        """Want something; a stop takes effect before this returns.
+        """Give a command to the daemon, and return when it is done; a stop takes effect at once.
 
         Raises:
-            RefusedError: It is not done.
+            RefusedError: The daemon refuses the command.
         """
         future = self._operations.order(command, by)
         if command is OperatorCommand.STOP:
@@ -97,7 +97,7 @@ class RunningBridge:
             raise RefusedError(refusal)
 
     def control_replay(self, command: ReplayCommand) -> None:
-        """Not here: it is live.
+        """Refuse to control a replay: the source is live.
 
         Raises:
             RefusedError: Always.
@@ -129,7 +129,7 @@ class _Caller:
 
 
 def status_of(snapshot: Snapshot) -> Status:
-    """A snapshot of the daemon."""
+    """Return the status in a snapshot of the daemon."""
     reading = snapshot.reading
     return Status(
         time_s=snapshot.time_s,

@@ -15,13 +15,13 @@ def scene_map(source: str | None, seed: int = 0) -> Mapping[str, Any] | None:
 
     Args:
         source: Name or file of a scene; None: nothing is known.
-        seed: Seed of what the scene leaves to chance.
+        seed: Seed of the random parts of the scene.
 
     Returns:
         `walls`, each [x1, y1, x2, y2], and `line`, each [x, y]; in metres.
 
     Raises:
-        ViewError: There is no such scene, or something in it is wrong.
+        ViewError: There is no such scene, or the scene is invalid.
     """
     if source is None:
         return None
@@ -42,7 +42,7 @@ def scene_start(source: str | None, seed: int = 0) -> tuple[float, float, float]
 
 
 def scene_from_start(scene: Scene) -> Mapping[str, Any]:
-    """A scene in the form that `scene_map` returns."""
+    """Return a scene in the form that `scene_map` returns."""
     begin_x_m, begin_y_m, heading_rad = scene.start
     cosine, sine = math.cos(heading_rad), math.sin(heading_rad)
 

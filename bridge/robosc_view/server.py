@@ -86,7 +86,7 @@ _CLOSE_LIMIT_S = 2.0
 
 
 def answer_headers(framed_by: Sequence[str] = ()) -> dict[str, str]:
-    """Headers of every answer.
+    """Return the headers of every answer.
 
     Args:
         framed_by: Origins, or schemes with their colon, whose pages may show this one in a frame.
@@ -105,13 +105,13 @@ class ViewServer:
     """Server of one source; lives in one event loop.
 
     Args:
-        settings: Settings of where and how it serves.
-        source: Function that returns the source; called for each page where each has a replay of its own, else once.
-        is_shared: True if all pages see the same.
-        robot: Robot that will be shown, where that is known: laid out now, before anything moves.
+        settings: Settings of the server.
+        source: Function that returns the source; called for each page if each has a replay of its own, else once.
+        is_shared: True if all pages share one source.
+        robot: Robot that will be shown, if it is known: its drawings are made now, before anything moves.
 
     Attributes:
-        address: `HOST:PORT` that it listens on; empty: it does not yet.
+        address: `HOST:PORT` that it listens on; empty: it does not listen yet.
         url: URL to open in a browser, with the token.
     """
 
@@ -140,7 +140,7 @@ class ViewServer:
         """Listen.
 
         Raises:
-            ViewError: It cannot.
+            ViewError: The server cannot listen.
         """
         settings = self._settings
         self._page = read_page()
@@ -185,7 +185,7 @@ class ViewServer:
         self._sweep = asyncio.create_task(self._sweep_up())
 
     async def stop(self) -> None:
-        """End every connection and give the port back."""
+        """End every connection and close the port."""
         if self._sweep is not None:
             self._sweep.cancel()
         if self._server is not None:
@@ -391,7 +391,7 @@ class _Session:
         self._last_s = asyncio.get_running_loop().time()
 
     async def read(self) -> None:
-        """Do what the page asks for, until it leaves."""
+        """Carry out the requests of the page, until it leaves."""
         async for message in self._page:
             if message.type is not WSMsgType.TEXT:
                 await _close(self._page, WSCloseCode.UNSUPPORTED_DATA, b"only texts are understood")
@@ -401,7 +401,7 @@ class _Session:
                 return
 
     def close(self) -> None:
-        """The page has left: commands that wait for an answer are taken back. Of a stop only its answer is."""
+        """Revoke the commands of a page that has left and that wait for an answer; a stop is never revoked."""
         for task in (*self._tasks, *self._stops):
             task.cancel()
 

@@ -12,7 +12,7 @@ from robosc_view.reports import EventBatch, LaserScan, Status
 
 
 class ViewError(BridgeError):
-    """The live view cannot be served as it is asked for; one sentence."""
+    """The live view cannot be served as requested; one sentence."""
 
 
 class SourceLostError(Exception):
@@ -20,42 +20,42 @@ class SourceLostError(Exception):
 
 
 class SourceWrongError(Exception):
-    """A source cannot be used, and trying again would not help before somebody changed something; one sentence."""
+    """A source cannot be used, and another attempt cannot succeed without a change; one sentence."""
 
 
 class RefusedError(Exception):
-    """Refusal of what was asked for; one sentence for a person."""
+    """Refusal of a request; one sentence for a person."""
 
 
 class Sink(Protocol):
-    """Receiver of what a source reports; used in the event loop of the server alone."""
+    """Receiver of a source's reports; used only in the event loop of the server."""
 
     async def define(self, robot: Robot) -> None:
-        """Define the robot; called first, and again where it has become another."""
+        """Define the robot; called first, and again after a change of the robot."""
 
     def begin(self, components: Mapping[str, object]) -> None:
         """Receive the known state in which what happens next begins; an empty one is the initial state."""
 
     def show(self, status: Status) -> None:
-        """Receive what the robot is doing; the latest alone counts."""
+        """Receive what the robot is doing; only the latest counts."""
 
     def append_events(self, batch: EventBatch, first: int | None = None) -> None:
-        """Entries of the event log; `first` is the number of the first of them, where they have one of their own."""
+        """Receive entries of the event log; `first` is the number of the first one, if entries have numbers."""
 
     def show_scan(self, scan: LaserScan) -> None:
-        """A revolution of the LiDAR; the latest alone counts."""
+        """Receive a revolution of the LiDAR; only the latest counts."""
 
     def replay_jumped(self) -> None:
-        """The replay of a log has jumped to another position; everything about that position follows."""
+        """Receive a jump of the replay to another position; everything about that position follows."""
 
     def show_position(self, time_s: float, speed: float, *, is_playing: bool) -> None:
         """Receive the position of the replay of a log."""
 
     def show_run(self, text: str) -> None:
-        """Receive the message `run` of a run that is stepped by hand; the latest alone counts."""
+        """Receive the message `run` of a run that is stepped by hand; only the latest counts."""
 
     def answer(self, text: str) -> None:
-        """Receive a message that answers a page; each is reported once."""
+        """Receive a message that answers a page; each is sent once."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +63,7 @@ class Seek:
     """Go to a time of the log.
 
     Attributes:
-        time_s: In seconds since 1970-01-01 UTC.
+        time_s: Time in seconds since 1970-01-01 UTC.
     """
 
     time_s: float
@@ -71,7 +71,7 @@ class Seek:
 
 @dataclass(frozen=True, slots=True)
 class Play:
-    """Play the log on.
+    """Continue to play the log.
 
     Attributes:
         speed: Seconds of the log in a second.
@@ -82,7 +82,7 @@ class Play:
 
 @dataclass(frozen=True, slots=True)
 class Pause:
-    """Stand still in the log."""
+    """Pause the replay of the log."""
 
 
 ReplayCommand = Seek | Play | Pause
@@ -95,21 +95,21 @@ class Source(Protocol):
         """Report everything to the sink, until cancelled.
 
         Raises:
-            SourceLostError: It is gone.
-            SourceWrongError: It cannot be used as it is.
+            SourceLostError: The source is gone.
+            SourceWrongError: The source cannot be used.
         """
 
     async def order(self, command: OperatorCommand, by: str) -> None:
-        """Want something of the robot; returns once it is done.
+        """Give a command to the robot; returns once it is done.
 
-        A stop is certain as soon as this first waits: it is carried out even if nobody awaits its answer any more.
+        A stop is certain as soon as this waits for the first time: it is carried out even if its caller is cancelled.
 
         Raises:
-            RefusedError: It is not done.
+            RefusedError: The command is refused.
         """
 
     def control_replay(self, command: ReplayCommand) -> None:
-        """Move in what is replayed.
+        """Control the replay.
 
         Raises:
             RefusedError: Nothing is replayed.
@@ -117,15 +117,15 @@ class Source(Protocol):
 
 
 def not_replayed() -> RefusedError:
-    """Return the answer of a live source to those who would move in time."""
+    """Return the error of a live source for requests about a replay."""
     return RefusedError("this robot is shown live: only a log can be replayed")
 
 
 def require_view() -> None:
-    """Raise where the extra `view` is missing.
+    """Do nothing if the extra `view` is installed.
 
     Raises:
-        ViewError: It is, with what to do about it.
+        ViewError: The extra is missing; the message says how to install it.
     """
     missing = [name for name in ("aiohttp", "igraph") if importlib.util.find_spec(name) is None]
     if missing:

@@ -1,4 +1,4 @@
-"""A model that is played with: its supervisor, made anew whenever its files change.
+"""A model that is stepped by hand: its supervisor is made anew whenever its files change.
 
 A model that was changed is synthesized in a process of its own, which the next change ends. Until there is another
 supervisor the one before stays, with why it is not the file's.
@@ -28,19 +28,19 @@ LOOK_S = 0.3
 
 
 class NoSupervisorError(Exception):
-    """The model as it is has no supervisor; the message is one sentence."""
+    """The present model has no supervisor; the message is one sentence."""
 
 
 @dataclass(frozen=True)
 class SynthesizedModel:
-    """A model of which there is a supervisor.
+    """A model with its supervisor.
 
     Attributes:
         supervisor: The supervisor.
-        findings: Findings about the model, a line each; of a supervisor's file nothing is known.
-        text: Text of the model, if it is all of it: without libraries.
-        language: Language of the text: `rscd`, or of automata the ending of their files.
-        beginnings: States that automata may begin in.
+        findings: Findings about the model, a line each; none for a supervisor's file.
+        text: Text of the model, if it is complete without libraries.
+        language: Language of the text: `rscd`, or for automata the ending of their files.
+        beginnings: Initial states of automata.
     """
 
     supervisor: Supervisor | SystemSupervisor
@@ -51,20 +51,20 @@ class SynthesizedModel:
 
 
 class WatchedModel:
-    """A model for all pages; its files are looked at while a page plays with it.
+    """A model for all pages; its files are watched while a page uses it.
 
     Args:
-        made: The model as it is.
-        seen: Digest that its files had.
+        made: The present model.
+        seen: Digest of its files when it was made.
         digest: Function that returns the digest of the files; called in a thread.
-        make: Function that makes the model of the files as they are.
-        pause: Function that waits for the next look at the files.
+        make: Function that makes the model from the present files.
+        pause: Function that waits until the files are to be checked again.
 
     `digest` and `make` raise `NoSupervisorError`.
 
     Attributes:
-        made: The model, as it was made last.
-        warning: Reason why that is not what the files say; empty: it is.
+        made: The model that was made last.
+        warning: Reason why the model is older than its files; empty: it is not.
     """
 
     def __init__(
@@ -86,7 +86,7 @@ class WatchedModel:
 
     @contextlib.asynccontextmanager
     async def listened(self, listener: Callable[[], None]) -> AsyncIterator[None]:
-        """Call a function whenever `made` or `warning` has become another."""
+        """Call a function whenever `made` or `warning` has changed."""
         self._listeners.add(listener)
         if self._watching is None:
             self._watching = asyncio.create_task(self._watch())
@@ -140,10 +140,10 @@ async def _ended(making: "asyncio.Task[SynthesizedModel] | asyncio.Task[None] | 
 
 
 def file_digest(path: Path) -> str:
-    """Return the digest of a supervisor's file at this moment.
+    """Return the present digest of a supervisor's file.
 
     Raises:
-        NoSupervisorError: It cannot be read.
+        NoSupervisorError: The file cannot be read.
     """
     try:
         return hashlib.sha256(path.read_bytes()).hexdigest()
@@ -152,14 +152,14 @@ def file_digest(path: Path) -> str:
 
 
 async def synthesized(words: Sequence[str], text: str | None = None) -> SynthesizedModel:
-    """The model of which `robosc synth` makes the supervisor; cancelling this ends it.
+    """Return the model with the supervisor that `robosc synth` makes; cancelling this ends the synthesis.
 
     Args:
-        words: Its arguments.
+        words: Arguments of `robosc synth`.
         text: Text of the model, which is put into a file of its own; None: the arguments name it.
 
     Raises:
-        NoSupervisorError: It makes none.
+        NoSupervisorError: The command makes none.
     """
     with tempfile.TemporaryDirectory(prefix="robosc-") as folder:
         made = Path(folder) / "model.rsup"
@@ -175,7 +175,7 @@ async def synthesized(words: Sequence[str], text: str | None = None) -> Synthesi
 
 
 async def synthesized_automata(arguments: argparse.Namespace, text: str | None = None) -> SynthesizedModel:
-    """The automata of which a process of their own makes the supervisor; cancelling this ends it.
+    """Return the automata with the supervisor that a separate process makes; cancelling this ends the process.
 
     Args:
         arguments: Arguments of the command.
@@ -215,7 +215,7 @@ async def _output(module: str, *words: str, given: bytes = b"") -> tuple[int | N
 
 
 def read(path: Path) -> Supervisor:
-    """The supervisor of a file.
+    """Return the supervisor of a file.
 
     Raises:
         NoSupervisorError: There is none.
@@ -227,7 +227,7 @@ def read(path: Path) -> Supervisor:
 
 
 def finding_text(severity: str, message: str, code: str) -> str:
-    """A finding without its place: lines move when something above them is written, and that is no news."""
+    """Return a finding without its place, since a line number that has only moved is no change."""
     return f"{severity}: {message} [{code}]"
 
 

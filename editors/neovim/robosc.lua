@@ -5,7 +5,7 @@ local here = vim.fn.fnamemodify(debug.getinfo(1, "S").source:sub(2), ":p:h")
 -- Here is syntax/robosc.vim.
 vim.opt.runtimepath:append(here)
 
--- Neovim 0.7 does not ask `vim.filetype` unless it is told to.
+-- Neovim 0.7 does not use `vim.filetype` by default.
 vim.api.nvim_create_autocmd({ "BufNewFile", "BufRead" }, {
   group = group,
   pattern = "*.rscd",
@@ -25,17 +25,17 @@ local function root_of(file)
   return own
 end
 
--- One server for all files, so that an unsaved library counts wherever it is imported: it is told of the folders.
+-- One server serves all files, so that an unsaved library counts wherever it is imported. It is notified of new folders.
 local roots = {}
 
-local function tell_of(client, root)
+local function add_folder(client, root)
   local folder = { uri = vim.uri_from_fname(root), name = root }
-  local told = { event = { added = { folder }, removed = {} } }
+  local change = { event = { added = { folder }, removed = {} } }
   local method = "workspace/didChangeWorkspaceFolders"
   if vim.fn.has("nvim-0.11") == 1 then
-    client:notify(method, told)
+    client:notify(method, change)
   else
-    client.notify(method, told)
+    client.notify(method, change)
   end
 end
 
@@ -70,15 +70,15 @@ local function attach(file)
     on_init = function(client)
       for _, other in ipairs(roots) do
         if other ~= root then
-          tell_of(client, other)
+          add_folder(client, other)
         end
       end
     end,
   })
   local client = number and vim.lsp.get_client_by_id(number)
-  -- One that is not initialized yet is told of it then.
+  -- A client that is not initialized yet sends the folder in on_init.
   if is_new and client and client.initialized and client.config.root_dir ~= root then
-    tell_of(client, root)
+    add_folder(client, root)
   end
 end
 

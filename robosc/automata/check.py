@@ -1,4 +1,4 @@
-"""Check whether the parts of a system fit together, which a front end may run before it hands a system on."""
+"""Check that the parts of a system fit together; a front end may run it before it passes a system on."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace

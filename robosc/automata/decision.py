@@ -44,7 +44,7 @@ class Decision:
     Attributes:
         nodes: The nodes, children before parents.
         root: 0 false, 1 true, n + 2 for node n.
-        indices: For each place what tells the index of a value in its domain.
+        indices: For each place the function from a value to its index in the domain.
     """
 
     nodes: tuple[Test, ...]

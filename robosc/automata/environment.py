@@ -1,4 +1,4 @@
-"""Input variables: what the environment sets as it likes, at any time, and automata may read."""
+"""Input variables: the environment sets them at any time to any value, and automata may read them."""
 
 from dataclasses import dataclass
 

@@ -1,10 +1,10 @@
 """The executable system: everything that a model does, event by event, as one value.
 
-The automata of synthesis leave out what decides nothing there: code-only variables, and the order in which an executor
-looks at transitions (language A.7). Here both are there, worked out once: which transition each component takes in
-each of its states, how services and actions move, and which requirements an event needs. Generators, the explanation
-of blocked requests, the replay of logs and the properties of the controller read it; the interpreter in
-`robosc.execution` does not, since it is what they are held against.
+The automata of synthesis leave out code-only variables, and the order in which an executor tries transitions (language
+A.7). The executable system has both, computed once: which transition each component takes in each of its states, how
+services and actions move, and which requirements an event needs. Generators, the explanation of blocked requests, the
+replay of logs and the properties of the controller read it. The interpreter in `robosc.execution` does not read it,
+because it is the reference that the others are compared with.
 """
 
 from collections.abc import Mapping

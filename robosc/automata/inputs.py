@@ -1,7 +1,7 @@
 """All the data that one occurrence of an event can carry.
 
-The environment chooses a value for each received datum, and for each array how long it is: an element
-is unknown when its index, or the index of an array around it, lies outside.
+The environment chooses a value for each received datum, and a length for each array. An element is unknown if its
+index, or the index of an enclosing array, is beyond the length.
 """
 
 from collections.abc import Iterable, Iterator
@@ -72,7 +72,7 @@ def _known_sets(group: tuple[InputVariable, ...]) -> Iterator[frozenset[Path]]:
     for item in elements:
         for array, index in _arrays(item):
             indices.setdefault(array, set()).add(index)
-    # Only lengths just past an index that is read tell choices apart, and the empty array.
+    # Lengths matter only where an index that is read begins to exist; the empty array is the other case.
     lengths = [(0, *(index + 1 for index in sorted(found))) for found in indices.values()]
     for choice in product(*lengths):
         length = dict(zip(indices, choice, strict=True))

@@ -1,10 +1,10 @@
-"""The explicit meaning of a system: the slow and obvious one by which every other is judged.
+"""The explicit semantics of a system: slow and obvious, and the reference for all other algorithms.
 
-A transition is one synchronous step: every automaton with the event in its alphabet takes an edge whose
-guard is true, unless it monitors the event and has none; all updates read the old state and the same received
-data and happen together. A step into a state in which a plant invariant is not true does not happen. What one
-event can do depends on few locations and variables only, so it is worked out once for each of their
-values and remembered.
+A transition is one synchronous step: every automaton with the event in its alphabet takes an edge whose guard is
+true; an automaton that only monitors the event may have no such edge, and then stays. All updates read the old state
+and the same received data, and happen together. A step into a state that violates a plant invariant does not happen.
+The steps of one event depend on few locations and variables, so they are computed once for each combination of their
+values.
 
 Definitions: Ouedraogo, Kumar, Malik and Akesson, "Nonblocking and safe control of discrete-event
 systems modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569, sec. II.

@@ -4,8 +4,8 @@ Definitions after Ouedraogo, Kumar, Malik and Akesson, "Nonblocking and safe con
 systems modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569. Automata synchronise
 on shared events; guards may read the locations and variables of every automaton.
 
-This structure knows nothing of RoboSC: a component is an automaton like any other. In expressions,
-`VariableRead(component=A, variable=v)` is variable v of automaton A, `StateTest(A, l)` tells whether
+This structure does not depend on RoboSC: a component is an automaton like any other. In expressions,
+`VariableRead(component=A, variable=v)` is variable v of automaton A, `StateTest(A, l)` is true if
 A is in location l, and `Received(path)` is the event's input of that path.
 """
 
@@ -102,9 +102,9 @@ class Automaton:
         locations: Names, at least one.
         initial: The locations it may begin in; without any the system has no initial state.
         marked: Marked locations.
-        alphabet: Events it takes part in. Where no edge for one takes part, a plant cannot do it, and a requirement
-            forbids it.
-        edges: Its arcs. Where several for one event take part, it takes one of them, and nobody controls which.
+        alphabet: Events that it takes part in. Without a possible edge for an event, a plant cannot do it, and a
+            requirement forbids it.
+        edges: Its arcs. If several edges for one event are possible, it takes one of them nondeterministically.
         variables: Its variables.
         role: Its role, plant or requirement.
         monitors: Events of the alphabet that it neither blocks nor forbids: where no edge for one takes part, it stays

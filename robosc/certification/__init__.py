@@ -1,6 +1,6 @@
 """The way from a problem to a certified supervisor, and the verification of a supervisor's file.
 
-The names are imported on use: who only reports progress does not load the check of models.
+The names are imported on use: a program that only reports progress does not load the check of models.
 """
 
 from typing import TYPE_CHECKING

@@ -1,4 +1,4 @@
-"""The certificate: what the independent verifier says about a supervisor that has just been synthesized."""
+"""The certificate: the result of the independent verifier for a supervisor that has just been synthesized."""
 
 from collections.abc import Callable
 

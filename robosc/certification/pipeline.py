@@ -1,7 +1,7 @@
 """From a bundle of texts to a certified supervisor: the whole pipeline in one call.
 
-Every door to the product (command line, service, tests) goes through `make_supervisor`, so the same
-bundle gives the same supervisor wherever it is made.
+The command line, the service and the tests all call `make_supervisor`, so the same bundle gives the same supervisor
+everywhere.
 """
 
 from collections.abc import Callable
@@ -61,8 +61,7 @@ class SynthesisOutcome:
     Attributes:
         status: Status at the end.
         supervisor: The supervisor, or None.
-        diagnostics: Every finding about the model, sorted by place; with a supervisor, also what only synthesis
-            can tell.
+        diagnostics: Every finding about the model, sorted by place; with a supervisor, also those of synthesis.
         statistics: Figures of the synthesis, or None where there was none.
         reason: Reason why there is no supervisor, in one sentence; empty where there is one.
         explanation: Explanation of what is to blame where no supervisor exists.

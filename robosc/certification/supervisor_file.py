@@ -1,8 +1,9 @@
 """Verification of an untrusted supervisor file against its model.
 
-Nothing in the file is believed: its model is compared with the one that is read anew from the texts, its added
-conditions are verified on that one, and its certificate is compared with what is found. A digest in a file proves
-nothing, since whoever changes the file can change the digest: a difference is reported, but decides nothing.
+Nothing in the file is trusted. Its model is compared with the model that is read again from the texts, its added
+conditions are verified on the model from the texts, and its certificate is compared with the result of that
+verification. A digest in a file proves nothing, because a person who changes the file can change the digest, too: a
+different digest is reported, but does not change the verdict.
 """
 
 from collections.abc import Callable
@@ -174,7 +175,7 @@ def verify_supervisor_file(
             on_progress=on_progress,
         )
 
-    # What the file says of its size decides only what is tried first: a false figure must not prevent the search.
+    # The stated number of states decides only which search is tried first: a false figure must not prevent it.
     stated = int(supervisor.certificate.states)
     report = verified_with(stated)
     if stated > limits.states and not report.is_complete:
@@ -237,7 +238,7 @@ def _false_claims(certificate: Certificate, found: Verification) -> list[str]:
         ("transitions", certificate.transitions, found.transitions),
     ):
         if stated is not None and counted is not None and int(stated) != counted:
-            claims.append(f"it tells of {stated} {what}, there are {counted}")
+            claims.append(f"it states {stated} {what}, there are {counted}")
     for name in PROPERTIES:
         if getattr(certificate, name) == "passed" and getattr(found, name) is CheckOutcome.FAILED:
             claims.append(f"it says '{name.replace('_', ' ')}: passed', which is false")
@@ -254,7 +255,7 @@ def _false_properties(stated: ControllerProperties, found: ControllerProperties)
 
 
 def _beliefs(certificate: Certificate, found: Verification) -> list[str]:
-    """Return the claims of a certificate that nobody has checked here."""
+    """Return the claims of a certificate that were not checked here."""
     claimed = [
         name.replace("_", " ")
         for name in PROPERTIES

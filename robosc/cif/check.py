@@ -1,4 +1,4 @@
-"""CIF models, checked: every finding, and the automata of a model without errors."""
+"""Check of CIF models: every finding, and the automata of a model without errors."""
 
 import os
 import posixpath
@@ -41,7 +41,7 @@ def load_cif(path: Path, text: str | None = None) -> Bundle:
         try:
             return SourceFile(name, read_source(path.parent / name, name))
         except OSError:
-            # `check_cif` tells where it is imported.
+            # `check_cif` reports the missing file where it is imported.
             return None
 
     files, _ = _imported(main, read, Findings())

@@ -70,7 +70,7 @@ class Cursor:
 
         Args:
             expected: Words for what would have fitted.
-            fix: Advice, where more is known than the token tells.
+            fix: Advice, if more is known than the token shows.
         """
         index = self.place
         token = self.texts[index]

@@ -1,4 +1,4 @@
-"""Functions that CIF has: of static values they are worked out, of a state synthesis takes some of integers."""
+"""Functions of CIF: evaluated for static values; over a state, synthesis supports some of those of integers."""
 
 import math
 from collections.abc import Callable, Mapping

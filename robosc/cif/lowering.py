@@ -1,7 +1,7 @@
 """Specification to automata: locations, edges, invariants and predicates of every component.
 
-If-updates and assignments of several variables become conditional expressions; what holds in a location becomes an
-implication; algebraic variables and constants are written out where they are used.
+If-updates and assignments of several variables become conditional expressions. An invariant of a location becomes an
+implication. Algebraic variables and constants are replaced by their expressions where they are used.
 """
 
 from dataclasses import dataclass, field, replace

@@ -1,12 +1,12 @@
-"""CIF text to syntax tree, by recursive descent: the language needs no more than two words of look-ahead.
+"""CIF text to syntax tree, by recursive descent: the language needs at most two tokens of look-ahead.
 
-textX with the grammar `tests/support/cif_language.tx` is its opponent in the tests. On a model of 36 kB it takes 0.19 s
-to say yes or no, and 0.13 s to start, where this parser takes 0.01 s for the whole tree; it tells one error of a text,
-and goes back over nested braces exponentially often unless it remembers everything. Lark's present distribution cannot
-be installed beside the older one that ROS 2 needs: both are the module `lark`.
+Tests compare the parser with textX and the grammar `tests/support/cif_language.tx`. textX needs 0.13 s to start and
+0.19 s to accept or reject a model of 36 kB, where this parser takes 0.01 s for the whole tree. textX reports only the
+first error of a text, and takes exponential time for nested braces unless it remembers every result. The present
+distribution of Lark cannot be installed beside the older one that ROS 2 needs: both are the module `lark`.
 
-Behind a syntax error in a declaration the parser goes on with the next one, so that one run tells them all; behind one
-in the head of a component nothing would be read right, and it stops.
+After a syntax error in a declaration the parser continues with the next declaration, so that one run reports all
+errors. After an error in the head of a component it stops, because the rest would be misread.
 """
 
 from collections.abc import Callable
@@ -132,7 +132,7 @@ class Parser(ExpressionParser):
         return self._declaration("a declaration")
 
     def _is_automaton(self) -> bool:
-        """Return True if `plant x:` opens an automaton, not an invariant called x: what follows the colon tells."""
+        """Return True if `plant x:` opens an automaton, not an invariant called x, by the token after the colon."""
         kinds, texts, place = self.kinds, self.texts, self.place
         if kinds[place + 1] != _NAME or texts[place + 2] != ":":
             return False

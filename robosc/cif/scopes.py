@@ -1,7 +1,7 @@
 """Scopes of a specification: files merged, definitions instantiated, and names looked up in them.
 
-A component and an instance are both a `Scope`. The body of a definition becomes one for each instance: its names are
-looked up where the definition stands, those of the arguments where the instance stands.
+Components and instances are both a `Scope`. The body of a definition becomes one scope for each instance. Names in the
+body are looked up at the definition, and names in the arguments at the instance.
 """
 
 from collections.abc import Iterator

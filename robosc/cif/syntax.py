@@ -1,4 +1,4 @@
-"""Syntax tree of a CIF text: what was written, with places, before any name is looked up.
+"""Syntax tree of a CIF text: the text as it was written, with places, before any name is looked up.
 
 Values of msgspec, as in `robosc.language.syntax`.
 """

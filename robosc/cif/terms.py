@@ -1,6 +1,6 @@
 """Meaning of a CIF expression: its type, and a static value or an expression of the automata.
 
-What synthesis cannot take is no error where it is written but where it is used, so a term carries it along.
+An expression that synthesis does not support is an error only where it is used, so a term carries the reason along.
 """
 
 import math

@@ -1,4 +1,4 @@
-"""Types of CIF's names: of what is declared, with its static value or the expression that it becomes."""
+"""Types of CIF's names: the type of each declaration, with its static value or the expression that it becomes."""
 
 from dataclasses import replace
 
@@ -77,7 +77,7 @@ class Typing(ExpressionTyping):
     # Entities
 
     def check(self, entity: Entity) -> None:
-        """Work out what is declared, so that its errors are told whether it is used or not."""
+        """Check a declaration, so that its errors are reported whether it is used or not."""
         match entity.declaration:
             case syntax.TypeDeclaration(name=name):
                 self._named(syntax.Name((name.text,), syntax.Root.HERE, name.at), entity.scope)

@@ -1,1 +1,1 @@
-"""The command line: one module per command, and what they print in common."""
+"""The command line: one module for each command, and modules for their common arguments and output."""

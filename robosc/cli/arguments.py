@@ -37,7 +37,7 @@ def add_log_arguments(parser: argparse.ArgumentParser, output_help: str) -> None
 
 
 def suggest(action: argparse.Action, values: Callable[[], Iterable[str]]) -> None:
-    """Tell what a shell offers for the value of an argument that takes other values, too.
+    """Set what a shell suggests for an argument that also takes other values.
 
     Args:
         action: The argument.
@@ -160,8 +160,8 @@ def add_condition_seconds_argument(parser: argparse.ArgumentParser) -> None:
         "--condition-seconds",
         type=_seconds,
         metavar="S",
-        help="after S seconds make no further condition of the supervisor shorter: it is right all the same, and "
-        "mostly told by the size of its diagram (default: only steps limit that, and the same comes out every time)",
+        help="after S seconds shorten no further condition of the supervisor: the condition is still right, and is "
+        "mostly shown as the size of its diagram (default: only steps limit this, and every run gives the same)",
     )
 
 

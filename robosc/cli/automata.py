@@ -43,7 +43,7 @@ SUPERVISOR = ".rsup"
 
 
 def is_given(arguments: argparse.Namespace) -> bool:
-    """Return True if the model of a command holds automata: the ending of its name tells."""
+    """Return True if the model of a command holds automata, by the ending of its name."""
     return is_automata(arguments.model)
 
 
@@ -419,7 +419,7 @@ class _Outcome(Protocol):
 
     @property
     def reason(self) -> str:
-        """Reason why there is no supervisor; empty if the findings tell."""
+        """Reason why there is no supervisor; empty if the findings say it."""
 
     @property
     def explanation(self) -> object:

@@ -33,12 +33,12 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument(
         "--synthesize",
         action="store_true",
-        help="also synthesize, to find what only that can tell: no supervisor at all, events that can never happen, "
+        help="also synthesize, to find what only synthesis shows: no supervisor at all, events that can never happen, "
         "states that are never reached, requirements that never restrict, requests that compete",
     )
     add_deployment_argument(parser)
     add_engine_options(parser)
-    # Not given, they are told from given without a synthesis, where they would mean nothing.
+    # None marks options that were not given: given without --synthesize, they are refused.
     parser.set_defaults(run=run, deployment=None, engine=None)
 
 

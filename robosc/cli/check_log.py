@@ -102,10 +102,10 @@ def _document(found: "LogCheck", run_: "LoggedRun", supervisor: "Supervisor") ->
 def _print(log: Path, found: "LogCheck", supervisor: "Supervisor") -> None:
     lines = [f"{log}:{item.line}: {item.sentence}" for item in found.violations[:_SHOWN]]
     if found.violation_count > len(lines):
-        lines.append(f"and {found.violation_count - len(lines)} more (--json tells the first 1000)")
+        lines.append(f"and {found.violation_count - len(lines)} more (--json lists the first 1000)")
     counts = [f"{found.events} events, {found.requests} of them requests"]
     if found.blocked:
-        unjudged = f" ({found.unjudged} for a reason that no state tells)" if found.unjudged else ""
+        unjudged = f" ({found.unjudged} for a reason that no state shows)" if found.unjudged else ""
         counts.append(f"{found.blocked} requests held back{unjudged}")
     if found.restarts:
         counts.append(f"{found.restarts} restarts")

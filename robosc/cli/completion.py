@@ -80,7 +80,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def script_folder(shell: str, environment: Mapping[str, str]) -> Path:
-    """Return the folder in which a shell looks for the scripts of a user, or can be told to.
+    """Return the folder in which a shell looks for the scripts of a user, or can be configured to look.
 
     Args:
         shell: One of `SHELLS`.
@@ -110,7 +110,7 @@ def _next_step(shell: str, folder: Path) -> str:
 def make_scripts(shell: str) -> dict[str, str]:
     """Return the script of each installed program, by its name.
 
-    A program whose packages are not installed is left out, and told on standard error.
+    A program whose packages are not installed is left out, and named on standard error.
 
     Args:
         shell: One of `SHELLS`.
@@ -141,7 +141,7 @@ def _parsers() -> Iterable[tuple[str, argparse.ArgumentParser]]:
 
 
 def _prepare(parser: argparse.ArgumentParser, shtab: Any) -> None:
-    """Tell shtab what the values of a parser's arguments can be, and those of its commands."""
+    """Set for shtab the possible values of the arguments of a parser and of its commands."""
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
             for command in dict.fromkeys(action.choices.values()):

@@ -33,7 +33,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     """Add the command."""
     parser = commands.add_parser(
         "doctor",
-        help="tell what this machine has for RoboSC, and what is missing",
+        help="report what this machine has for RoboSC, and what is missing",
         description="Examine this machine: Python, packages, ROS, compilers, serial ports and who may use them, a "
         "browser. Everything that is missing comes with a way to get it. Nothing is changed, and no line is opened.",
         epilog=_EPILOG,

@@ -1,7 +1,8 @@
 """`robosc`: check, synthesize, verify, explore and generate on this machine.
 
-Every command is a module with `add_parser` and `run`, imported when it is called, and imports what it needs when it
-runs, so that `robosc check` does not pay for decision diagrams. Other packages add commands (`robosc.cli.plugins`).
+Every command is a module with `add_parser` and `run`. The module is imported when the command is called, and imports
+large packages only when it runs, so that `robosc check` does not load decision diagrams. Other packages add commands
+(`robosc.cli.plugins`).
 """
 
 import argparse

@@ -1,8 +1,8 @@
 """Output of the commands, and the exit codes: shared by `robosc` and `robosc-client`.
 
-Results go to standard output, findings and progress to standard error; with `--json` one JSON document
-goes to standard output and holds the findings too. Where a command cannot do what it was asked, that document is
-`{"error": ...}`, and the message goes to standard error all the same.
+Results go to standard output, findings and progress to standard error. With `--json`, one JSON document goes to
+standard output and also holds the findings. If a command fails, the document is `{"error": ...}`, and the message goes
+to standard error as well.
 """
 
 import codecs
@@ -78,9 +78,9 @@ def has_unicode_output() -> bool:
 
 
 def print_diagnostics(diagnostics: Sequence[Diagnostic], bundle: Bundle | None) -> None:
-    """Findings with source line and caret on standard error, and a closing line that counts them.
+    """Print findings with source line and caret on standard error, and a last line that counts them.
 
-    On a terminal that line also tells where to read more; what a program reads stays bare.
+    On a terminal the last line also says where to read more.
     """
     for diagnostic in diagnostics:
         sys.stderr.write(diagnostic.render(bundle) + "\n")

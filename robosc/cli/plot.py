@@ -145,7 +145,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _motion(arguments: argparse.Namespace, run: "LoggedRun") -> "Motion":
-    """Return the record of motion that tells the robot's time.
+    """Return the record of motion that gives the robot's time.
 
     Raises:
         MotionOfLogError: The one that was given cannot be used.

@@ -1,8 +1,8 @@
 """Commands of other packages: installed distributions add them through the entry-point group `robosc.commands`.
 
-An entry point's name is the command's, its value a module with `add_parser` and `run`, as the modules of this package
-are. Entry points are looked up only where no built-in command is called, and a module is loaded only where its command
-is called or all of them are listed.
+The name of an entry point is the name of the command. Its value is a module with `add_parser` and `run`, like the
+modules of this package. Entry points are looked up only if no built-in command is called, and a module is loaded only
+if its command is called or all commands are listed.
 """
 
 import argparse
@@ -85,7 +85,7 @@ def _loaded(item: "EntryPoint") -> Plugin:
 
 
 def _naming_missing_package(name: str, run: Callable[[argparse.Namespace], int]) -> Callable[[argparse.Namespace], int]:
-    """The command, with a package that it misses only when it runs told in the same sentence."""
+    """The command, with a clear message if a package is missing when it runs."""
 
     def guarded(arguments: argparse.Namespace) -> int:
         try:

@@ -31,7 +31,7 @@ properties:
   name: p               a property with a name
 
 E is a condition of the language over component states and synthesis variables; service.location and
-action.location tell where a call is (idle, waiting or executing, ready, failed). Operators take one
+action.location give the state of a call (idle, waiting or executing, ready, failed). Operators take one
 operand, as '!' does: write AG (a or b). docs/verification.md has more.
 
 exit status:

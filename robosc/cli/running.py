@@ -1,6 +1,6 @@
-"""Running of a command: arguments are read, output arrives or its loss is reported, errors become a message.
+"""Running of a command: it reads arguments, reports lost output, and turns errors into a message.
 
-It loads no command, so that programs beside `robosc` run theirs in the same way.
+The module loads no command, so that other programs than `robosc` run their commands in the same way.
 """
 
 import argparse
@@ -51,7 +51,7 @@ class Parser(argparse.ArgumentParser):
         return super().parse_known_args(args, namespace)
 
     def error(self, message: str) -> NoReturn:
-        """Tell what is wrong.
+        """Raise an error that says what is wrong.
 
         Raises:
             WrongArguments: Always.
@@ -118,7 +118,7 @@ def guarded(program: str, run: Callable[[], int], *, as_json: bool = False) -> i
     except CommandError as error:
         status, message = error.status, _complain(program, error)
     except RoboscError as error:
-        # An engine or target that nobody has, or a folder that cannot be written, is no fault of the model.
+        # An unknown engine or target, or a folder that cannot be written, is no fault of the model.
         status = ExitCode.USAGE if isinstance(error, LookupError | OSError) else ExitCode.FAILED
         message = _complain(program, error)
     except KeyboardInterrupt:
@@ -140,7 +140,7 @@ def guarded(program: str, run: Callable[[], int], *, as_json: bool = False) -> i
 
 
 def _complain(program: str, problem: object) -> str:
-    """Tell what is wrong on standard error; returns that."""
+    """Print what is wrong on standard error, and return it."""
     message = visible(str(problem))
     sys.stderr.write(f"{program}: {message}\n")
     return message

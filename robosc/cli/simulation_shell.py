@@ -41,8 +41,8 @@ EVENT [DATA] [-> STATE]    an event: press, sensor true, take -> Buffer = full w
 
 _DEFAULT_STEPS = 1000
 _MOST = 1_000_000
-_MOST_TOLD = 20
-"""Steps of a walk that are reported at once."""
+_MOST_PRINTED = 20
+"""Steps of a walk that are printed at once."""
 
 
 class _CommandFault(Exception):
@@ -101,7 +101,7 @@ class Shell:
             readline.set_completer(lambda text, state: self._completion(readline.get_line_buffer(), text, state))
             is_libedit = getattr(readline, "backend", "readline") == "editline"
             readline.parse_and_bind("bind ^I rl_complete" if is_libedit else "tab: complete")
-        write_lines([f"{self._run.name}: 'help' tells the commands, Tab completes", *state_lines(self._run)])
+        write_lines([f"{self._run.name}: 'help' lists the commands, Tab completes", *state_lines(self._run)])
         while True:
             try:
                 line = input(PROMPT)
@@ -211,15 +211,15 @@ class Shell:
     # Output and completion
 
     def _print_walk(self, number: int) -> None:
-        """Tell the steps after so many; of a long walk the last ones."""
-        left_out = len(self._run) - number - _MOST_TOLD
+        """Print the steps after a number of steps; of a long walk only the last ones."""
+        left_out = len(self._run) - number - _MOST_PRINTED
         if left_out > 0:
-            write_lines([f"      {left_out} events, which 'history' tells"])
+            write_lines([f"      {left_out} events, which 'history' lists"])
             number += left_out
         self._print_steps(number)
 
     def _print_steps(self, number: int) -> None:
-        """Tell the steps after so many."""
+        """Print the steps after a number of steps."""
         before = self._run.history[number - 1].state if number else self._run.initial
         for count, step in enumerate(self._run.history[number:], start=number + 1):
             write_lines(step_lines(count, step, before))

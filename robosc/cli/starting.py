@@ -1,6 +1,6 @@
-"""Start of an installed command: Ctrl-C ends it with one line at any time, even while it is imported or closed.
+"""Start of an installed command: Ctrl-C ends it with one line at any time, even during imports or at its end.
 
-So does a package that is not installed, since each command but `robosc` needs an extra, and a Python that is too old.
+A missing package and a Python that is too old end it with one line, too: each command but `robosc` needs an extra.
 """
 
 import contextlib
@@ -78,7 +78,7 @@ def start(program: str, load: Callable[[], Callable[[], int]], extra: str | None
         if is_heard:
             signal.signal(signal.SIGINT, leave)
     if status == INTERRUPTED:
-        # The command has told it.
+        # The command has already reported the interrupt.
         with contextlib.suppress(AttributeError, OSError, ValueError):
             sys.stdout.flush()
         os._exit(status)

@@ -24,8 +24,8 @@ class Figures:
     """Figures of a synthesis.
 
     Attributes:
-        statistics: Those that it tells itself, or None where there was none.
-        seconds: Time that it took, with the certification of its result if there was one.
+        statistics: Figures that synthesis reports itself, or None without a synthesis.
+        seconds: Time of the synthesis, and of the certification of its result if there was one.
     """
 
     statistics: "Statistics | None"

@@ -1,4 +1,4 @@
-"""The supervisor that a command is given as `--model`, itself or as its model: what has happened is held up to it."""
+"""The supervisor for the argument `--model`, which names a supervisor file or a model: events are compared with it."""
 
 import argparse
 from typing import TYPE_CHECKING

@@ -1,7 +1,7 @@
 """Irredundant sums of products over multi-valued places, with states that do not matter.
 
-A sum is found cube by cube: a state that is not covered yet, made as large as the forbidden states allow. Then cubes
-that the others cover are dropped, and literals are given the shortest words that still do.
+A sum is built cube by cube: a state that no cube covers yet is expanded as far as the forbidden states allow. Then
+redundant cubes are dropped, and literals get the shortest words that are still correct.
 
 Sources: R. K. Brayton, G. D. Hachtel, C. T. McMullen and A. L. Sangiovanni-Vincentelli, "Logic Minimization Algorithms
 for VLSI Synthesis", Kluwer, 1984, ch. 4 (expand, irredundant, reduce); R. L. Rudell and A. Sangiovanni-Vincentelli,
@@ -83,7 +83,7 @@ def cover(space: Space, words: Words, wanted: Node, forbidden: Node, *, most: in
 
     Args:
         space: The store of both.
-        words: Sizes of tests, which tell which cubes are short.
+        words: Sizes of tests, by which cubes are compared for length.
         wanted: Node of the states where they must be true.
         forbidden: Node of the states where they must be false; disjoint from `wanted`.
         most: Number of cubes that there may be before some of them are dropped.

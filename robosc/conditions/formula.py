@@ -1,7 +1,7 @@
 """Short formulas of decision diagrams: factored sums of products, their duals and relations, whichever is shortest.
 
-A formula can be exponentially larger than its diagram, so the work is bounded in steps and the result in operands;
-beyond either bound there is none, and the diagram itself is what can be shown.
+A formula can be exponentially larger than its diagram, so the steps of the search and the operands of the result are
+bounded. Beyond either bound there is no formula, and the diagram is shown instead.
 
 Sources: R. K. Brayton, "Factoring logic functions", IBM Journal of Research and Development 31(2), 1987, pp. 187-198
 (common literals); `cover` for the sums, `relations` for the relations.

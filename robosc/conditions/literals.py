@@ -1,4 +1,4 @@
-"""Tests whether a place of the state holds one of some values, in the model's words, and how long they are."""
+"""Tests that a place of the state has one of some values, in the model's words, with their lengths."""
 
 from collections.abc import Collection, Iterable, Iterator
 from dataclasses import dataclass

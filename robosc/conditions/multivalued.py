@@ -1,7 +1,8 @@
 """Decision diagrams over finitely many values as a store of shared nodes: joined, subtracted, searched.
 
-Values that no diagram tells apart are one class, so that a node has a child for each class however large the range is.
-Every walk counts its steps: what would take too many ends with `EffortExceededError`, at the same place everywhere.
+Values that no diagram distinguishes form one class, and a node has one child for each class, however large the range
+is. Every operation counts its steps. An operation that needs too many raises `EffortExceededError`, on every machine at
+the same step.
 
 Source: A. Srinivasan, T. Kam, S. Malik and R. K. Brayton, "Algorithms for discrete function manipulation", IEEE
 ICCAD 1990, pp. 92-95.
@@ -25,7 +26,7 @@ MAXIMUM_SUBJECTS = 100
 """Places that the diagrams of one store may test."""
 
 MAXIMUM_RUNS = 128
-"""Ranges of one place's values that they may tell apart."""
+"""Ranges of one place's values that the diagrams of one store may distinguish."""
 
 Node = int
 """A node's number: 0 false, 1 true."""
@@ -76,10 +77,10 @@ class Space:
     """A store of nodes over the places that some diagrams test.
 
     Args:
-        diagrams: Diagrams that decide which values are told apart.
+        diagrams: Diagrams that decide which values form a class of their own.
         domains: Values that the places can hold.
         effort: Effort that the work may take.
-        apart: Places whose values are all told apart.
+        apart: Places each of whose values is a class of its own.
 
     Attributes:
         subjects: The places, in the order of the diagrams.
@@ -89,7 +90,7 @@ class Space:
         effort: Effort that further work may take.
 
     Raises:
-        EffortExceededError: They test too many places or tell too many values apart.
+        EffortExceededError: The diagrams test too many places or distinguish too many values.
     """
 
     def __init__(
@@ -110,7 +111,7 @@ class Space:
         self.integers = frozenset(
             place for place, subject in enumerate(self.subjects) if isinstance(domains[subject].type, IntegerType)
         )
-        # Only one range each, so that relations between integers can tell where they stand.
+        # Each class of an integer is one range, so that relations between integers can compare classes.
         ranges = {self.subjects[place] for place in self.integers} if len(self.integers) > 1 else ()
         self.classes = [
             _singles(len(domains[subject]), effort)
@@ -461,7 +462,7 @@ _OPERATIONS = ("both", "either", "without")
 """Operations, by their numbers in the kernel."""
 
 _MOST_CLASSES = 64
-"""Classes of one place that the kernel can tell apart."""
+"""Classes of one place that the kernel can handle."""
 
 
 def space_of(
@@ -498,7 +499,7 @@ def _singles(count: int, effort: Effort) -> list[Indices]:
 
 
 def _classes(nodes: Sequence[DecisionNode], count: int, effort: Effort, *, are_ranges: bool) -> list[Indices]:
-    """The indices of a place's values in classes that none of its nodes tells apart, in the order of their first."""
+    """Classes of indices of one place's values; no node distinguishes the values of a class. Ordered by first index."""
     starts = sorted({start for node in nodes for start in node.starts})
     if len(starts) > MAXIMUM_RUNS:
         raise EffortExceededError

@@ -2,9 +2,9 @@
 
 Enumerations of one type are integers of which only the equality counts.
 
-A predicate lies inside the conjunction of the relations that hold in it, so only the states inside it have to be told
-apart further; relations that these tests make unnecessary are dropped. Values that a store does not tell apart may lie
-on both sides of a relation: a relation is then possible for their class, and what is possible is enough to be exact.
+A predicate implies the conjunction of the relations that hold in it, so only states inside that conjunction need
+further tests. Relations that these tests make unnecessary are dropped. A class of values may lie on both sides of a
+relation: the relation is then possible for the class, and possible relations are enough for an exact result.
 
 Source: A. Mine, "The octagon abstract domain", Higher-Order and Symbolic Computation 19(1), 2006, pp. 31-100 (bounds
 of differences and sums of two); sums of more places are bounded in the same way.
@@ -189,7 +189,7 @@ class Relations:
     def states(self, description: Description) -> Node:
         """Return the node that is true where a description may be true.
 
-        It is exact if all values of the description's integers are told apart.
+        It is exact if each value of the description's integers is a class of its own.
         """
         found = self._space.both(self._possible(description.relations), description.single)
         return found if description.inner is None else self._space.without(found, self._certain(description.inner))

@@ -1,8 +1,7 @@
 """The supervisor's conditions in the model's words: a short formula, else the decision diagram node by node.
 
-The diagram is written as numbered lines that read from the top down, each in the language's own `if ... then ... else`,
-where `[n]` stands for line n; a line is written once however often it is needed, so the text is never larger than the
-diagram.
+The diagram is written as numbered lines, from the top down. Each line is an `if ... then ... else` of the language, in
+which `[n]` stands for line n. Each line is written only once, so the text is never larger than the diagram.
 """
 
 import re
@@ -104,7 +103,7 @@ class Formulas:
     def _is_longer(self, formula: Expression, diagram: DecisionDiagram) -> bool:
         """Return True if a formula that is not short takes more tests than its diagram, written line by line."""
         most = operands(formula)
-        # Every line takes a test at least: those of very many need not be told to be counted.
+        # Every line has at least one test: very many lines need not be built to be counted.
         if most <= SHORT or len(_order(*_branches(diagram, self.domains), diagram.root)) >= most:
             return False
         return most > sum(line.operands for line in diagram_lines(diagram, self.vocabulary))

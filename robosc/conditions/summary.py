@@ -22,7 +22,7 @@ _NODES = 150
 FROM_THE_FIRST = ", to be read from [1] on:"
 """Words between a diagram's size and its nodes."""
 
-ELSEWHERE = "; --json tells it node by node"
+ELSEWHERE = "; --json lists its nodes"
 """Words after the size of a diagram that is not written node by node."""
 
 _TRUE = DecisionDiagram((), 1)

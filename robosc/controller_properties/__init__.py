@@ -1,9 +1,9 @@
 """Controller properties that synthesis does not guarantee: finite response, confluence, nonblocking under control.
 
-After Reijnen, Erens, van de Mortel-Fronczak and Rooda, "Supervisory controller synthesis and implementation for
-safety PLCs", Discrete Event Dynamic Systems 32, 2022, pp. 115-141, with the automaton of our executor
-(`robosc.controller_properties.controller`), and one difference: a marked state counts as reached also where silent
-steps only pass through it, since the robot has then completed its task, if only for a moment.
+Source: Reijnen, Erens, van de Mortel-Fronczak and Rooda, "Supervisory controller synthesis and implementation for
+safety PLCs", Discrete Event Dynamic Systems 32, 2022, pp. 115-141. The definitions are applied to the automaton of our
+executor (`robosc.controller_properties.controller`), with one difference: a marked state also counts as reached if
+silent steps only pass through it, because the robot has then completed its task, if only for a moment.
 """
 
 from robosc.controller_properties.check import DEFAULT_LIMIT, check_controller

@@ -1,4 +1,4 @@
-"""Checks the properties of a controller: by structure where that is enough, else by visiting its states."""
+"""Check of the properties of a controller: by its structure if that is enough, else by a search of its states."""
 
 from collections.abc import Callable, Iterable
 
@@ -12,10 +12,10 @@ from robosc.controller_properties.silent_steps import always_end, never_conflict
 from robosc.supervisor import AddedCondition, PropertyResult
 
 DEFAULT_LIMIT = 10_000
-"""Stable states beyond which a search is given up."""
+"""Maximum number of stable states that a search visits."""
 
 HOPELESS = 1_000
-"""Times by which the controlled system is larger than a search may be, where none is begun."""
+"""Factor between the states of the controlled system and the limit of a search from which no search is begun."""
 
 
 def check_controller(
@@ -30,15 +30,15 @@ def check_controller(
 ) -> Properties:
     """Check finite response, confluence and nonblocking under control of a supervisor; deterministic.
 
-    Only what is proved is 'passed', and only what a trace shows is 'failed'.
+    A property is 'passed' only if it is proved, and 'failed' only if a trace shows it.
 
     Args:
         system: Executable system of the robot.
         added: The conditions that synthesis adds.
         is_nonblocking: True if it is certain that the controlled system is nonblocking.
-        states: States of the controlled system, as far as is known: where there are `HOPELESS` times as many as
-            `limit` allows, nothing is searched for nonblocking alone, which only a whole search can decide.
-        limit: Stable states beyond which a search is given up.
+        states: Number of states of the controlled system, if it is known. If it is `HOPELESS` times as large as
+            `limit`, there is no search for nonblocking alone, because only a complete search decides it.
+        limit: Maximum number of stable states that the search visits.
         semantics: Semantics of its automata, if it was made already.
         should_stop: Function called now and then; once it returns true, the work ends.
 

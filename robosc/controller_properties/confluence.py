@@ -1,10 +1,10 @@
 """Confluence: whether the order of silent steps matters (semantics 2).
 
-All orders are followed, not only the executor's. They agree where they have one outcome: the same stable state, or no
-end at all. (Newman's lemma, that it is enough to compare single steps, needs that every order ends: M. H. A. Newman,
-"On theories with a combinatorial definition of 'equivalence'", Annals of Mathematics 43(2), 1942, pp. 223-243. So
-outcomes are compared here, and the lemma serves only where `robosc.controller_properties.silent_steps` has proved that
-they end.)
+All orders are followed, not only the executor's. They agree if they have one outcome: the same stable state, or no end
+at all. Newman's lemma says that it is enough to compare single steps, but only if every order ends (M. H. A. Newman,
+"On theories with a combinatorial definition of 'equivalence'", Annals of Mathematics 43(2), 1942, pp. 223-243). So
+outcomes are compared here, and the lemma is used only if `robosc.controller_properties.silent_steps` has proved that
+every order ends.
 """
 
 from collections.abc import Callable
@@ -14,20 +14,20 @@ from robosc.controller_properties.controller import Controller, Node
 from robosc.controller_properties.outcome import Conflict, Order
 
 _Outcome = State | None
-"""The stable state in which steps end, or None: they do not end."""
+"""The stable state in which silent steps end, or None if they do not end."""
 
 _Step = tuple[str, Node]
 
 
 class ConfluenceSearch:
-    """Comparison of the orders of silent steps, each state once.
+    """Comparison of the orders of silent steps; each state is visited once.
 
     Args:
         controller: The automaton.
-        limit: States on the way of silent steps beyond which to give up.
+        limit: Maximum number of states that silent steps pass through.
 
     Attributes:
-        is_exhausted: True if the limit is passed: then nothing more is compared.
+        is_exhausted: True if the limit was exceeded; then no more orders are compared.
     """
 
     def __init__(self, controller: Controller, limit: int) -> None:
@@ -42,7 +42,7 @@ class ConfluenceSearch:
 
         Args:
             start: The state.
-            trace: Gives the events that lead there.
+            trace: Function that returns the events that lead to the state.
         """
         if start in self._only or self.is_exhausted:
             return None
@@ -87,7 +87,7 @@ class ConfluenceSearch:
         return steps, outcomes
 
     def _other_order(self, start: Node, steps: dict[Node, list[_Step]], unwanted: _Outcome) -> Order:
-        """A shortest order that ends in another state than `unwanted`; where none does, one that does not end."""
+        """A shortest order that ends in another state than `unwanted`; if there is none, an order that does not end."""
         parents: dict[Node, tuple[Node, str] | None] = {start: None}
         queue = [start]
         for node in queue:

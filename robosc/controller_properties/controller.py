@@ -1,20 +1,20 @@
 """The controller automaton: what a supervisor and its executor do together, state by state (semantics 2 and 3).
 
-A state is one of the system, with what the executor remembers of running goals: which requirements of an action
-held in some stable state since its request (3.4). It is *stable* where no silent step is enabled. Silent steps
+A state consists of a state of the system and the executor's memory of running goals: which requirements of an action
+held in some stable state since its request (3.4). The state is *stable* if no silent step is enabled. Silent steps
 pre-empt everything else, in the executor's order: own cancels, resets, taus (3.3). In a stable state the environment
 may send a message or answer, and any enabled request may be issued.
 
 - One step of the environment is one middleware message, a *batch* (3.1): the events that stand for it, in source
   order, with no silent step between them. Under the setting `on_unknown: keep` an event whose enum is unknown does
   not happen, so any part of a batch may happen as well; a *whole* batch can happen under every setting.
-- Received data takes every value that matters; events of one message carry what the same fields can bring
-  (`robosc.controller_properties.messages`). Code-only variables do not matter: nothing that decides about events
-  reads one (language A.6). They only decide what is sent; a request whose data is unknown counts as possible.
-- That an action cannot be requested again until its cancelled goal is known to have ended (3.2) is left out: the end
-  can become known in any state and changes nothing else, so every state is reached, and left, as if it were known.
-- Where two transitions on one event apply, the executor takes the state's own before the behaviour's, then source
-  order (language A.7).
+- Received data takes every value that matters. Events of one message carry data that the same fields can produce
+  (`robosc.controller_properties.messages`). Code-only variables do not matter: no condition on events reads one
+  (language A.6). They only determine what is sent; a request whose data is unknown counts as possible.
+- The controller automaton omits that an action cannot be requested again before its cancelled goal has ended (3.2).
+  The end can become known in any state and changes nothing else, so the same states are reached.
+- If two transitions on one event apply, the executor prefers the state's own to the behaviour's, and then the first
+  one in source order (language A.7).
 """
 
 from collections.abc import Iterable, Iterator
@@ -31,7 +31,7 @@ from robosc.supervisor import AddedCondition
 from robosc.supervisor.predicates import state_predicates
 
 Held = tuple[int, ...]
-"""For each action with requirements: a bit for each of them that held in a stable state since its request."""
+"""Bits for each action with requirements: one for each requirement that held in a stable state since its request."""
 
 Node = tuple[State, Held]
 """A state of the controller automaton."""
@@ -39,7 +39,7 @@ Node = tuple[State, Held]
 
 @dataclass(frozen=True, slots=True)
 class Goal:
-    """An action with requirements, as the executor watches its goal.
+    """An action with requirements, whose goal the executor watches.
 
     Attributes:
         index: Its place in `Held`.
@@ -58,7 +58,7 @@ class Goal:
     reads: frozenset[Subject]
 
     def holding(self, state: State) -> int:
-        """A bit for each requirement that holds."""
+        """Bits of the requirements that hold."""
         return sum(1 << bit for bit, holds in enumerate(self.requirements) if holds(state, NO_DATA) is True)
 
 
@@ -67,12 +67,12 @@ class SilentRun:
     """Silent steps in the executor's order, to the end.
 
     Attributes:
-        events: The steps; of a run that does not end, those before its cycle.
-        cycle: The steps that come again and again; empty where the run ends.
-        end: The stable state, once the executor has looked at it; None where the run does not end.
-        is_marked: True if a state of the run is marked, the first included; of one that does not end, if one of its
-            cycle is.
-        cycle_states: The states of its cycle; empty where the run ends.
+        events: The steps; if the run does not end, the steps before its cycle.
+        cycle: The steps that repeat for ever; empty if the run ends.
+        end: The stable state, after the executor has evaluated the requirements; None if the run does not end.
+        is_marked: True if a state of the run, the first one included, is marked; if the run does not end, a state of
+            its cycle.
+        cycle_states: The states of the cycle; empty if the run ends.
     """
 
     events: tuple[str, ...]
@@ -91,7 +91,7 @@ class Controller:
         semantics: Semantics of its automata, if it was made already.
 
     Attributes:
-        is_deterministic: True if no two transitions apply to one event in one state, whatever a model may say.
+        is_deterministic: True if no two transitions apply to one event in one state.
         system: The automata that are executed; their states are those of the model's automata.
         width: Number of places of a state.
         goals: The actions that the executor may cancel, in source order.
@@ -162,11 +162,11 @@ class Controller:
         return min(targets) if len(targets) > 1 else next(iter(targets))
 
     def _has_edges(self, state: State, event: str) -> bool:
-        """Return True if every automaton of an event has an edge here: few have, and this check is quick."""
+        """Return True if every automaton of an event has an edge here: a quick check that excludes most events."""
         return all(state[place] in sources for place, sources in self._sources[event])
 
     def silent_steps(self, node: Node) -> Iterator[tuple[str, Node]]:
-        """Every silent step that is enabled, with where it leads, the executor's choice first."""
+        """Every silent step that is enabled, with its target state; the executor's choice comes first."""
         state, held = node
         for goal in self.goals:
             mask = held[goal.index]
@@ -208,7 +208,7 @@ class Controller:
             visited.append(target)
 
     def observed(self, node: Node) -> Node:
-        """A stable state in which the executor has looked at the requirements of what runs."""
+        """A stable state after the executor has evaluated the requirements of running goals."""
         state, held = node
         if not held:
             return node
@@ -223,7 +223,7 @@ class Controller:
 
         Returns:
             Events, True if this can happen under every setting, and the state before any silent step. A state comes
-            once for each request, and once for each batch: as a whole one, if it can.
+            once for each request and once for each batch, as a whole batch if possible.
         """
         state, held = node
         for event in self.requests:
@@ -237,7 +237,7 @@ class Controller:
                 yield events, is_whole, (target, self.forgotten(target, held))
 
     def _joint_targets(self, state: State, batch: tuple[str, ...]) -> dict[State, tuple[tuple[str, ...], bool]]:
-        """Return the states that the events of a batch lead to, each with the events and True if those are all."""
+        """Return the states that events of a batch lead to, with these events, and True if they are the whole batch."""
         if batch not in self._choices:
             return self._separate_targets(state, batch)
         found: dict[State, tuple[tuple[str, ...], bool]] = {}
@@ -251,7 +251,7 @@ class Controller:
     def _with_choice(
         self, state: State, batch: tuple[str, ...], choice: Choice, *, keeps: bool
     ) -> dict[State, tuple[tuple[str, ...], bool]]:
-        """The same for some of the data that the events can carry together, with or without `on_unknown: keep`."""
+        """The same targets for one combination of the events' data, with or without `on_unknown: keep`."""
         found: dict[State, tuple[tuple[str, ...], bool]] = {state: ((), True)}
         for event, options in zip(batch, choice, strict=True):
             if not self._has_edges(state, event):
@@ -271,7 +271,7 @@ class Controller:
         return found
 
     def _separate_targets(self, state: State, batch: tuple[str, ...]) -> dict[State, tuple[tuple[str, ...], bool]]:
-        """The same where nothing is known of what the events carry together."""
+        """The same targets if every combination of data counts as possible."""
         found: dict[State, tuple[tuple[str, ...], bool]] = {state: ((), True)}
         for event in batch:
             if not self._has_edges(state, event):

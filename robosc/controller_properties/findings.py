@@ -1,4 +1,4 @@
-"""Findings about the controller: runs without end, steps whose order matters, tasks that are never completed."""
+"""Findings about the controller: endless silent steps, steps whose order matters, tasks that are never completed."""
 
 from collections.abc import Iterable, Sequence
 
@@ -29,7 +29,7 @@ def controller_findings(
         model: The checked robot.
         system: Its automata.
         places: Source locations of its parts.
-        properties: Properties that were found out.
+        properties: Results of the check of the controller.
         allow_livelock: True if silent steps that do not end are a warning only.
     """
     found: list[Diagnostic] = []
@@ -78,7 +78,7 @@ def _conflict(model: Model, system: System, places: Places, conflict: Conflict) 
 
 
 def _order_words(model: Model, system: System, order: Order, beside: Order) -> str:
-    """An order and where it ends, as far as that is not where another one ends."""
+    """An order in words, with the part of its end state that differs from the end of another order."""
     listed = _listed((*order.events, *order.cycle))
     if order.end is None:
         return f"{listed} never ends"

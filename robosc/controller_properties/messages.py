@@ -1,10 +1,10 @@
 """Data that the events of one middleware message can carry together.
 
-Several communications may read one message (semantics 3.1): then what they receive comes from the same fields. Enum
-rules are read as conditions over *terms*: a field that is compared with constants, or anything more difficult, which
-then counts as one term that may have any value. Values of a term that no comparison tells apart are one, so all
-choices can be gone through. The reported data is never too little: terms that are written differently are taken to be
-independent, although they may read the same fields.
+Several communications may read one message (semantics 3.1): then they receive data from the same fields. Enum rules are
+read as conditions over *terms*. A term is a field that is compared with constants, or a more difficult expression,
+which may have any value. Values that no comparison distinguishes are represented by one of them, so that all choices
+can be enumerated. The result contains every possible combination, and may contain impossible ones: terms that are
+written differently are taken to be independent, although they may read the same fields.
 """
 
 import math
@@ -40,7 +40,7 @@ from robosc.model.structure import Communication, EnumDefinition, EventKind, Mod
 from robosc.model.typed import constant_value
 
 MAXIMUM_CHOICES = 20_000
-"""Choices of values of terms beyond which the data of events are taken to be independent."""
+"""Maximum number of combinations of terms' values; beyond it the data of events counts as independent."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -49,9 +49,9 @@ class PossibleData:
 
     Attributes:
         data: The data.
-        is_unknown: True if an enum has its default because a rule is unknown: then there is a setting under which the
-            event does not happen.
-        may_be_left_out: True if that can be so, as far as is known here.
+        is_unknown: True if an enum has its default because a rule is unknown; under the setting `on_unknown: keep` the
+            event then does not happen.
+        may_be_left_out: True if `is_unknown` is possible.
     """
 
     data: Carried
@@ -60,7 +60,7 @@ class PossibleData:
 
 
 Choice = tuple[tuple[PossibleData, ...], ...]
-"""For each event of a batch the data that it can carry, given some values of what several of them read."""
+"""Data that each event of a batch can carry, for one combination of values of the shared terms."""
 
 
 def choices_together(model: Model, system: System, batch: Sequence[Communication]) -> tuple[Choice, ...] | None:
@@ -98,7 +98,7 @@ def _has_field(model: Model, type_: Type | None, name: str) -> bool:
 
 
 class _Terms:
-    """Terms that conditions use, with the values that the conditions tell apart."""
+    """Terms that conditions use, with the values that the conditions distinguish."""
 
     def __init__(self) -> None:
         self._kinds: dict[Hashable, Type | None] = {}
@@ -107,7 +107,7 @@ class _Terms:
         self._values: dict[Hashable, tuple[Value | None, ...]] = {}
 
     def add(self, key: Hashable, type_: Type | None, points: Iterable[float | str], *, may_be_unknown: bool) -> None:
-        """Speak of a term, and compare it with some constants; of another type than a basic one it is a boolean."""
+        """Add a term and the constants that it is compared with; a term without a basic type counts as a boolean."""
         self._kinds[key] = type_
         self._points.setdefault(key, set()).update(points)
         if may_be_unknown:
@@ -118,7 +118,7 @@ class _Terms:
         return prod(len(self.values(key)) for key in keys)
 
     def values(self, key: Hashable) -> tuple[Value | None, ...]:
-        """One value of each kind that is told apart; to be asked once all are known."""
+        """One value of each class that the conditions distinguish; call it only when all conditions are known."""
         if key not in self._values:
             unknown = (None,) if key in self._may_be_unknown else ()
             self._values[key] = (*self._known(key), *unknown)
@@ -145,13 +145,13 @@ class _Terms:
 
 @dataclass(slots=True)
 class _Reading:
-    """A datum, worked out from terms.
+    """A datum that is computed from terms.
 
     Attributes:
         path: Path of the datum in the event's data.
         slots: Key of each term that it reads, with the range to which a received integer is clamped.
         rules: Conditions over `Received((n,))`, the n-th slot, each with the value of the datum then.
-        default: Value otherwise; None where it is the first slot itself.
+        default: Value if no rule is true; None if it is the first slot itself.
     """
 
     path: Path
@@ -186,7 +186,7 @@ def _clamped(value: Value | None, range_: IntegerType | None) -> Value | None:
 
 
 class _Event:
-    """One event of a batch: which data it can carry, by the terms that this depends on."""
+    """One event of a batch: the data that it can carry, as a function of terms."""
 
     def __init__(self, model: Model, system: System, item: Communication, terms: _Terms, root: Path) -> None:
         self._model = model
@@ -203,7 +203,7 @@ class _Event:
         self._readings: list[_Reading] = []
         self._is_input = {one.path for one in inputs}
         for one in inputs:
-            # A field with too many values to tell them all apart would leave nothing to go through.
+            # A field with too many values would make too many combinations to enumerate.
             if one.may_be_unknown or len(domain(one.type)) > MAXIMUM_CHOICES:
                 self._free.append(one)
             else:
@@ -310,7 +310,7 @@ class _Event:
         reading: _Reading,
         enum: EnumDefinition,
     ) -> Expression:
-        """A term that is not looked into: what is written alike, over fields of the same types, has one value."""
+        """An opaque term: equal expressions over fields of the same types have one value."""
         read = [leaf for leaf in leaves(term) if isinstance(leaf, Received)]
         types = tuple(self._type_at(enum.source, leaf.path) for leaf in read)
         key = (self._message, self._base, reading.path, term, types, type(type_))

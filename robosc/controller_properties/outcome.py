@@ -12,7 +12,7 @@ class Livelock:
 
     Attributes:
         trace: The events that lead into the cycle.
-        cycle: The silent steps that come again and again.
+        cycle: The silent steps that repeat for ever.
     """
 
     trace: tuple[str, ...]
@@ -29,9 +29,9 @@ class Order:
     """Silent steps in one order.
 
     Attributes:
-        events: The steps; of an order that does not end, those before its cycle.
-        cycle: The steps that come again and again; empty where it ends.
-        end: The state where no silent step is enabled, or None where there is no end.
+        events: The steps; if the order does not end, the steps before its cycle.
+        cycle: The steps that repeat for ever; empty if the order ends.
+        end: The stable state at the end, or None if the order does not end.
     """
 
     events: tuple[str, ...]
@@ -44,7 +44,7 @@ class Conflict:
     """Silent steps whose order matters.
 
     Attributes:
-        trace: The events that lead to where they are enabled.
+        trace: The events that lead to the state in which they are enabled.
         chosen: The order that the executor takes.
         other: Another order, with another outcome.
     """
@@ -60,7 +60,7 @@ class Blocking:
 
     Attributes:
         trace: The events that lead there.
-        states: It, and the stable states that can be reached from it.
+        states: This state and the stable states that can be reached from it.
     """
 
     trace: tuple[str, ...]
@@ -75,7 +75,7 @@ class Properties:
         finite_response: Result of checking that silent steps end.
         confluence: Result of checking that their order does not matter.
         nonblocking: Result of checking that a marked state stays reachable under control.
-        method: Method by which this was found out, in words.
+        method: Method of the check, in words.
         livelock: Reason why there is no finite response, or None.
         conflict: Reason why there is no confluence, or None.
         blocking: Reason why it is not nonblocking under control, or None.

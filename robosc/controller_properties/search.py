@@ -1,7 +1,7 @@
-"""Forward search of the controller automaton, and what it tells about finite response and nonblocking.
+"""Forward search of the controller automaton, and its result for finite response and nonblocking.
 
-Stable states are visited by the number of events that lead to them (E. W. Dijkstra, "A note on two problems in
-connexion with graphs", Numerische Mathematik 1, 1959, pp. 269-271), so a trace has as few events as there can be.
+Stable states are visited in the order of the number of events that lead to them (E. W. Dijkstra, "A note on two
+problems in connexion with graphs", Numerische Mathematik 1, 1959, pp. 269-271), so every trace is a shortest one.
 """
 
 from collections import defaultdict
@@ -15,10 +15,10 @@ from robosc.controller_properties.outcome import Blocking, Conflict, Livelock
 from robosc.errors import SynthesisCancelled
 
 STOP_INTERVAL = 64
-"""States handled between two questions whether to stop."""
+"""States that are visited between two calls of `should_stop`."""
 
 MAXIMUM_EFFORT = 5_000_000
-"""Moves, each counted with the places of a state, beyond which a search is given up too: some seconds."""
+"""Maximum number of moves of a search, multiplied by the places of a state: some seconds of work."""
 
 
 @dataclass(slots=True)
@@ -27,11 +27,11 @@ class Searched:
 
     Attributes:
         states: Stable states that were visited.
-        is_complete: True if there are no others.
+        is_complete: True if every stable state was visited.
         livelock: Silent steps that do not end, the first by the number of events, or None.
         conflict: Silent steps whose order matters, or None.
-        blocking: The nearest state, or cycle of silent steps, from which no marked one is reachable, or None; also
-            where the search is not complete.
+        blocking: The nearest state, or cycle of silent steps, from which no marked state is reachable; None if there is
+            none, or if the search is not complete.
     """
 
     states: int = 0
@@ -48,10 +48,10 @@ class _Graph:
     Attributes:
         nodes: The states.
         numbers: Their numbers.
-        distances: Fewest events that lead there, as far as is known.
-        parents: Number of the state in which those events begin, and the events.
-        before: For each state those from which it can be reached under every setting.
-        good: States that are marked, or pass one on a way that there is under every setting.
+        distances: Fewest events that lead to each state, as found so far.
+        parents: For each state the number of the state before it, and the events in between.
+        before: The states from which each state can be reached under every setting.
+        good: States that are marked, or that pass a marked state on a way that exists under every setting.
     """
 
     nodes: list[Node] = field(default_factory=list)
@@ -62,7 +62,7 @@ class _Graph:
     good: set[int] = field(default_factory=set)
 
     def meet(self, node: Node, parent: int | None, events: tuple[str, ...]) -> tuple[int, bool]:
-        """The number of a state reached by events, and whether that is the shortest way so far."""
+        """The number of a state that events reach, and whether they are the shortest way so far."""
         distance = len(events) + (0 if parent is None else self.distances[parent])
         number = self.numbers.setdefault(node, len(self.nodes))
         if number == len(self.nodes):
@@ -96,9 +96,9 @@ def search(
 
     Args:
         controller: The automaton.
-        limit: Stable states beyond which to give up; also beyond `MAXIMUM_EFFORT`.
-        confluence: Compares the orders of the silent steps of every state that is met, or None if nobody asks.
-        should_stop: Asked now and then; once true, the work ends.
+        limit: Maximum number of stable states to visit; `MAXIMUM_EFFORT` is another limit.
+        confluence: Comparison of the orders of silent steps of every visited state, or None for no comparison.
+        should_stop: Function called now and then; once it returns true, the work ends.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
@@ -159,13 +159,13 @@ def search(
 
 
 def _shorter(first: Blocking | None, second: Blocking | None) -> Blocking | None:
-    """The one with fewer events; of two alike the first."""
+    """The finding with the shorter trace; the first one if both are equally long."""
     found = [item for item in (first, second) if item is not None]
     return min(found, key=lambda item: len(item.trace), default=None)
 
 
 def _blocking(graph: _Graph) -> Blocking | None:
-    """The nearest state from which no marked one is reachable."""
+    """The nearest state from which no marked state is reachable."""
     good = set(graph.good)
     stack = list(good)
     while stack:

@@ -1,10 +1,11 @@
 """Properties of the controller that follow from the structure of its silent steps, without visiting states.
 
-Each function proves its property or says nothing. Facts about silent steps of a checked model:
+Each function returns True only if it proves its property; False means unknown. Facts about silent steps of a checked
+model:
 
 - A tau changes the location of its own component and nothing else.
-- Resets and the executor's own cancels bring a service or action back to where only a request leads on, so each of
-  them happens at most once in a run of silent steps.
+- After a reset or an own cancel, only a request can move the service or action again, so each reset or cancel happens
+  at most once in a run of silent steps.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -23,7 +24,7 @@ from robosc.model.structure import CommunicationKind, EventKind, Model, is_tau
 from robosc.supervisor import AddedCondition
 
 MAXIMUM_VALUATIONS = 20_000
-"""Values, of all that some silent steps read, beyond which they are not gone through."""
+"""Maximum number of combinations of values, of all that some silent steps read, that are enumerated."""
 
 _Arcs = dict[str, list[Edge]]
 """Taus of one automaton that change its location, by the location they leave."""
@@ -34,11 +35,11 @@ _Steps = dict[tuple[int, Value], list[tuple[Function, str]]]
 
 
 def always_end(system: System, should_stop: Callable[[], bool] = lambda: False) -> bool:
-    """Return True if silent steps end in whatever order they are taken, judged by the taus of every component.
+    """Return True if the taus of every component prove that silent steps end in every order.
 
-    From some step on, a run without end takes only taus that it takes again and again: each lies on a cycle of its
-    component's taus, and all that other steps change stands still. So it is enough that no values of what stands
-    still let such taus go round, looking at those components together whose guards read each other.
+    From some step on, an endless run takes only taus that repeat for ever. Each of them lies on a cycle of the taus of
+    its component, and everything that other steps change stays constant. So it is enough to prove, for all values of
+    these constants, that such taus cannot form a cycle. Components whose guards read each other are examined together.
     """
     cyclic: dict[str, _Arcs] = {}
     for automaton in system.automata:
@@ -52,7 +53,7 @@ def always_end(system: System, should_stop: Callable[[], bool] = lambda: False) 
 
 
 def _on_cycles(taus: Iterable[Edge]) -> _Arcs:
-    """The edges that lie on a cycle, whatever their guards: those of which the source is reachable from the target."""
+    """The edges that lie on a cycle if guards are ignored: the source is reachable from the target."""
     leaving: _Arcs = {}
     for edge in taus:
         leaving.setdefault(edge.source, []).append(edge)
@@ -65,7 +66,7 @@ def _on_cycles(taus: Iterable[Edge]) -> _Arcs:
 
 
 def _clusters(cyclic: Mapping[str, _Arcs]) -> Iterator[tuple[str, ...]]:
-    """Automata with cycles, together where a guard of one reads the location of another."""
+    """Automata with cycles, in groups whose guards read each other's locations."""
     neighbours: dict[str, set[str]] = {name: set() for name in cyclic}
     for name, arcs in cyclic.items():
         for subject in _read(arcs):
@@ -95,7 +96,7 @@ def _read(arcs: _Arcs) -> dict[Subject, None]:
 def _cannot_cycle(
     system: System, cyclic: Mapping[str, _Arcs], cluster: tuple[str, ...], should_stop: Callable[[], bool]
 ) -> bool:
-    """Return True if the taus of some automata cannot go round, whatever everything else is."""
+    """Return True if the taus of some automata cannot form a cycle, for all values of everything else."""
     own = [Subject(name) for name in cluster]
     frozen = [
         item for item in dict.fromkeys(item for name in cluster for item in _read(cyclic[name])) if item not in own
@@ -118,7 +119,7 @@ def _cannot_cycle(
 
 
 def _has_cycle(steps: _Steps, width: int, states: Iterable[State]) -> bool:
-    """Return True if taus lead from a state back to it: removing states without predecessors leaves some over."""
+    """Return True if taus form a cycle: some states are left after repeated removal of states without predecessors."""
     after: dict[State, list[State]] = {}
     arriving: dict[State, int] = {}
     for state in states:
@@ -145,7 +146,7 @@ class _Step:
 
     Attributes:
         event: Its event.
-        reads: A bit for each place of a state on which it depends whether it is enabled and where it leads.
+        reads: A bit for each place of a state that decides whether the step is enabled and where it leads.
         writes: A bit for each place that it may change.
         home: The automaton of a tau; None for resets and cancels.
         sources: The locations in which a tau stands.
@@ -163,7 +164,7 @@ def never_conflict(
 ) -> bool:
     """Return True if any two silent steps that are enabled together lead to one state in either order.
 
-    Where silent steps always end, that is confluence, by Newman's lemma (see `confluence`).
+    If silent steps always end, this implies confluence, by Newman's lemma (see `confluence`).
 
     Args:
         controller: The automaton.
@@ -247,7 +248,7 @@ def _commute(
 
 
 def _taken(controller: Controller, state: State, event: str) -> State | None:
-    """Return the target of a reset or tau, or None where it is not taken: a tau that would change nothing is not."""
+    """Return the target of a reset or tau, or None if it is not taken; a tau that would change nothing is not taken."""
     target = controller.after(state, event)
     return None if target == state else target
 
@@ -255,9 +256,9 @@ def _taken(controller: Controller, state: State, event: str) -> State | None:
 def stays_nonblocking(model: Model, controller: Controller, added: Iterable[AddedCondition]) -> bool:
     """Return True if a controlled system that is nonblocking stays so under control.
 
-    Its silent steps are resets alone, and nothing else depends on whether they are taken at once: so every run to a
-    marked state, where services are idle, is also one with each reset directly after its answer. And the environment
-    and the executor do, one by one, whatever happens in the controlled system.
+    This holds if all silent steps are resets and nothing else depends on whether they are taken at once. Every run to a
+    marked state, in which services are idle, is then also possible with each reset directly after its answer. And the
+    environment and the executor can take every event of the controlled system, one by one.
     """
     has_own_steps = any(is_tau(event) for event in controller.silent) or any(
         item.kind is CommunicationKind.ACTION for item in model.communications

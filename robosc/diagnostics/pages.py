@@ -1,11 +1,11 @@
-"""Reads the pages about diagnostic codes, and joins them to one document.
+"""Pages about diagnostic codes, read from files and joined to one document.
 
-There is one Markdown file a code in the folder `pages`, of one shape:
+Each code has one Markdown file in the folder `pages`. All files have this shape:
 
     # code
     severity: error
     stage: model
-    What is wrong, and why it matters for the robot; its first sentence stands for the whole in lists.
+    What is wrong, and why it matters for the robot; lists show only the first sentence.
     ## Example
     Fenced texts that are reported with exactly this code, at the line that ends in `// <- here`.
     ## Fix
@@ -15,7 +15,7 @@ There is one Markdown file a code in the folder `pages`, of one shape:
 
 A fence says what it holds: `robosc` (the model), `robosc library=NAME` (a library that the model imports), `cif` (a
 CIF model), `cif library=NAME` (a file that it imports), `gen` or `wmod` (plain automata), or `console` (a session at a
-shell, where no text could show the fault: a NUL, a file of 16 MiB).
+shell, for a fault that no text can show: a NUL, a file of 16 MiB).
 """
 
 import re
@@ -229,7 +229,7 @@ Every finding of RoboSC has a code, which stays the same from version to version
 behind the message, and `robosc explain CODE` prints its chapter of this document. An *error* makes a model unusable. A
 *warning* is very likely a mistake; `robosc check --strict` fails for one. A *note* is worth knowing.
 
-The *stage* tells who finds it: reading the *text*, checking the *model*, the *synthesis* of the supervisor, its
+The *stage* says who finds it: reading the *text*, checking the *model*, the *synthesis* of the supervisor, its
 *explanation* by `robosc explain-synthesis`, or what is made for one *target* or deployment. In the examples the finding
 is reported at the line that ends in `// <- here`.
 """

@@ -1,4 +1,4 @@
-"""Checks of a machine: each looks at one part, for the purposes that need it."""
+"""Checks of a machine: each examines one part of it, for the purposes that need this part."""
 
 import re
 from collections.abc import Iterable, Iterator

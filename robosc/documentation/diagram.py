@@ -1,8 +1,8 @@
 """A component's automaton as a Mermaid state diagram (https://mermaid.js.org/syntax/stateDiagram.html).
 
-States get identifiers of our own (`s1`, `s2`, ...) and their names as labels: Mermaid has keywords (`end`,
-`state`, `note`) that a state may be called. In labels every character with a meaning of its own is written as
-Mermaid's reference by number, `#59;` for a semicolon.
+States get identifiers of our own (`s1`, `s2`, ...) and their names as labels, because a state's name may be a keyword
+of Mermaid (`end`, `state`, `note`). In labels, every character with a meaning in Mermaid is written as a reference by
+number, such as `#59;` for a semicolon.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""Markdown of which every part is escaped: whatever a model calls its topics, a table stays a table.
+"""Markdown with every part escaped, so that no name of a topic can break a table.
 
 Written for CommonMark with the tables of GitHub (https://github.github.com/gfm), which most viewers know.
 """

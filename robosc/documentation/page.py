@@ -1,7 +1,6 @@
 """The page of a robot, section by section, from the checked model alone.
 
-The same model gives the same bytes: everything stands in the model's own order, and no time, version or
-place of a file is reported.
+The same model gives the same bytes: everything is in the order of the model, and no time, version or path is written.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,1 +1,1 @@
-"""Information about a text for editors, also while it is being typed; knows no protocol."""
+"""Information about a text for editors, also while it is being typed, independent of any editor protocol."""

@@ -387,7 +387,7 @@ class _Names:
             communication = self._inspected.communications.get(name_of(item[2]))
             if communication is not None:
                 return communication.request
-            # It is broken where somebody types.
+            # The declaration is incomplete while it is being typed.
             return self._named(name_of(item[item.index("type") + 2])) if "type" in item[:-2] else None
         return None
 
@@ -399,7 +399,7 @@ class _Names:
         return ObjectType(key) if key in self._scope.types.objects else self._scope.enums.get(name)
 
     def _required_type(self) -> Type | None:
-        """The type that is needed, as far as what stands before tells it."""
+        """The type that is needed here, if the words before the cursor determine it."""
         before = _up_to_expression(self._place.before)
         item = self._place.item[: len(self._place.item) - (len(self._place.before) - len(before))]
         last = before[-1] if before else ""
@@ -416,7 +416,7 @@ class _Names:
         return found if found is not None else self._type_of(_compared_with(self._behind))
 
     def _declared(self, item: Sequence[str]) -> Type | None:
-        """The type of a variable or constant whose value is missing still: nothing but its words tells it."""
+        """The type of a variable or constant that has no value yet, from the words of its declaration."""
         name = name_of(item[3]) if len(item) > 3 and item[2] == ":" else ""
         return None if self._scope is None else self._scope.enums.get(name)
 

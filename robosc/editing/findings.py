@@ -1,4 +1,4 @@
-"""Findings of editors, which show findings alone, where the command line says something in words."""
+"""Findings for editors, which show only findings, about results that the command line prints as text."""
 
 from robosc.errors import Diagnostic, Severity
 from robosc.source import Location
@@ -11,7 +11,7 @@ def no_supervisor(reason: str, place: Location) -> Diagnostic:
         reason: Reason in one sentence.
         place: Place of the robot's name.
     """
-    fix = "Run 'robosc synth': it tells what is to blame."
+    fix = "Run 'robosc synth': it shows what is to blame."
     return Diagnostic(Severity.WARNING, "no-supervisor", reason.rstrip("."), place, fix)
 
 

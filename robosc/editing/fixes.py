@@ -1,4 +1,4 @@
-"""Fixes that can be made by a machine: the same that findings describe in words."""
+"""Fixes that an editor can apply automatically: the same ones that findings describe in words."""
 
 import re
 from collections.abc import Callable, Iterator

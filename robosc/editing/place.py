@@ -1,4 +1,4 @@
-"""Place in a text where somebody types: what is open there, and what came before."""
+"""Place of the cursor in a text: the open blocks there, and the words before it."""
 
 import re
 from collections.abc import Sequence

@@ -166,7 +166,7 @@ def on_robots_clock(run: LoggedRun, motion: Motion) -> LoggedRun:
     """
     samples = motion.samples
     if len(samples) < 2 or samples[0].time >= samples[-1].time:
-        raise PlotError("the record of motion is too short to tell the robot's time")
+        raise PlotError("the record of motion is too short to give the robot's time")
     # A clock that was set back would turn time round.
     times = [samples[0].time]
     for sample in samples[1:]:

@@ -1,10 +1,10 @@
 """Check whether the events that a log reports could have happened under a supervisor.
 
-The events are replayed from the initial state on the automata: each request must have been allowed by plants, ranges,
-requirements and what synthesis has added in the state that the events before it led to, each other event must have
-been possible, and each logged state must be the one that they lead to. Resets, cancels and tau transitions stand in a
-log as events like any other; a request is wrong while one of the resets or taus was still to be taken, since the
-executor takes them first. Where something is wrong the replay goes on from what the log reports.
+The events are replayed from the initial state on the automata. Each request must be allowed in the state before it, by
+plants, ranges, requirements and the conditions of the supervisor. Each other event must be possible, and each logged
+state must be the state that the events lead to. Resets, cancels and tau transitions are logged like other events. A
+request is wrong if an enabled reset or tau was not taken before it, because the executor takes these first. After a
+violation, the replay continues from the logged state.
 """
 
 import json
@@ -127,7 +127,8 @@ class _Checking:
         # Actions that were requested: their goals may be under way for longer than the model knows.
         self._requested: set[str] = set()
         model = replay.model
-        # What nothing is requested before; the executor asks again in another run, which a log does not tell whole.
+        # Identifiers whose first message must come before any request. Not checked after a restart: a log does not
+        # record every message of a later run.
         self._awaited = {item.identifier for item in model.communications if item.max_age is not None}
         self._identifiers = {event: item.identifier for item in model.communications for event in item.events}
         self._unknown_kinds: set[str] = set()
@@ -246,7 +247,7 @@ class _Checking:
         names = ", ".join(f"{item.name}.request" for item in candidates)
         match why:
             case "not allowed now":
-                # Which of several messages it was the log does not tell: one that is forbidden is reason enough.
+                # The log does not say which of several messages it was: one forbidden message is reason enough.
                 if not any(self._replay.refusal(f"{item.name}.request") for item in candidates):
                     self._wrong(entry, f"a request on {identifier} was held back, but {names} was allowed")
             case "stopped":

@@ -1,4 +1,4 @@
-"""Event logs as MCAP files, which Foxglove, `ros2 bag` and PlotJuggler open. The messages need no installed ROS.
+"""Event logs as MCAP files, which Foxglove, `ros2 bag` and PlotJuggler open. The conversion needs no installed ROS.
 
 The format is that of https://mcap.dev: schemas `ros2msg`, messages in CDR, profile `ros2`, compressed by Zstandard.
 """

@@ -1,8 +1,8 @@
 """Sequences of events as pictures and pages, as in the paper's Figures 14 and 15.
 
-Time goes to the right, one row stands for an event. Orange triangles are controllable, blue dots uncontrollable: the
-tones are those that M. Okabe and K. Ito propose for colour-blind readers ("Color Universal Design", 2008), and shape
-tells the two apart without any colour.
+Time goes to the right; each row stands for one event. Orange triangles are controllable events, blue dots are
+uncontrollable ones. The colours are those that M. Okabe and K. Ito propose for colour-blind readers ("Color Universal
+Design", 2008), and the shapes distinguish the two kinds without any colour.
 """
 
 import importlib

@@ -18,7 +18,7 @@ class LogEntry:
         kind: `event`, `blocked`, `fault` and so on: see `robosc.execution.runtime.event_log`.
         event: The event that it is about; empty if it is about none.
         is_controllable: True if the controller took the event by itself.
-        document: All of it, as it stands in the log. Entries share what is equal: nobody may change it.
+        document: The whole entry as it is in the log. It must not be changed, because entries share equal parts.
     """
 
     line: int

@@ -1,6 +1,6 @@
-"""Layouts of Foxglove for converted logs: its panels, filled with the topics of one log.
+"""Layouts of Foxglove for converted logs: panels that show the topics of one log.
 
-The file is what Foxglove imports as a layout (`Import from file`): panels by name, and how they share the window.
+Foxglove imports the file as a layout (`Import from file`): it has the panels by name, and their places in the window.
 """
 
 from collections.abc import Mapping, Sequence
@@ -9,7 +9,7 @@ from typing import Any
 from robosc.event_logs.messages import BLOCKED, EVENTS, LOG, PATH, POSE, ROBOT, TF, VELOCITY, WORLD
 
 _MOST_LINES = 12
-"""Lines of a plot beyond which none can be told from another."""
+"""Most lines of one plot that a reader can tell apart."""
 
 _COLORS = ("#0072B2", "#D55E00", "#009E73", "#CC79A7", "#56B4E9", "#E69F00", "#000000", "#F0E442")
 _NUMBERS = ("std_msgs/msg/Bool", "std_msgs/msg/Int64", "std_msgs/msg/Float64")
@@ -19,7 +19,7 @@ def layout_of(topics: Mapping[str, str]) -> dict[str, Any]:
     """Return the layout for a converted log.
 
     Args:
-        topics: Type of each topic of the log, as `Converted` tells them.
+        topics: Type of each topic of the log, as in `Converted`.
     """
     texts = [topic for topic, type_ in topics.items() if type_ == "std_msgs/msg/String"]
     states = [topic for topic in texts if topic.startswith("/robosc/state/")]

@@ -45,7 +45,7 @@ _FURTHER = {"tf2_msgs/msg/TFMessage": "geometry_msgs/TransformStamped[] transfor
 """Definitions beside those that come with RoboSC."""
 
 _SECONDS_END = 1 << 31
-"""The first second that builtin_interfaces/Time cannot tell."""
+"""The first second that builtin_interfaces/Time cannot represent."""
 
 _LONGEST_TOKEN = 80
 _MOST_POSES = 2000
@@ -140,7 +140,7 @@ def topics_of(reader: LogReader, name: str) -> LogTopics:
         has_blocked |= entry.kind == "blocked"
         if not 0 <= entry.time_s < _SECONDS_END:
             raise LogError(
-                f"{name}, line {entry.line}: its 'time' is before 1970 or after 2038, which messages cannot tell"
+                f"{name}, line {entry.line}: its 'time' is before 1970 or after 2038, which messages cannot represent"
             )
         for component, part in entry.state.items():
             if components.get(component) is not part:
@@ -200,7 +200,7 @@ def motion_messages(motion: Motion) -> Iterator[Message]:
         LogError: A time of it cannot be reported.
     """
     if any(not 0 <= sample.time < _SECONDS_END for sample in motion.samples):
-        raise LogError("a time of the record of motion is before 1970 or after 2038, which messages cannot tell")
+        raise LogError("a time of the record of motion is before 1970 or after 2038, which messages cannot represent")
     step = -(-len(motion.samples) // _MOST_POSES)
     for number, sample in enumerate(motion.samples):
         time_ns = _nanoseconds(sample.time)

@@ -117,9 +117,9 @@ def _draw_rows(axes: Axes, sequence: EventSequence) -> None:
 
 
 def _name_states(figure: Figure, axes: Axes, sequence: EventSequence) -> None:
-    """Write each state into its spans that are wide enough; those of which none is stand right of the band."""
+    """Write each state's name into its spans that are wide enough, or right of the band if none is."""
     written: list[Artist] = []
-    # Words on the right make the axes narrower: only a layout that is done tells how wide a second is.
+    # Names on the right make the axes narrower: the width of a second is known only after the layout.
     for _ in range(2):
         figure.draw_without_rendering()
         per_s = axes.get_window_extent().width / figure.dpi / (axes.get_xlim()[1] - axes.get_xlim()[0])

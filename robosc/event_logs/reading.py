@@ -1,4 +1,4 @@
-"""Reads event logs, which may come from anywhere: every size is bounded, and errors are reported with their lines."""
+"""Reader of event logs. Logs are untrusted: every size is bounded, and errors are reported with their lines."""
 
 import json
 from collections.abc import Iterator, Mapping
@@ -28,14 +28,14 @@ _MAXIMUM_NAME = 600
 
 
 class LogError(RoboscError):
-    """A file is no event log, or too large a one; the message tells the line."""
+    """A file is no event log, or too large a one; the message names the line."""
 
 
 def read_log(path: str | Path) -> LoggedRun:
     """Read a log (JSON Lines).
 
-    A last line that is cut off is left out and told, and so are lines that were torn because the disk was full: their
-    writer has counted them as dropped.
+    A last line that is cut off is left out and reported. The same holds for lines that a full disk cut off: the writer
+    has counted them as dropped.
 
     Args:
         path: The file; no pipe or device, which might never end.

@@ -1,8 +1,8 @@
-"""A supervisor's automata, led through the entries of a log.
+"""Replay of a log's entries on a supervisor's automata.
 
-This is deliberately not the executor: what can happen and where it leads comes from the explicit meaning of the
-automata (`robosc.automata.Semantics`) and the conditions that synthesis has added. Variables that synthesis leaves out
-are computed by the slow evaluator, as far as the log contains their operands: it leaves out arrays.
+The replay deliberately does not use the executor: possible events and their target states come from the explicit
+semantics of the automata (`robosc.automata.Semantics`) and the conditions that synthesis has added. Variables that
+synthesis leaves out are computed by the slow evaluator, if the log contains their operands; it does not contain arrays.
 """
 
 from collections.abc import Mapping
@@ -283,7 +283,7 @@ class Replay:
         for component, behaviour in self._behaviours.items():
             entry = logged.get(component)
             if entry is None:
-                found.append(f"nothing is told of {component}")
+                found.append(f"the state of {component} is missing")
                 continue
             location = self.state[self._places[Subject(component)]]
             if entry["state"] != location:

@@ -1,4 +1,4 @@
-"""Content of a plot of a sequence of events: rows, marks along time, and fewer of those that cover others."""
+"""Content of a plot of a sequence of events: rows and marks along time; marks that would cover others are left out."""
 
 from collections import Counter
 from collections.abc import Iterable, Sequence

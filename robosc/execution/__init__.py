@@ -1,4 +1,4 @@
-"""Parts that make a supervisor run: `runtime`, executors that generated packages carry copies of, and `interpreter`.
+"""Parts that run a supervisor: the executors in `runtime`, which are copied into generated packages, and `interpreter`.
 
-The interpreter is the reference for what generated code does; it is not copied.
+The interpreter is the reference for generated code, and is not copied.
 """

@@ -1,6 +1,6 @@
-"""Explanation of synthesis: what is to blame for an empty supervisor, and what restricts events where there is one.
+"""Explanation of synthesis: the reasons for an empty supervisor, or the restrictions of events by a supervisor.
 
-The names are imported on use, so that who only reads an explanation does not load the synthesizer.
+The names are imported on use: a program that only reads explanations does not load the synthesizer.
 """
 
 from typing import TYPE_CHECKING

@@ -1,10 +1,10 @@
-"""Analysis of why events cannot happen in states, and how states run into trouble, in terms of automata.
+"""Analysis of the reasons why events cannot happen in states, and of runs into trouble, in terms of automata.
 
-*Trouble* is a state that is bad, or from which no marked state can be reached under the requirements without going
-through a bad one. Of a state that a supervisor has to avoid, a run into trouble is shown: where uncontrollable events
-alone lead there, a shortest run of these, which nothing can prevent; else a shortest run of anything that plants and
-requirements allow. One of both there always is: were no trouble within reach, what can be reached would be safe,
-nonblocking and closed under uncontrollable events, so the state were good.
+*Trouble* is a bad state, or a state from which the requirements allow no run to a marked state without bad states. For
+a state that a supervisor must avoid, the analysis shows a run into trouble. If uncontrollable events alone lead to
+trouble, it is a shortest run of them, which nothing can prevent; else it is a shortest run that plants and requirements
+allow. One of these runs always exists: if no trouble were reachable, all reachable states would be safe, nonblocking
+and closed under uncontrollable events, so the state would be good.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -27,14 +27,14 @@ from robosc.synthesis.transitions import Steps
 from robosc.synthesis.ways import WayNotFoundError, Ways
 
 MAXIMUM_UNFOUND = 2
-"""Ways that took too long to find after which an analysis looks for shortest ones only."""
+"""Number of failed searches for a way after which an analysis searches only for shortest ways."""
 
 
 class BlockingCauseKind(StrEnum):
     """Kind of cause that keeps an event from happening."""
 
     BEHAVIOUR = "behaviour"
-    """The plants cannot do it: for the most part, one has no edge for it there whose guard is true."""
+    """The plants cannot do it: mostly, a plant has no edge for the event whose guard is true."""
     RANGE = "range"
     """An update would leave a variable's range."""
     REQUIREMENT = "requirement"
@@ -50,11 +50,11 @@ class BlockingCause:
     Attributes:
         kind: Kind of cause.
         event: The event.
-        where: Those of the states in which it does.
-        automaton: The one without an edge.
-        plant_condition: Place in `System.plant_conditions` of the one that is not true.
-        is_impossible: True if every step would lead to states that are against the plant invariants.
-        range: The range.
+        where: The states in which the cause applies.
+        automaton: The automaton that has no edge.
+        plant_condition: Place in `System.plant_conditions` of the condition that is not true.
+        is_impossible: True if every step would lead to states that violate the plant invariants.
+        range: The range that an update would leave.
         condition: Place in `System.conditions`.
     """
 
@@ -70,19 +70,19 @@ class BlockingCause:
 
 @dataclass(frozen=True, slots=True)
 class Counterexample:
-    """A run into trouble, and what the trouble is.
+    """A run into trouble, with a description of the trouble.
 
     Attributes:
         run: The run.
         is_forced: True if all of its events are uncontrollable.
-        invariants: Places of the invariants that are not true there.
+        invariants: Places of the invariants that are not true in the last state.
         leaving: Uncontrollable events that can leave a range there.
-        forbidden: Uncontrollable events that can happen there against a condition (its place).
-        detour: Way that the plants by themselves would have to a marked state, where the state is not bad, but
-            blocks; None where the plants have none either, or finding one takes too long.
-        is_detour_unknown: True where finding one takes too long.
-        unmarked: Automata that are in no marked location, where the state blocks.
-        is_marker_missed: True if the marker is not true there, where the state blocks.
+        forbidden: Uncontrollable events that can happen there although a condition (its place) forbids them.
+        detour: Way of the plants alone to a marked state, if the last state blocks but is not bad; None if the plants
+            have no such way, or if the search takes too long.
+        is_detour_unknown: True if the search for such a way takes too long.
+        unmarked: Automata that are in no marked location, if the state blocks.
+        is_marker_missed: True if the state blocks and the marker is not true there.
     """
 
     run: SystemRun
@@ -97,7 +97,7 @@ class Counterexample:
 
     @property
     def is_blocking(self) -> bool:
-        """True if the state is not bad, but has no way on to a marked state."""
+        """True if the state is not bad, but no marked state can be reached from it."""
         return not (self.invariants or self.leaving or self.forbidden)
 
 
@@ -108,9 +108,8 @@ class Detour:
     Attributes:
         events: The events of the whole run.
         stopped_at: Place of the first event that is not allowed, or that leads to a state to be avoided.
-        state: The state before it.
-        blocking_causes: Causes that keep it from happening there; none where it is uncontrollable and leads to
-            trouble.
+        state: The state before that event.
+        blocking_causes: Causes that block the event there; none if it is uncontrollable and leads to trouble.
     """
 
     events: tuple[str, ...]
@@ -125,11 +124,10 @@ class Analysis:
     Args:
         encoding: The variables.
         monitor: Monitor of the waiting caller.
-        problems: The problem and what is left of it without constraints.
-        constraints: All of them.
+        problems: The problem and its variants without some constraints.
+        constraints: All constraints.
         good: The states that a supervisor may be in.
-        dropped: Constraints that the problem is thought to be without. Runs leave no range nevertheless, unless there
-            is no other way.
+        dropped: Constraints that are assumed to be left out. Runs still leave no range, unless there is no other way.
     """
 
     def __init__(
@@ -176,7 +174,7 @@ class Analysis:
     # Why events cannot happen
 
     def _behaviours(self, event: str) -> tuple[BlockingCause, ...]:
-        """Return all that could keep the plants from doing an event, each with the states where it does."""
+        """Return all causes by which the plants could block an event, each with the states where it applies."""
         if event not in self._enabling:
             system = self._encoding.system
             plants = [item for item in system.automata if event in item.alphabet]
@@ -210,14 +208,14 @@ class Analysis:
         )
 
     def wanted(self, event: str) -> Any:
-        """Return the states where the plants would let an event happen if variables had no ranges."""
+        """Return the states where the plants would allow an event if variables had no ranges."""
         steps = self._problems.steps(event)
         return steps.plant | steps.leaving
 
     def possible(self, event: str, good: Any | None = None) -> Any:
-        """Return the states where an event may happen and stays in good states.
+        """Return the states where an event may happen and leads only to good states.
 
-        Good states are those that a supervisor may be in, or others.
+        Good states are those that a supervisor may be in, unless others are given.
         """
         good = self.good if good is None else good
         steps = self._steps[event]
@@ -226,7 +224,7 @@ class Analysis:
         return good & steps.plant & steps.condition & self._staying(event, good)
 
     def _staying(self, event: str, good: Any) -> Any:
-        """Return the states from which an event, if it happens, leads to good states alone."""
+        """Return the states from which an event, if it happens, leads only to good states."""
         if good != self.good:
             return self._steps[event].only(good)
         if event not in self._kept:
@@ -234,16 +232,16 @@ class Analysis:
         return self._kept[event]
 
     def moving(self, event: str) -> Any:
-        """Return the states where an event is more than a step that changes nothing."""
+        """Return the states where an event changes the state."""
         return self._steps[event].moving()
 
     def blocking_causes(self, event: str, states: Any, good: Any | None = None) -> tuple[BlockingCause, ...]:
-        """Return the causes that keep an event from happening in some of the states, whatever else does.
+        """Return every cause that blocks an event in some of the states.
 
         Args:
             event: The event.
             states: The states.
-            good: States that a supervisor must not leave, if other than the states that it may be in.
+            good: States that a supervisor must not leave; the states that it may be in, if None.
         """
         good = self.good if good is None else good
         steps = self._steps[event]
@@ -282,7 +280,7 @@ class Analysis:
     # Runs
 
     def runs(self, start: Any, possible: Mapping[str, Any]) -> ShortestRuns:
-        """Shortest runs from some states through events where they are possible."""
+        """Shortest runs from some states by possible events."""
         return self._runs(self._steps, start, possible)
 
     def _runs(self, steps: Mapping[str, Steps], start: Any, possible: Mapping[str, Any]) -> ShortestRuns:
@@ -290,7 +288,7 @@ class Analysis:
         return ShortestRuns(self._encoding, self._monitor, chosen, possible, start)
 
     def counterexample_after(self, start: Any) -> Counterexample:
-        """Return a run into trouble from one of some states that must be avoided."""
+        """Return a run into trouble from one of some states that a supervisor must avoid."""
         for steps, is_forced in self._continuations():
             possible = {
                 name: item.plant & self._restricted(item)
@@ -303,7 +301,7 @@ class Analysis:
         raise InternalError("a state that must be avoided does not run into trouble")
 
     def _continuations(self) -> Iterator[tuple[Mapping[str, Steps], bool]]:
-        """Events by which trouble is looked for, and whether by uncontrollable ones alone; the better ones first."""
+        """Events for the search for trouble, and True if they are all uncontrollable; the preferred ones first."""
         if self._dropped_ranges:
             # Updates that stop at the end of a range are no steps that the robot takes.
             real = {name: self._problems.steps(name).under(steps.condition) for name, steps in self._steps.items()}
@@ -369,20 +367,20 @@ class Analysis:
     def detour(
         self, start: Any, goal: Any, good: Any, inside: Any | None = None, runs: ShortestRuns | None = None
     ) -> Detour | None:
-        """Return a way to a goal that the plants alone would have, and where it is stopped; None without any.
+        """Return a way of the plants alone to a goal, and where it is stopped; None if there is none.
 
-        Allowed events lead on as far as they can, and only from there the plants alone: the event that is reported is
-        one that no other way avoids.
+        The way follows allowed events as far as they lead, and only then the plants alone. So no other way avoids the
+        reported event.
 
         Args:
             start: States where the way begins.
-            goal: States that it leads to; allowed events do not.
+            goal: States at its end, which allowed events do not reach.
             good: The states that must not be left.
             inside: States that can be reached by allowed events, if that is known.
             runs: Shortest runs from the start by allowed events, if there are some already.
 
         Raises:
-            WayNotFoundError: Finding one takes too long.
+            WayNotFoundError: The search takes too long.
         """
         for ways in self._ways(goal):
             # Allowed events are the plants' own, so from what they reach no way leads on unless one does from here.
@@ -414,7 +412,7 @@ class Analysis:
     def _ways(self, goal: Any) -> tuple[Ways, Ways]:
         """Return the ways to a goal under the requirements, and those of the plants alone.
 
-        They are tried in this order: what synthesis keeps from happening is reported before what is forbidden anyhow.
+        They are tried in this order: an event that synthesis forbids is reported before one that requirements forbid.
         """
         return self._marked_ways if goal == self._fixed_point.marked else self._ways_to(goal)
 
@@ -438,7 +436,7 @@ class Analysis:
             raise
 
     def predicate(self, state: State) -> Any:
-        """Return the predicate that is true where the state is this one."""
+        """Return the predicate that is true only in this state."""
         values = zip(subjects(self._encoding.system), state, strict=True)
         return self._encoding.all_of(
             self._encoding.equals(self._encoding.subjects[subject], value) for subject, value in values

@@ -1,4 +1,4 @@
-"""Reasons why a problem has no supervisor: a run into trouble, what is to blame, and what would have to go."""
+"""Reasons why a problem has no supervisor: a run into trouble, the blamed constraints, and a removal that helps."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -21,13 +21,13 @@ EFFORT = 100
 """Steps that the search for what is to blame may take, as a multiple of those of one synthesis."""
 
 LEAST_EFFORT = 20_000
-"""Steps that it may take in any case."""
+"""Least limit of these steps."""
 
 MAXIMUM_PARTS = 200
-"""Parts of the model that an explanation lists: a search that was given up early may leave thousands."""
+"""Maximum number of parts of the model that an explanation lists: an unfinished search may leave thousands."""
 
 _ASKED = (ConstraintKind.REQUIREMENT, ConstraintKind.INVARIANT)
-"""Kinds of constraints that are asked of the robot; the others are what it is."""
+"""Kinds of constraints that are requirements on the robot; the other kinds describe the robot."""
 
 
 _NOWHERE = CounterexampleReport(
@@ -44,11 +44,12 @@ class Blame:
     """Constraints to blame for the lack of a supervisor: places in a list of constraints, in its order.
 
     Attributes:
-        conflict: Constraints that, without any other, leave no supervisor.
-        is_minimal: True if it is known that none of them can be missing.
-        sufficing: Those of the conflict without which alone there is a supervisor, beside all others; None where
-            that was not found out.
-        removal: Those without which there is a supervisor, none of which can stay; None where that was not found out.
+        conflict: Constraints that alone are enough to leave no supervisor.
+        is_minimal: True if it is known that each of them is needed.
+        sufficing: Constraints of the conflict each of which, removed alone, leaves a supervisor; None if that is not
+            known.
+        removal: Constraints that, removed together, leave a supervisor, and of which none can stay; None if that is
+            not known.
     """
 
     conflict: tuple[int, ...]
@@ -64,9 +65,9 @@ def find_blame(
 
     Args:
         problems: The problem.
-        constraints: Constraints that it could be without; those to be blamed rather than others first.
+        constraints: Constraints that can be left out; those that are preferred for blame come first.
         false: The predicate that is true nowhere.
-        monitor: Monitor that bounds the work; beyond its limit what has been found so far is reported.
+        monitor: Monitor that bounds the work; at its limit the result so far is returned.
 
     Raises:
         SynthesisCancelled: The work is to end.
@@ -88,16 +89,16 @@ def find_blame(
 
 
 def _to_keep(constraints: Sequence[RelaxableConstraint], conflict: Sequence[int]) -> tuple[int, ...]:
-    """Return the order in which constraints stay.
+    """Return the order in which constraints are kept.
 
-    What the robot is comes before what is asked of it; of this, what is not blamed comes first.
+    Constraints that describe the robot come before requirements on it; of these, those that are not blamed come first.
     """
     blamed = set(conflict)
     return tuple(sorted(range(len(constraints)), key=lambda item: (constraints[item].kind in _ASKED, item in blamed)))
 
 
 class _Search:
-    """Remembers what was asked, and the smallest set that was found to leave no supervisor."""
+    """Search that remembers its results, and the smallest set found so far that leaves no supervisor."""
 
     def __init__(
         self, problems: Problems, constraints: Sequence[RelaxableConstraint], false: Any, monitor: BoundedMonitor
@@ -135,7 +136,7 @@ def explain_empty(
     """Explain why a model, or automata, have no supervisor.
 
     Args:
-        words: The automata, for which synthesis has found no supervisor, with the words for them.
+        words: The automata, which have no supervisor, with the words for them.
         engine: Name of the engine for decision diagrams, or more about it.
         should_stop: Function called before each step; once true, the work ends.
         on_progress: Function called with the progress of the work.
@@ -156,12 +157,12 @@ def explain_problem(place: Workspace, monitor: BoundedMonitor, problems: Problem
     if fixed_point.initial == false:
         return EmptyExplanation(_NOWHERE, (), is_minimal=True, removal=(), is_of_automata=words.is_of_automata)
     fixed_point.solution(problem, false)
-    # What one synthesis takes, encoding and all, tells how large the problem is.
+    # The steps of one synthesis, encoding included, measure the size of the problem.
     monitor.limit = max(LEAST_EFFORT, EFFORT * monitor.steps)
     with place.reordering():
         blame = find_blame(problems, constraints, false, monitor)
     monitor.limit = None
-    # The trouble is that of what is blamed alone: so both tell one story.
+    # The counterexample is computed under the blamed constraints alone, so that it fits the blame.
     blamed = set(blame.conflict)
     dropped = (item for place, item in enumerate(constraints) if place not in blamed)
     analysis = Analysis(encoding, monitor, problems, constraints, false, dropped)

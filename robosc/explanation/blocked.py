@@ -1,13 +1,12 @@
-"""Requests that a supervisor lets through in the state that a robot is in, and the reasons why not the others.
+"""Requests that a supervisor allows in the current state of a robot, and the reasons why the others are blocked.
 
-A request is not enabled where its service or action is not idle, where a behaviour that mentions it has no transition
-on it, where an update would take a variable out of its range, where a requirement does not hold, and where synthesis
-forbids it (semantics part 1). Each of these is a sentence here, so that a request has one if and only if it is not
-enabled. What synthesis adds means nothing where the rest blocks a request already, and is reported only where it does
-not.
+A request is not enabled in five cases (semantics part 1): its service or action is not idle; a behaviour that mentions
+it has no transition on it; an update would take a variable out of its range; a requirement does not hold; or synthesis
+forbids it. Each case gives one sentence, so a request has a sentence if and only if it is not enabled. The condition
+that synthesis adds has no meaning if another case blocks the request, and is reported only if none does.
 
-The state comes from elsewhere - a bridge, a topic, a log file - and is untrusted: numbers and texts are taken for
-what the model's types say, and all that fits none is an error. Locations of services and actions may be unknown.
+The state comes from a bridge, a topic or a log file, and is untrusted: numbers and texts are converted to the model's
+types, and a value that does not fit is an error. Locations of services and actions may be unknown.
 """
 
 import re
@@ -45,17 +44,17 @@ from robosc.model.structure import (
 from robosc.supervisor import AddedCondition, DecisionDiagram
 
 MAXIMUM_REASONS = 8
-"""Sentences for one request."""
+"""Maximum number of sentences about one request."""
 
 MAXIMUM_DIGITS = 400
-"""Characters of a number that comes as a text."""
+"""Maximum number of characters of a number that is given as a text."""
 
 _INTEGER = re.compile(r"-?[0-9]{1,18}", re.ASCII)
 _TRUTHS = {"true": True, "false": False}
 
 
 class StateError(RoboscError, ValueError):
-    """A state that the model cannot be in; one sentence."""
+    """A state that the model cannot be in; the message is one sentence."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,12 +72,12 @@ class Blocked:
 
 @dataclass(frozen=True, slots=True)
 class RequestAvailability:
-    """The requests of a model in one state, each in one of these, in the model's order.
+    """The requests of a model in one state, divided into three groups, each in the model's order.
 
     Attributes:
         enabled: Requests that may be made.
         blocked: Requests that may not be made.
-        unknown: Requests that cannot be decided, since the location of a service or action is not known.
+        unknown: Requests that cannot be decided, because the location of a service or action is not known.
     """
 
     enabled: tuple[str, ...]
@@ -98,7 +97,7 @@ _NO_DATA: Mapping[Any, Any] = _NoData()
 
 @dataclass(frozen=True, slots=True)
 class _Condition:
-    """An expression, taken apart once."""
+    """A compiled expression."""
 
     function: Function
     text: str
@@ -138,7 +137,7 @@ class _Need:
 
 @dataclass(frozen=True, slots=True)
 class _Rule:
-    """All that may block a request."""
+    """All conditions that may block a request."""
 
     event: str
     moves: Moves | None
@@ -148,7 +147,7 @@ class _Rule:
 
 
 class Requests:
-    """Requests of one supervisor: those that may be made in a state, and why others may not.
+    """Requests of one supervisor: those that are allowed in a state, and why the others are not.
 
     Args:
         system: Executable system that it supervises.
@@ -182,12 +181,12 @@ class Requests:
         return tuple(rule.event for rule in self._rules)
 
     def availability(self, components: Mapping[str, Any], communications: Mapping[str, str]) -> RequestAvailability:
-        """Return the requests that may be made in a state, and the reasons why the rest may not.
+        """Return the requests that are allowed in a state, and the reasons why the others are not.
 
         Args:
             components: State and variables of every component with a behaviour, `{name: {"state": s, "variables": {v:
                 value}}}`; values as the model has them, as JSON has them, or as texts.
-            communications: Location of services and actions, by name; those that are missing are unknown.
+            communications: Location of services and actions, by name; missing ones are unknown.
 
         Raises:
             StateError: The model has no such state.
@@ -279,7 +278,7 @@ class Requests:
                 continue
             part = components.get(name)
             if not isinstance(part, Mapping):
-                raise StateError(f"nothing is told about component '{name}'")
+                raise StateError(f"the state of component '{name}' is missing")
             found.append(self._value(subject, part))
         return tuple(found)
 
@@ -300,7 +299,7 @@ class Requests:
         raw = variables.get(subject.variable) if isinstance(variables, Mapping) else None
         value = read_value(type_, raw)
         if value is None:
-            raise StateError(f"{subject} is not told as a value of {type_text(type_)}")
+            raise StateError(f"the value of {subject} is missing or is no {type_text(type_)}")
         return value
 
     # Why
@@ -349,7 +348,7 @@ class Requests:
         return f"{name} is {cut(value_text(value))}"
 
     def _decided(self, decision: Decision, state: State) -> tuple[bool | None, list[str]]:
-        """Return whether a diagram is true, None where it looks at what is not known, and what it looked at."""
+        """Return whether a diagram is true (None if it reads an unknown value), and the places that it reads."""
         order = tuple(self._places)
         number, words = decision.root, list[str]()
         while number > 1:
@@ -363,7 +362,7 @@ class Requests:
 
 
 def read_value(type_: Type, raw: Any) -> Value | None:
-    """A value of a type, out of JSON (whose numbers may all be doubles) or a text; None: it is none."""
+    """A value of a type, from JSON (whose numbers may all be doubles) or a text; None if it is no such value."""
     match type_:
         case BooleanType():
             return raw if isinstance(raw, bool) else _TRUTHS.get(raw) if isinstance(raw, str) else None

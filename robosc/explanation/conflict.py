@@ -1,24 +1,24 @@
-"""Minimal sets: which of many things together make a problem empty, and which would have to go.
+"""Minimal sets of constraints: a conflict, which makes a problem empty, and a removal, which repairs it.
 
-Sources: U. Junker, "QuickXplain: preferred explanations and relaxations for over-constrained problems", AAAI 2004, pp.
-167-172 (a minimal conflict by halves: for k of n things some 2k log(n/k) + 2k questions); the things that have to go
-are what a maximal relaxation, grown by halves too, leaves out.
+Source: U. Junker, "QuickXplain: preferred explanations and relaxations for over-constrained problems", AAAI 2004, pp.
+167-172 (a minimal conflict by halves: for k of n constraints some 2k log(n/k) + 2k checks). A minimal removal is the
+complement of a maximal relaxation, which is also built by halves.
 
-What is asked must be monotone: with more things an empty problem stays empty.
+Emptiness must be monotone: a problem that is empty stays empty with more constraints.
 """
 
 from collections.abc import Callable, Sequence
 
 IsEmpty = Callable[[frozenset[int]], bool]
-"""Function that returns True if the problem with these things alone is empty."""
+"""Function that returns True if the problem with only these constraints is empty."""
 
 
 def minimal_conflict(things: Sequence[int], is_empty: IsEmpty) -> tuple[int, ...]:
-    """Things that make a problem empty, none of which can be missing; nothing where it is empty without any.
+    """A minimal set of constraints that makes a problem empty; no constraints if it is empty without any.
 
     Args:
-        things: All things, which together make it empty; of several such sets, one of early things is found.
-        is_empty: The question.
+        things: All constraints, which together make the problem empty; earlier ones are preferred for the result.
+        is_empty: Function that decides whether a problem is empty.
     """
     if is_empty(frozenset()):
         return ()
@@ -28,9 +28,9 @@ def minimal_conflict(things: Sequence[int], is_empty: IsEmpty) -> tuple[int, ...
 def _conflict(
     is_empty: IsEmpty, background: frozenset[int], added: Sequence[int], candidates: tuple[int, ...]
 ) -> tuple[int, ...]:
-    """Return those of `candidates` that make the problem empty.
+    """Return the candidates that make the problem empty, together with the background.
 
-    They do so beside the background to which `added` came last.
+    `added` are the constraints that were added last to the background.
     """
     if added and is_empty(background):
         return ()
@@ -44,18 +44,18 @@ def _conflict(
 
 
 def minimal_removal(things: Sequence[int], is_empty: IsEmpty) -> tuple[int, ...]:
-    """Things without which the problem of all others is not empty, none of which can stay.
+    """A minimal set of constraints to remove, so that the problem with all others is not empty.
 
     Args:
-        things: All things; the earlier ones rather stay than the later ones.
-        is_empty: The question; false of nothing at all.
+        things: All constraints; earlier ones are preferred to stay.
+        is_empty: Function that decides whether a problem is empty; false without any constraint.
     """
     kept = _grown(is_empty, frozenset(), tuple(things))
     return tuple(item for item in things if item not in kept)
 
 
 def _grown(is_empty: IsEmpty, kept: frozenset[int], more: tuple[int, ...]) -> frozenset[int]:
-    """Return the things that can stay: those kept already, and those of `more` that can stay beside them."""
+    """Return the constraints that can stay: those that are kept already, and the ones of `more` that fit them."""
     together = kept.union(more)
     if not more or not is_empty(together):
         return together

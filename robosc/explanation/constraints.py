@@ -1,11 +1,10 @@
-"""Constraints that a synthesis problem could be without (requirements, ranges, markings), and the problem left.
+"""Constraints that a synthesis problem can be relaxed by (requirements, ranges, markings), and the relaxed problem.
 
-Leaving a constraint out never takes anything from a supervisor: where one keeps the system safe and nonblocking, it
-still does. A condition or an invariant less forbids less, and a location more that is marked is one more to get to.
-A range counts as left out when an update beyond it stops at its end, as `clamp` does: in a state from which the
-variable is not led out of its range nothing changes, and the others become safe. So emptiness is monotone, which is
-all that finding a minimal set needs (see `conflict`), and without any constraint every system that can begin has a
-supervisor.
+A supervisor stays a supervisor if a constraint is left out: the system under it stays safe and nonblocking. Without a
+condition or an invariant, less is forbidden, and with one more marked location, there is one more location to reach. A
+range is left out by updates that stop at its end, as `clamp` does: states from which the variable does not leave its
+range are unchanged, and the other states become safe. So emptiness is monotone, as the search for a minimal set needs
+(see `conflict`), and without any constraint every system with an initial state has a supervisor.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
@@ -19,31 +18,31 @@ from robosc.synthesis.questions import Restriction
 
 
 class ConstraintKind(StrEnum):
-    """Kind of constraint; in this order the earlier are blamed rather than the later."""
+    """Kind of constraint; earlier kinds are preferred for blame."""
 
     REQUIREMENT = "requirement"
-    """On events."""
+    """Requirement on events."""
     INVARIANT = "invariant"
     """Condition that must be true in every state."""
     CONDITION = "condition"
-    """An event condition that no single requirement brings, such as the one on cancel."""
+    """An event condition that comes from no single requirement, such as the one on cancel."""
     RANGE = "range"
     """Range of a variable."""
     MARKING = "marking"
-    """Need of an automaton to get back to its marked locations, or of the system to where its marker holds."""
+    """Marking: an automaton must reach its marked locations again, or the system a state in which its marker holds."""
 
 
 @dataclass(frozen=True, slots=True)
 class RelaxableConstraint:
-    """A part that a problem could be without.
+    """A part that can be left out of a problem.
 
     Attributes:
         kind: Kind of constraint.
         conditions: Places in `System.conditions`.
         invariants: Places in `System.invariants`.
-        range: The variable whose range it is.
-        marking: The automaton whose marking it is.
-        is_marker: True if it is the condition that all marked states have in common (`System.marker`).
+        range: The variable of the range.
+        marking: The automaton of the marking.
+        is_marker: True if the part is the condition that all marked states have in common (`System.marker`).
     """
 
     kind: ConstraintKind
@@ -55,7 +54,7 @@ class RelaxableConstraint:
 
 
 def relaxable_constraints(system: System, restrictions: Sequence[Restriction] = ()) -> tuple[RelaxableConstraint, ...]:
-    """Every constraint of a system, the earlier ones to be blamed rather than the later ones.
+    """Every constraint of a system; earlier ones are preferred for blame.
 
     Args:
         system: The system.
@@ -94,7 +93,7 @@ def relaxable_constraints(system: System, restrictions: Sequence[Restriction] = 
 
 
 def _ranged(system: System) -> Iterator[Subject]:
-    """The integer variables that get more than constants."""
+    """The integer variables that are assigned other values than constants."""
     for automaton in system.automata:
         computed = {
             update.variable
@@ -108,7 +107,7 @@ def _ranged(system: System) -> Iterator[Subject]:
 
 
 def without(system: System, constraints: Iterable[RelaxableConstraint]) -> System:
-    """The system that is left without some constraints."""
+    """The system without some constraints."""
     dropped = tuple(constraints)
     conditions = {place for item in dropped for place in item.conditions}
     invariants = {place for item in dropped for place in item.invariants}

@@ -1,9 +1,9 @@
 """Reasons why an event of automata cannot happen in a state, one sentence for each cause.
 
-They follow the definition of the controlled system (`robosc.automata.controlled`): a plant has no edge whose guard is
-true, a requirement automaton has none, a condition on the event does not hold, an update would leave a variable's
-range, every step is against a plant invariant, or the supervisor forbids it. The last is reported if nothing else is:
-what it adds means nothing elsewhere.
+The reasons follow the definition of the controlled system (`robosc.automata.controlled`): a plant or a requirement
+automaton has no edge whose guard is true, a condition on the event does not hold, an update would leave a variable's
+range, every step violates a plant invariant, or the supervisor forbids the event. The last reason is reported only if
+there is no other one: elsewhere the supervisor's condition has no meaning.
 """
 
 from collections.abc import Iterable, Iterator
@@ -38,7 +38,7 @@ class Disabled:
         self._free = Semantics(replace(system, plant_invariants=()))
 
     def reasons(self, state: State, event: str) -> tuple[str, ...]:
-        """Return the reasons why an event cannot happen in a state, which it cannot; at least one.
+        """Return the reasons, at least one, why an event that cannot happen in a state cannot happen.
 
         Raises:
             KeyError: There is no such event.
@@ -70,7 +70,7 @@ class Disabled:
         return tuple(found[:MAXIMUM_NAMES])
 
     def _without_edge(self, automaton: Automaton, state: State, event: str) -> Iterator[str]:
-        """Yield why an automaton has no edge to take."""
+        """Yield the reason why an automaton has no edge to take."""
         name = automaton.name if automaton.role is Role.PLANT else f"requirement {automaton.name}"
         edges = [edge for edge in automaton.edges if edge.event == event]
         here = self._from(edges, automaton, state)
@@ -109,7 +109,7 @@ class Disabled:
                                 yield f"it could take {subject}, which is {now}, out of its range {low}..{high}"
 
     def _against_invariants(self, state: State, event: str) -> Iterator[str]:
-        """Yield the plant invariants that its steps would break, if each of them breaks one."""
+        """Yield the plant invariants that the steps of an event would violate, if each step violates one."""
         invariants = self._system.plant_invariants
         targets = self._free.targets(state, event) if invariants else ()
         broken = [[item for item in invariants if not self._holds(item, target)] for target in targets]
@@ -125,7 +125,7 @@ class Disabled:
         return all(value is None or low <= value <= high for value in found)  # type: ignore[operator]  # a number
 
     def _decided(self, state: State, event: str) -> str:
-        """The values at which the supervisor looks, in brackets."""
+        """The values that the supervisor's condition reads, in brackets."""
         condition = self._added.get(event)
         if not isinstance(condition, Decision):
             return ""

@@ -1,6 +1,6 @@
-"""Effect of synthesis on a model: what restricts each event, why one cannot happen in a state, and warnings.
+"""Effect of synthesis on a model: restrictions of events, reasons why an event cannot happen in a state, warnings.
 
-Everything is found on predicates over the states of the controlled system; each answer comes with a shortest run.
+Everything is computed on predicates over the states of the controlled system; each answer comes with a shortest run.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -31,7 +31,7 @@ from robosc.synthesis.ways import WayNotFoundError
 from robosc.synthesis.workspace import workspace
 
 MAXIMUM_STATES = 5
-"""States of one kind that warnings show: all of them could be too many to read."""
+"""Maximum number of states of one kind that warnings show: all of them could be too many to read."""
 
 
 def explain_synthesis(
@@ -49,14 +49,14 @@ def explain_synthesis(
     Args:
         words: The automata, with the words for them.
         engine: Name of the engine for decision diagrams, or more about it.
-        event: The event to explain; none: all of them, and warnings.
+        event: The event to explain; empty: all events, and warnings.
         state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
         after: Run after which to explain what can happen, such as `open, jam.response`.
         should_stop: Function called before each step; once true, the work ends.
         on_progress: Function called with the progress of the work.
 
     Raises:
-        RequestError: Something that is asked about is not there: an event, a part of the model, a state, a run.
+        RequestError: The event, the part of the model, the state or the run does not exist.
         SynthesisCancelled: `should_stop` became true.
         NodeLimitError: Diagrams became larger than the engine's options allow.
         UnknownEngineError: There is no such engine.
@@ -131,7 +131,7 @@ class _Explainer:
         return run
 
     def _stopped(self, goal: Any) -> tuple[Stopped | None, str]:
-        """Return a way of the plants to a goal and where it is stopped, or what is to be reported instead of one."""
+        """Return a way of the plants to a goal and where it is stopped, or a sentence if there is none to report."""
         try:
             detour = self._analysis.detour(self._initial, goal, self._analysis.good, self._reachable, self._runs)
         except WayNotFoundError:
@@ -141,7 +141,7 @@ class _Explainer:
     # Events
 
     def event(self, event: str, *, has_behaviours: bool = False) -> EventReport:
-        """Report what restricts an event, with behaviours or only what restricts it beside them."""
+        """Report what restricts an event, with or without restrictions by behaviours."""
         possible, wanted = self._possible[event], self._reachable & self._analysis.wanted(event)
         found = [
             item
@@ -165,7 +165,7 @@ class _Explainer:
         )
 
     def _decisive(self, event: str, found: list[BlockingCause], wanted: Any) -> list[BlockingCause]:
-        """Return the causes needed to keep an event from ever happening; behaviours where they alone do it."""
+        """Return the causes that together block an event everywhere; only behaviours, if they are enough."""
         candidates = [item for item in found if item.kind is not BlockingCauseKind.BEHAVIOUR]
         if wanted == self._false:
             candidates = found or list(self._analysis.blocking_causes(event, self._reachable))
@@ -206,7 +206,7 @@ class _Explainer:
         return states
 
     def fitting(self, states: Any, condition: Any, text: str) -> Any:
-        """Those of some states where a condition is true.
+        """The states, out of given ones, where a condition is true.
 
         Raises:
             RequestError: There is none.
@@ -228,12 +228,12 @@ class _Explainer:
         raise RequestError(problem)
 
     def state(self, states: Any, event: str | None, after: tuple[str, ...] | None = None) -> StateReport:
-        """Report what can happen in one of some states; where an event is asked for, rather where it cannot.
+        """Report what can happen in one of some states; if an event is given, preferably where it cannot happen.
 
         Args:
             states: The states.
             event: The event, or None for all.
-            after: The run that led there, if one was asked for; else a shortest one is reported.
+            after: The run that led there, if one was given; else a shortest one is reported.
         """
         chosen = states
         if event is not None and states & ~self._possible[event] != self._false:
@@ -263,7 +263,7 @@ class _Explainer:
     # Warnings
 
     def unreachable_states(self) -> Iterator[Remark]:
-        """Locations that the controlled system never gets to."""
+        """Locations that the controlled system never reaches."""
         for automaton, location, place in self._words.locations():
             self._monitor.check_stop()
             goal = self._encoding.in_location(automaton, location)
@@ -281,7 +281,7 @@ class _Explainer:
             )
 
     def left_to_the_environment(self) -> Iterator[Remark]:
-        """States from which no event that is a controller's own can move on, by the locations of automata."""
+        """States in which no own event of the controller changes the state, grouped by the locations of automata."""
         controllable, uncontrollable = (
             self._encoding.any_of(
                 self._possible[event.name] & self._moving(event.name)
@@ -295,7 +295,7 @@ class _Explainer:
         yield from self._remarks("deadlock", waiting & ~uncontrollable, "nothing at all can happen")
 
     def _moving(self, event: str) -> Any:
-        """Return the states where an event counts as a step: a silent one that changes nothing is never taken."""
+        """Return the states where an event counts as a step: a silent step that changes nothing is never taken."""
         if self._words.terms.is_silent(event):
             return self._analysis.moving(event)
         return self._encoding.manager.true
@@ -313,7 +313,7 @@ class _Explainer:
             left = left & ~self._locations(run.states[-1])
 
     def _locations(self, state: Any) -> Any:
-        """The states in which every automaton is where it is in this one."""
+        """The states with the same locations as this one."""
         values = zip(subjects(self._system), state, strict=True)
         return self._encoding.all_of(
             self._encoding.in_location(subject.automaton, value)

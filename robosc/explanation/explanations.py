@@ -36,10 +36,9 @@ class EmptyExplanation:
 
     Attributes:
         trouble: A run into trouble.
-        blamed: Parts of the model that, without any other requirement, range or marking, leave no supervisor.
+        blamed: Parts of the model that alone, without any other requirement, range or marking, leave no supervisor.
         is_minimal: True if it is known that each of them is needed for that.
-        removal: The fewest parts, in the sense that none of them can stay, without which there is a supervisor; empty
-            where that was not found out, or there are very many.
+        removal: A minimal set of parts without which there is a supervisor; empty if it is not known, or very large.
         left_out: Number of blamed parts that are not listed.
         is_of_automata: True if it is about automata that are no model's: their plants are no behaviours.
     """
@@ -66,10 +65,10 @@ class Explanation:
     """Explanation of what synthesis did to a model.
 
     Attributes:
-        empty: Explanation why there is no supervisor, or None where there is one.
-        events: The events asked for; where none was, every controllable event. Empty where a state was asked for.
-        state: Report on what can happen in the state asked for.
-        remarks: Warnings, where neither an event nor a state was asked for.
+        empty: Explanation why there is no supervisor, or None if there is one.
+        events: Reports on the requested event, or on every controllable event; empty if a state was requested.
+        state: Report on what can happen in the requested state.
+        remarks: Warnings, if neither an event nor a state was requested.
         is_of_automata: True if it is about automata that are no model's: their plants are no behaviours.
     """
 
@@ -100,12 +99,12 @@ def document(explanation: Explanation | EmptyExplanation) -> dict[str, Any]:
 
 
 def to_text(explanation: Explanation | EmptyExplanation) -> str:
-    """An explanation as one JSON text, which `whole_from_text` reads, or `from_text` where it is of no supervisor."""
+    """An explanation as one JSON text, for `whole_from_text`, or for `from_text` if there is no supervisor."""
     return msgspec.json.encode(explanation).decode()
 
 
 def from_text(text: str) -> EmptyExplanation:
-    """The explanation that a text holds, validated.
+    """The explanation, why there is no supervisor, from a text; it is validated.
 
     Raises:
         ValueError: It holds none.
@@ -114,7 +113,7 @@ def from_text(text: str) -> EmptyExplanation:
 
 
 def whole_from_text(text: str) -> Explanation:
-    """The explanation of what synthesis did that a text holds, validated.
+    """The explanation of what synthesis did, from a text; it is validated.
 
     Raises:
         ValueError: It holds none.

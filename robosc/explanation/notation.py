@@ -22,7 +22,7 @@ def value_text(value: Value) -> str:
 
 
 def events_text(events: Sequence[str]) -> str:
-    """Events of a run, cut where it is long."""
+    """Events of a run, shortened if it is long."""
     shown = ", ".join(events[:MAXIMUM_EVENTS])
     return shown + (f", ... ({len(events)} in all)" if len(events) > MAXIMUM_EVENTS else "")
 
@@ -43,12 +43,12 @@ def requirement_text(item: Requirement, components: Collection[str]) -> str:
 
 
 def cut(text: str) -> str:
-    """A text of the model, cut where it is long."""
+    """A text of the model, shortened if it is long."""
     return text if len(text) <= MAXIMUM_TEXT else text[: MAXIMUM_TEXT - 4] + " ..."
 
 
 def listed(names: Sequence[str]) -> str:
-    """Names joined by `or`, at least one; of very many the first."""
+    """Names joined by `or`, at least one; only the first ones if there are very many."""
     shown = names[:MAXIMUM_NAMES]
     more = "" if len(names) <= MAXIMUM_NAMES else f" or {len(names) - MAXIMUM_NAMES} more"
     return (
@@ -57,6 +57,6 @@ def listed(names: Sequence[str]) -> str:
 
 
 def bracketed(words: Sequence[str]) -> str:
-    """Values that were looked at, in brackets with a blank before; empty where there are none."""
+    """Values that were read, in brackets after a blank; empty if there are none."""
     shown = ", ".join(words[:MAXIMUM_NAMES]) + (", ..." if len(words) > MAXIMUM_NAMES else "")
     return f" ({shown})" if shown else ""

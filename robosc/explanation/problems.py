@@ -1,7 +1,7 @@
-"""The problems that are left of one problem without some of its constraints, over one set of Boolean variables.
+"""Variants of a problem without some of its constraints, over one set of Boolean variables.
 
-What an event does depends on few constraints, so it is encoded once for each choice of the ranges that it could leave,
-and a condition once for all events and problems.
+The effect of an event depends on few constraints, so it is encoded once for each choice of the ranges that the event
+could leave. Each condition is encoded once for all events and variants.
 """
 
 from collections.abc import Iterable
@@ -42,7 +42,7 @@ class Problems:
             self._on_event.setdefault(item.event, []).append(place)
 
     def without(self, dropped: Iterable[RelaxableConstraint]) -> tuple[FixedPoint, Problem]:
-        """The problem without some constraints, and what solves it.
+        """The problem without some constraints, and its solver.
 
         Raises:
             SynthesisCancelled: The work is to end.

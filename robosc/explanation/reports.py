@@ -1,4 +1,4 @@
-"""From answers about automata to explanations in the model's words."""
+"""Conversion of answers about automata to explanations in the model's words."""
 
 from typing import Any
 
@@ -11,7 +11,7 @@ from robosc.explanation.terms import Terms
 from robosc.synthesis.runs import SystemRun
 
 MAXIMUM_REASONS = 20
-"""Reasons, and parts that are broken, that are reported about one state: thousands would say nothing more."""
+"""Maximum number of reasons, and of violated parts, that are reported about one state: more would not help a reader."""
 
 
 _MARKER = RelaxableConstraint(ConstraintKind.MARKING, is_marker=True)

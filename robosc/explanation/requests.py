@@ -1,4 +1,4 @@
-"""Subjects that a user asks about, by the names of a model or of automata: an event, a state, a run."""
+"""Subjects of a user's question, by the names of a model or of automata: an event, a state, a run."""
 
 import re
 from abc import ABC, abstractmethod
@@ -31,7 +31,7 @@ MAXIMUM_NAMES = 8
 """Names that an error lists."""
 
 MAXIMUM_SHOWN = 100
-"""Characters of what was asked that an error repeats."""
+"""Maximum number of characters of a question that an error repeats."""
 
 _ATOM = re.compile(
     r"(?P<not>!\s*|not\s+)?(?:(?P<kind>service|action)\s+)?(?P<owner>\w+)\.(?P<name>\w+)(?:\s*(?P<operator>!=|<=|>=|=|<|>)\s*(?P<value>-?\w+))?"
@@ -45,11 +45,11 @@ _OPERATORS: dict[str, BinaryOperator] = {"=": "=", "!=": "!=", "<": "<", "<=": "
 
 
 class RequestError(RoboscError, LookupError):
-    """Error for a request about something that is not there."""
+    """Error about a question that names something that does not exist."""
 
 
 class Requests(ABC):
-    """Reader of what is asked about one system.
+    """Reader of questions about one system.
 
     Args:
         system: The automata.
@@ -118,7 +118,7 @@ class Requests(ABC):
 
 
 class ModelQuestionReader(Requests):
-    """Reader of what is asked about a model's automata.
+    """Reader of questions about a model's automata.
 
     Args:
         system: The automata.
@@ -130,7 +130,7 @@ class ModelQuestionReader(Requests):
         self._model = model
 
     def event(self, text: str) -> str:
-        """The event that a name stands for: an event, or a communication's request (or what comes from it).
+        """The event of a name: an event itself, or the request (or else the response) of a communication.
 
         Raises:
             RequestError: There is none.
@@ -147,7 +147,7 @@ class ModelQuestionReader(Requests):
     def _atom(self, text: str) -> Expression:
         """The condition on one place of a state.
 
-        Of a service or action that is called like a component, `service calibrate.waiting` is the location.
+        If a component has the name of a service or action, `service calibrate.waiting` is the service's location.
         """
         found = _ATOM.fullmatch(text.replace("^", ""))
         if found is None:
@@ -155,7 +155,7 @@ class ModelQuestionReader(Requests):
         owner, name = found["owner"], found["name"]
         plants = {item.name: communication_plant_name(item) for item in self._model.communications}
         if found["kind"]:
-            # The word tells a service or action from a component of the same name.
+            # The word distinguishes a service or action from a component of the same name.
             automaton = f"{found['kind']} {owner}"
             plants = {name: plant for name, plant in plants.items() if plant.startswith(f"{found['kind']} ")}
             if automaton not in plants.values():
@@ -179,7 +179,7 @@ class ModelQuestionReader(Requests):
 
 
 class SystemQuestionReader(Requests):
-    """Reader of what is asked about automata, whose names may be anything."""
+    """Reader of questions about automata, whose names may be any text."""
 
     def event(self, text: str) -> str:
         """The event of a name.
@@ -237,7 +237,7 @@ def _unknown(what: str, name: str, known: list[str]) -> RequestError:
 
 
 def _hint(name: str, known: list[str]) -> str:
-    """Return a hint at what may have been meant."""
+    """Return a hint at the name that may have been meant."""
     near = did_you_mean(name, known)
     if near is not None:
         return f"; did you mean '{near}'?"

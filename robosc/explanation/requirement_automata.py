@@ -1,4 +1,4 @@
-"""Requirement automata as event conditions, so that all that is said of conditions is said of them, too."""
+"""Requirement automata as event conditions, so that explanations treat both in the same way."""
 
 from collections.abc import Iterable
 from dataclasses import replace
@@ -8,13 +8,13 @@ from robosc.expressions import FALSE, TRUE, Binary, Expression, StateTest
 
 
 def as_conditions(system: System) -> tuple[System, dict[str, tuple[int, ...]]]:
-    """Return the same system in which requirement automata only watch, and conditions forbid what they did.
+    """Return an equal system in which plants replace requirement automata, and conditions forbid the same events.
 
-    A requirement automaton forbids an event where it has no edge for it to take, which is a condition on its location
-    and on what its guards read. A plant that monitors all of its events goes where the requirement went.
+    A requirement automaton forbids an event if it has no edge for it, which is a condition on its location and on the
+    values that its guards read. A plant that monitors all of its events moves in the same way as the requirement.
 
     Returns:
-        The system, its own conditions first; and for each requirement automaton the places of its conditions.
+        The system, whose own conditions come first; and for each requirement automaton the places of its conditions.
     """
     automata: list[Automaton] = []
     conditions = list(system.conditions)
@@ -57,7 +57,7 @@ def _has_edge(automaton: Automaton, event: str) -> Expression:
 
 
 def _any_of(expressions: Iterable[Expression]) -> Expression:
-    """Return the disjunction of some expressions, as shallow as can be: there may be very many."""
+    """Return the disjunction of some expressions as a balanced tree, because there may be very many."""
     level = list(expressions)
     while len(level) > 1:
         pairs = [Binary("or", *level[place : place + 2]) for place in range(0, len(level) - 1, 2)]

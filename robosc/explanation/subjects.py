@@ -1,4 +1,4 @@
-"""Subjects of explanations: a model's automata or others, each with the words for them and what is remarkable."""
+"""Subjects of explanations: automata of a model or of another origin, with the words for them and their remarks."""
 
 from collections import defaultdict
 from collections.abc import Iterator
@@ -29,7 +29,7 @@ class Words(Protocol):
 
     @property
     def is_of_automata(self) -> bool:
-        """True if the automata are no model's."""
+        """True if the automata come from no model."""
 
     @property
     def system(self) -> System:
@@ -51,7 +51,7 @@ class Words(Protocol):
         """Warnings that follow from the answers."""
 
     def locations(self) -> Iterator[tuple[str, str, Location | None]]:
-        """Automata with their locations, of which to warn if they are never reached."""
+        """Automata with the locations that cause a warning if they are never reached."""
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class ModelWords:
 
     @property
     def is_of_automata(self) -> bool:
-        """False: the automata are a model's."""
+        """False: the automata come from a model."""
         return False
 
     @cached_property
@@ -106,7 +106,7 @@ class ModelWords:
 
 @dataclass(frozen=True)
 class SystemWords:
-    """The words of automata that are no model's.
+    """The words of automata that come from no model.
 
     Attributes:
         given: The automata.
@@ -118,7 +118,7 @@ class SystemWords:
 
     @property
     def is_of_automata(self) -> bool:
-        """True: the automata are no model's."""
+        """True: the automata come from no model."""
         return True
 
     @cached_property
@@ -132,7 +132,7 @@ class SystemWords:
 
     @cached_property
     def _restrictions(self) -> tuple[Restriction, ...]:
-        """Return what stands or falls together: what is written in one place."""
+        """Return the groups of conditions that belong together, because they are written in one place."""
         system, automata = self._conditions
         together = defaultdict[tuple[Location | int, Expression], list[int]](list)
         for place, item in enumerate(self.given.conditions):

@@ -16,8 +16,8 @@ class SystemTerms(Terms):
     """The words of automata.
 
     Args:
-        system: The automata; of requirement automata their plants and conditions (see `requirement_automata`).
-        constraints: Constraints that the problem could be without.
+        system: The automata, with plants and conditions in place of requirement automata (see `requirement_automata`).
+        constraints: Constraints that can be left out of the problem.
         requirements: Requirement automata, with the places of their conditions.
         places: Places of the parts in a file, as far as they are known.
     """
@@ -37,7 +37,7 @@ class SystemTerms(Terms):
         self._places = places
 
     def state(self, state: State) -> StateValues:
-        """A state: where each automaton is that has several locations, and the value of each variable."""
+        """A state: the location of each automaton with several locations, and the value of each variable."""
         values = dict(zip(self._subjects, state, strict=True))
         return StateValues(
             components={

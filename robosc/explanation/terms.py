@@ -1,7 +1,7 @@
 """Automata in words: states, parts with their places, and why events cannot happen.
 
-`Terms` is what is said of automata of any origin; `ModelTerms` has the words of a robot's model, and
-`system_terms.SystemTerms` those of automata that come from elsewhere.
+`Terms` has the words for automata of any origin, `ModelTerms` those for a robot's model, and `system_terms.SystemTerms`
+those for automata that come from no model.
 """
 
 from abc import ABC, abstractmethod
@@ -27,11 +27,11 @@ class Terms(ABC):
 
     Args:
         system: Its automata, all of them plants.
-        constraints: Constraints that its problem could be without.
-        whole_names: Names that keep those of automata whole in texts; see `automaton_text`.
+        constraints: Constraints that can be left out of its problem.
+        whole_names: Names because of which texts write the names of automata in full; see `automaton_text`.
 
     Attributes:
-        plants: Word for what can happen when nothing is forbidden.
+        plants: Word for the plants.
     """
 
     plants: str
@@ -48,7 +48,7 @@ class Terms(ABC):
 
     @property
     def constraints(self) -> tuple[RelaxableConstraint, ...]:
-        """The constraints that the problem could be without."""
+        """The constraints that can be left out of the problem."""
         return self._constraints
 
     # States
@@ -85,7 +85,7 @@ class Terms(ABC):
 
     @abstractmethod
     def is_own(self, event: str) -> bool:
-        """Return True if a controller takes an event of its own accord, and need not wait for it."""
+        """Return True if the controller itself takes an event, without waiting for the environment."""
 
     @abstractmethod
     def is_silent(self, event: str) -> bool:
@@ -112,17 +112,17 @@ class Terms(ABC):
     def _variable_place(self, variable: Subject) -> Location | None: ...
 
     def _marking(self, automaton: str) -> tuple[str, Location | None]:
-        """The text and the place of an automaton's need to be marked."""
+        """The text and the place of an automaton's marking."""
         marked = sorted(self._system.automaton(automaton).marked)
         shown = ", ".join(marked[:MAXIMUM_NAMES]) + (", ..." if len(marked) > MAXIMUM_NAMES else "")
         return f"that {automaton} gets to a marked state ({shown or 'none'})", self.automaton_part(automaton).location
 
     def condition_part(self, place: int) -> Part:
-        """The part that brings an event condition."""
+        """The part that an event condition comes from."""
         return self.part(self._by_condition[place])
 
     def invariant_part(self, place: int) -> Part:
-        """The part that brings an invariant."""
+        """The part that an invariant comes from."""
         return self.part(self._by_invariant[place])
 
     @abstractmethod
@@ -185,7 +185,7 @@ class ModelTerms(Terms):
         model: The model.
         places: Places of its parts.
         system: Its automata.
-        constraints: Constraints that its problem could be without; requirements and invariants in the model's order.
+        constraints: Constraints that can be left out of its problem; requirements and invariants in the model's order.
     """
 
     plants = "behaviours"
@@ -216,9 +216,9 @@ class ModelTerms(Terms):
         )
 
     def is_own(self, event: str) -> bool:
-        """Return True if the executor takes an event of its own accord.
+        """Return True if the executor itself takes an event.
 
-        An action's cancel is its own in the layer, too, where the caller may cancel as well.
+        It also takes an action's cancel itself, even in a layer, where the caller may cancel as well.
         """
         return self._system.event(event).is_controllable or event.endswith(f".{EventKind.CANCEL}")
 

@@ -1,7 +1,7 @@
 """Typed expressions over components' variables and states, and their meaning.
 
-The bottom of the pipeline: the checked model, the automata, the supervisor, the executor and the
-code generators all speak this one expression language.
+All other parts use this one expression language: the checked model, the automata, the supervisor, the executor and the
+code generators.
 """
 
 from robosc.expressions.tree import (

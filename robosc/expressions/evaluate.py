@@ -1,4 +1,4 @@
-"""The meaning of an expression in a state: the slow, obvious evaluator that everything else must agree with."""
+"""The value of an expression in a state: the slow, obvious evaluator that all other ones must agree with."""
 
 from collections.abc import Callable, Mapping
 from typing import Any, assert_never

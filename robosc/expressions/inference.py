@@ -1,7 +1,7 @@
-"""Types of resolved expressions, inferred from what they speak of.
+"""Types of resolved expressions, inferred from their variables, data and constants.
 
-The language's front end has typed the text that its expressions were made from; this is for expressions that come
-from elsewhere (a file, another front end) and may say anything.
+The front end of the language checks types in the text. This module is for expressions that come from elsewhere (a file,
+another front end), which may be wrong.
 """
 
 import math

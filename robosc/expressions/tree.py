@@ -1,9 +1,8 @@
 """Resolved expressions, shared by the checked model, the automata, the supervisor and the targets.
 
-Every name in them is already bound: a variable or state is given with the component (automaton) it
-belongs to. A condition *holds* only when it is true; it may also be unknown (language B.4). The
-operator `holds` turns unknown into false, for the one place where the semantics asks for it inside
-an expression (the cancel of an action).
+Every name in them is bound: a variable or state is given with its component (automaton). A condition *holds* only if it
+is true; it may also be unknown (language B.4). The operator `holds` turns unknown into false. The semantics needs it
+inside an expression in only one place, the cancel of an action.
 """
 
 from typing import Annotated, Literal

@@ -1,7 +1,7 @@
 """Value types of RoboSC: what a variable, a received datum or an expression can be.
 
-A type is self-contained: an `EnumType` lists its values, so that automata and code generators need
-no table of definitions beside it. Objects are known by name; their properties stand in the model.
+A type is self-contained: an `EnumType` lists its values, so that automata and code generators need no table of
+definitions. Object types are only names; the model defines their properties.
 """
 
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""Comments and blank lines between the tokens of a text, which are worth keeping."""
+"""Comments and blank lines between the tokens of a text, which the formatter keeps."""
 
 import re
 from collections.abc import Mapping

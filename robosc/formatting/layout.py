@@ -1,4 +1,4 @@
-"""Writes statements line by line: one line each if it fits, else broken where its groups say.
+"""Layout of statements: one line for each statement if it fits, else broken at its groups.
 
 A group is broken if it does not fit on the rest of its line or holds a comment that ends a line, and then at all of
 its breaks (consistent breaking: D. C. Oppen, Prettyprinting, ACM TOPLAS 2(4), 1980, 465-483). The widths of

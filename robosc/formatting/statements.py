@@ -1,7 +1,7 @@
 """The structure of a text as its layout needs it: statements, and where their lines may be broken.
 
-Tokens are named by their indices, so nothing of a text can get lost. The text has been read by the
-parser before: what does not fit the grammar is not looked for.
+Tokens are named by their indices, so no part of a text can get lost. The parser has already accepted the text, so there
+are no syntax errors.
 """
 
 from collections.abc import Callable, Mapping
@@ -86,8 +86,8 @@ def find_structure(tokens: Tokens, tree: syntax.File) -> Structure:
 
     Args:
         tokens: Its tokens.
-        tree: Its syntax tree; it tells what words alone do not: which requirements are invariants, and which words of
-            goals are names.
+        tree: Its syntax tree, which shows what tokens alone do not: which requirements are invariants, and which words
+            of goals are names.
     """
     walker = _Walker(tokens, tree)
     walker.file()

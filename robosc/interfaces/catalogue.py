@@ -1,4 +1,4 @@
-"""Interfaces as one ROS distribution has them, with the definitions that were found for a model."""
+"""Interfaces of one ROS distribution, with the definitions that were found for a model."""
 
 import re
 from collections.abc import Mapping

@@ -1,6 +1,6 @@
 """Reader of ROS interface definitions: the texts of `.msg`, `.srv` and `.action` files, of ROS 1 and of ROS 2.
 
-The format is that of genmsg (ROS 1) and of rosidl_adapter (ROS 2), which are alike but for bounds and default values.
+The formats are those of genmsg (ROS 1) and rosidl_adapter (ROS 2). They differ only in bounds and default values.
 """
 
 import re
@@ -148,7 +148,7 @@ def nested_types(parts: tuple[Part, ...]) -> frozenset[str]:
 
 
 def ros_version_of(parts: tuple[Part, ...], package: str) -> int | None:
-    """Return 1 or 2 if a definition is of that ROS alone, as far as its text tells, else None.
+    """Return 1 or 2 if the text of a definition fits only that version of ROS, else None.
 
     Args:
         parts: Parts of the definition.

@@ -1,7 +1,7 @@
-"""Interface definitions of ROS distributions that come with RoboSC: models are checked without an installed ROS.
+"""Interface definitions of ROS distributions, which come with RoboSC: models are checked without an installed ROS.
 
-A file of the folder `shipped` has one definition after the other: its name, such as `std_msgs/msg/Bool`, then its
-lines, each behind a blank. `deploy/collect_interfaces.py` writes them.
+A file of the folder `shipped` is a list of definitions. Each has its name, such as `std_msgs/msg/Bool`, and then its
+lines, each after a blank. `deploy/collect_interfaces.py` writes the files.
 """
 
 from collections.abc import Mapping

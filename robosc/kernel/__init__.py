@@ -1,7 +1,7 @@
 """The kernel: the inner loops of synthesis and of the search for formulas, in C.
 
-It is there where RoboSC was installed with a C compiler at hand, or from a wheel that was made with one. Everything it
-does has a twin in Python, which takes its place where it is not: the same results, later.
+The kernel is available if RoboSC was installed with a C compiler, or from a wheel that was built with one. Every
+function has a twin in Python, which replaces it otherwise, with the same results but more slowly.
 """
 
 import importlib

@@ -1,25 +1,25 @@
-/* Decision diagrams of CUDD: saturation, restriction and extraction, without Python in between.
+/* Decision diagrams of CUDD: saturation, restriction and extraction, without calls of Python functions in between.
  *
- * Each function here is the twin of one in robosc/synthesis, operation by operation: `closure` of saturation.py,
- * `restrict`, `without` and `told_apart` of nodes.py, `extract` of diagrams.py. CUDD is the one inside dd.cudd, found when this
- * module is connected with it, so that a diagram of dd is one of this module. Python's lock is held all the time:
- * whatever frees a predicate of the same manager waits.
+ * Each function here does the same operations as its twin in robosc/synthesis: `closure` of saturation.py, `restrict`,
+ * `without` and `separated` of nodes.py, `extract` of diagrams.py. They use the CUDD inside dd.cudd, which `connect`
+ * finds, so that diagrams of dd and of this module are the same. Python's lock is held all the time, so that no other
+ * thread frees a predicate of the same manager meanwhile.
  *
- * A node is passed as its address, 0 where there is none. Functions that return a node own one reference of it, unless
- * they say that it is borrowed; NULL is a failure, with Python's exception set or of CUDD itself.
+ * A node is passed as its address, or 0 for no node. A function that returns a node gives the caller one reference,
+ * unless its comment says that the node is borrowed. NULL is a failure of CUDD, or of Python with its exception set.
  */
 #include "kernel.h"
 
 #include <dlfcn.h>
 #include <limits.h>
 
-/* Steps between two questions of whether to go on. */
+/* Steps between two calls of `pause`, which asks whether to go on. */
 enum { PAUSE = 16 };
 
 typedef struct DdManager DdManager;
 typedef struct DdNode DdNode;
 
-/* The beginning of dd.cudd.BDD as Cython lays it out; the size of the whole is checked where this is connected. */
+/* The first fields of dd.cudd.BDD, as Cython lays them out; Python checks the size of the whole before it connects. */
 typedef struct {
     PyObject_HEAD
     void *methods;
@@ -100,7 +100,7 @@ static int level_of(DdManager *manager, DdNode *f) {
     return node == cudd.one(manager) ? INT_MAX : cudd.level(manager, (int)cudd.index(node));
 }
 
-/* The cofactors of a predicate by the variable of a level, borrowed. None of its own variables stands above it. */
+/* The cofactors of a predicate by the variable of a level, borrowed. The predicate has no variable above that level. */
 static void split(DdManager *manager, DdNode *f, int level, DdNode **low, DdNode **high) {
     DdNode *node = regular(f);
     if (level_of(manager, f) != level) {
@@ -126,7 +126,7 @@ static DdNode *joined(DdManager *manager, int level, DdNode *low, DdNode *high) 
     return found;
 }
 
-/* Tables: what was found for two nodes and a number, a node or a value; all three nodes of an entry are owned. */
+/* Tables: results, a node or a value, by two nodes and a number; an entry owns its three nodes. */
 
 typedef struct {
     DdNode *first, *second, *found;
@@ -163,7 +163,7 @@ static int make_table(Table *table, size_t size) {
     return 1;
 }
 
-/* Remember what was found, which stays its owner's, too. */
+/* Put a found node into a table; the caller keeps its own reference. */
 static int remember(Table *table, DdNode *first, DdNode *second, int number, DdNode *found) {
     if (3 * (table->count + 1) > 2 * table->size) {
         Table larger;
@@ -209,7 +209,7 @@ typedef struct {
     Py_ssize_t count;
 } Substitutions;
 
-/* What an event makes of a set of states: see image.py. What a step has not is NULL. */
+/* The image of a set of states under an event: see image.py. Parts that a step does not have are NULL. */
 typedef struct {
     DdNode *inside, *needed, *constants, *relation, *hidden, *outside, *room;
     Substitutions functions, names;
@@ -228,8 +228,8 @@ typedef struct {
     Group *groups;
     Py_ssize_t group_count, step_count;
     Table known;
-    PyObject *pause, *tell;
-    long long taken, told, asked;
+    PyObject *pause, *report;
+    long long taken, reported, asked;
 } Closure;
 
 static DdNode *composed(Closure *closure, DdNode *f, const Substitutions *substitutions) {
@@ -245,7 +245,7 @@ static DdNode *composed(Closure *closure, DdNode *f, const Substitutions *substi
     return found;
 }
 
-/* One predicate in place of another, which is dropped. */
+/* Drop one predicate and return another in its place. */
 static DdNode *instead(DdManager *manager, DdNode *old, DdNode *new) {
     drop(manager, old);
     return new;
@@ -287,26 +287,28 @@ static int answered(PyObject *answer) {
     return answer != NULL;
 }
 
-static int told_of(Closure *closure, DdNode *states) {
-    closure->told++;
-    return answered(PyObject_CallFunction(closure->tell, "LK", closure->told, (unsigned long long)(uintptr_t)states));
+/* Report progress; false if Python raised an exception. */
+static int report_round(Closure *closure, DdNode *states) {
+    unsigned long long address = (unsigned long long)(uintptr_t)states;
+    closure->reported++;
+    return answered(PyObject_CallFunction(closure->report, "LK", closure->reported, address));
 }
 
-/* Whether to go on, asked with the number of steps since it was asked last. */
+/* Call `pause` with the number of steps since its last call; false if it raised an exception. */
 static int may_go_on(Closure *closure) {
     long long steps = closure->taken - closure->asked;
     closure->asked = closure->taken;
     return answered(PyObject_CallFunction(closure->pause, "L", steps));
 }
 
-/* States and what a step adds to them of those within a predicate, led from new ones. */
+/* States, and the states within a predicate that a step reaches from the new ones. */
 static DdNode *grown(Closure *closure, DdNode *states, DdNode *within, const Step *step, DdNode *new) {
     DdManager *manager = closure->manager;
     if (closure->taken % PAUSE == 0 && !may_go_on(closure)) {
         return NULL;
     }
     closure->taken++;
-    if (closure->taken >= (closure->told + 1) * closure->step_count && !told_of(closure, states)) {
+    if (closure->taken >= (closure->reported + 1) * closure->step_count && !report_round(closure, states)) {
         return NULL;
     }
     if (new == closure->zero) {
@@ -332,7 +334,7 @@ static DdNode *grown(Closure *closure, DdNode *states, DdNode *within, const Ste
 
 static DdNode *saturated(Closure *closure, DdNode *states, DdNode *within, int number);
 
-/* A set, dropped, closed under the steps of one group and of those below it. */
+/* The closure of a set under the steps of one group and of the groups below it; the set is dropped. */
 static DdNode *closed_under(Closure *closure, DdNode *states, DdNode *within, int number, DdNode **seen) {
     DdManager *manager = closure->manager;
     const Group *group = &closure->groups[number];
@@ -416,7 +418,7 @@ static int is_done(Closure *closure, DdNode *states) {
     return closure->until != NULL && cudd.leq(closure->manager, closure->until, states);
 }
 
-/* The closure of a whole set, dropped: the topmost steps are taken in turns with all that is below. */
+/* The closure of a whole set, which is dropped: topmost steps and saturation below them take turns. */
 static DdNode *of_whole(Closure *closure, DdNode *states, DdNode *within) {
     DdManager *manager = closure->manager;
     const Group *topmost = &closure->groups[0];
@@ -439,7 +441,7 @@ static DdNode *of_whole(Closure *closure, DdNode *states, DdNode *within) {
     return states;
 }
 
-/* What Python passes */
+/* Arguments from Python */
 
 static DdManager *manager_of(PyObject *bdd) { return ((Bdd *)bdd)->manager; }
 
@@ -549,13 +551,13 @@ static void free_closure(Closure *closure) {
     free_table(closure->manager, &closure->known);
 }
 
-/* A found node for Python, with the reference that it still owns. */
+/* The address of a found node for Python, which gets its reference; without a node an exception. */
 static PyObject *passed(DdNode *found) {
     if (found != NULL) {
         return PyLong_FromUnsignedLongLong((unsigned long long)(uintptr_t)found);
     }
     if (!PyErr_Occurred()) {
-        /* As dd says it: an operation that CUDD gave up. */
+        /* dd raises the same error when CUDD gives an operation up. */
         PyErr_SetString(PyExc_ValueError, "NULL reference");
     }
     return NULL;
@@ -567,7 +569,7 @@ PyObject *diagram_closure(PyObject *module, PyObject *arguments) {
     PyObject *bdd, *groups;
     unsigned long long states, within, until;
     if (!PyArg_ParseTuple(arguments, "OKKO!KOO", &bdd, &states, &within, &PyTuple_Type, &groups, &until,
-                          &closure.pause, &closure.tell)) {
+                          &closure.pause, &closure.report)) {
         return NULL;
     }
     closure.manager = manager_of(bdd);
@@ -634,13 +636,15 @@ PyObject *diagram_restrict(PyObject *module, PyObject *arguments) {
     return passed(found);
 }
 
-/* Places without which two sets are told apart */
+/* Places that are not needed to distinguish two sets */
 
 static DdNode *without(DdManager *manager, DdNode *f, DdNode *cube) {
     return owned(cudd.and_exist(manager, f, cudd.one(manager), cube));
 }
 
-/* The product of the variables of places from one up to another, by halves: one by one would take squares of steps. */
+/* The product of the variables of the places from `first` to before `end`. It is built by halves: one by one would take
+ * a quadratic number of steps.
+ */
 static DdNode *product(DdManager *manager, DdNode **cubes, Py_ssize_t first, Py_ssize_t end) {
     if (end - first < 2) {
         return owned(end == first ? cudd.one(manager) : cubes[first]);
@@ -654,10 +658,10 @@ static DdNode *product(DdManager *manager, DdNode **cubes, Py_ssize_t first, Py_
     return found;
 }
 
-/* Leave out of two sets that share no state each place from one up to another that can go, earlier ones first. Where all
- * can go together, each can; else they are tried by halves. One set, which is replaced, is looked at without them; the
- * other one need not be: what is left of both shares a state where the whole other one shares one with what is left of
- * this one. The product of what goes is replaced, too.
+/* Leave out the places from `first` to before `end` without which two disjoint sets stay disjoint, earlier ones first.
+ * If all of them together can be left out, they are; else they are tried by halves. Only the set `left` is quantified
+ * and replaced. The other set, `whole`, stays as it is: both quantified sets share a state exactly if `whole` and the
+ * quantified `left` do. The product of the places left out is added to `gone`.
  */
 static int leave_out(DdManager *manager, DdNode *whole, DdNode **left, DdNode **gone, DdNode **cubes, Py_ssize_t first,
                      Py_ssize_t end) {
@@ -683,7 +687,7 @@ static int leave_out(DdManager *manager, DdNode *whole, DdNode **left, DdNode **
            leave_out(manager, whole, left, gone, cubes, middle, end);
 }
 
-/* The variables of places, each the product of its own, borrowed from a tuple of them. */
+/* The cubes of a tuple, one for the variables of each place, borrowed. */
 static DdNode **read_cubes(PyObject *places, Py_ssize_t *count) {
     *count = PyTuple_Size(places);
     DdNode **cubes = *count < 0 ? NULL : PyMem_Calloc((size_t)*count + 1, sizeof(DdNode *));
@@ -720,7 +724,7 @@ PyObject *diagram_without(PyObject *module, PyObject *arguments) {
     return passed(found);
 }
 
-PyObject *diagram_told_apart(PyObject *module, PyObject *arguments) {
+PyObject *diagram_separated(PyObject *module, PyObject *arguments) {
     (void)module;
     PyObject *bdd, *places;
     unsigned long long one, other;
@@ -756,11 +760,11 @@ PyObject *diagram_told_apart(PyObject *module, PyObject *arguments) {
 typedef struct {
     int *levels;
     int bits;
-    int end; /* The first place after those that its bits stand among. */
+    int end; /* The first place after its block. */
     long long size;
 } Place;
 
-/* A first index and the predicate, owned, that holds from there on. */
+/* A first index and the predicate, owned, that holds from this index on. */
 typedef struct {
     long long start;
     DdNode *function;
@@ -771,14 +775,14 @@ typedef struct {
     size_t count, room;
 } Runs;
 
-/* Reasons for which a predicate is not taken apart. */
+/* Reasons for which an extraction is refused: too many ranges of one place, or in all. */
 enum { NONE, BRANCHES, TOTAL };
 
 typedef struct {
     DdManager *manager;
     Place *places;
     int place_count;
-    int *home; /* For each level the first place that bits stand among there. */
+    int *home; /* For each level the first place of its block. */
     int level_count;
     long long branches, left;
     int refused, at;
@@ -808,7 +812,7 @@ static int append(Runs *runs, long long start, DdNode *function) {
     return 1;
 }
 
-/* The cofactors of a predicate by the variable of a level, owned; other variables may stand above it. */
+/* The cofactors of a predicate by the variable of a level, owned; the predicate may have variables above that level. */
 static int split_at(DdManager *manager, DdNode *f, int level, DdNode **low, DdNode **high) {
     if (level_of(manager, f) >= level) {
         split(manager, f, level, low, high);
@@ -822,7 +826,7 @@ static int split_at(DdManager *manager, DdNode *f, int level, DdNode **low, DdNo
     return *high != NULL;
 }
 
-/* Add the cofactor of a predicate for each index of the bits from one on, equal neighbours merged. */
+/* Add the cofactor of a predicate for each value of a place's bits from `bit` on; equal neighbours are merged. */
 static int collect(Extraction *extraction, int number, int bit, DdNode *f, long long start, Runs *runs) {
     DdManager *manager = extraction->manager;
     const Place *place = &extraction->places[number];
@@ -905,7 +909,7 @@ static int home_of(const Extraction *extraction, DdNode *f) {
     return level < extraction->level_count ? extraction->home[level] : -1;
 }
 
-/* The number of the node that tests a place, whose cofactors are more than one. */
+/* The number of the node that tests a place, by the place's cofactors. */
 static int branched(Extraction *extraction, int number, const Runs *runs) {
     const Place *place = &extraction->places[number];
     long long *starts = PyMem_Malloc(2 * runs->count * sizeof *starts), *children;
@@ -916,7 +920,7 @@ static int branched(Extraction *extraction, int number, const Runs *runs) {
         return found;
     }
     children = starts + runs->count;
-    /* Codes from the size on stand for no value: what a predicate says of them is nobody's business. */
+    /* Codes from the size on stand for no value: the predicate is ignored there. */
     for (size_t item = 0; item < runs->count && runs->items[item].start < place->size; item++) {
         DdNode *below = runs->items[item].function;
         int home = home_of(extraction, below);
@@ -959,8 +963,8 @@ static int new_number(Extraction *extraction, DdNode *f, int first) {
     return -1;
 }
 
-/* The number of a predicate: 0 false, 1 true, from 2 on nodes; it does not depend on the places of its topmost
- * variable that stand before one. -1 is a failure.
+/* The number of a predicate: 0 false, 1 true, from 2 on nodes; -1 is a failure. The predicate depends on no place of its
+ * block before `first`.
  */
 static int number_of(Extraction *extraction, DdNode *f, int first) {
     if (regular(f) == cudd.one(extraction->manager)) {

@@ -14,7 +14,7 @@ PyObject *diagram_closure(PyObject *module, PyObject *arguments);
 PyObject *diagram_restrict(PyObject *module, PyObject *arguments);
 PyObject *diagram_implies(PyObject *module, PyObject *arguments);
 PyObject *diagram_without(PyObject *module, PyObject *arguments);
-PyObject *diagram_told_apart(PyObject *module, PyObject *arguments);
+PyObject *diagram_separated(PyObject *module, PyObject *arguments);
 PyObject *diagram_extract(PyObject *module, PyObject *arguments);
 PyObject *diagram_release(PyObject *module, PyObject *arguments);
 

@@ -1,8 +1,8 @@
 /* Decision diagrams over finitely many values: the operations of conditions/multivalued.py that take most of its time.
  *
  * Each operation takes the same steps in the same order as its twin in Python, and makes the same nodes with the same
- * numbers. Steps are counted: an operation is given how many there are left, and tells how many it took; it ends once
- * these are more.
+ * numbers. Steps are counted: an operation gets the number of steps that are left, and returns the number that it took.
+ * It fails when it needs more.
  */
 #include "kernel.h"
 
@@ -40,7 +40,7 @@ typedef struct {
 
 static const uint32_t FAILED = UINT32_MAX;
 
-/* Take some steps; fails, without an exception, where there are not so many left. */
+/* Count some steps; false, without an exception, if more steps were taken than were left. */
 static int spend(Space *space, long long steps) {
     space->spent += steps;
     return space->spent <= space->left;
@@ -109,7 +109,7 @@ static int enlarge_numbers(Space *space) {
     return 1;
 }
 
-/* The node with children, which stand on top of the pool at `first` and are taken from there unless they are new. */
+/* The node with the children on top of the pool, from `first` on; they are removed from the pool unless it is new. */
 static uint32_t make(Space *space, uint32_t variable, size_t first) {
     if (!spend(space, 1)) {
         return FAILED;
@@ -317,7 +317,7 @@ static int meets(Space *space, uint32_t node) {
     return found;
 }
 
-/* Whether a node is true somewhere in the cube, remembered for the round; `count` counts what is remembered. */
+/* Whether a node is true somewhere in the cube. The result is kept for the round; `count` counts the kept results. */
 static uint32_t leads(Space *space, uint32_t node, long long *count) {
     if (node < 2) {
         return node;
@@ -410,7 +410,7 @@ static uint32_t length(Space *space, uint32_t node) {
     return least + 1;
 }
 
-/* What Python passes */
+/* Arguments from Python */
 
 static void free_space(PyObject *capsule) {
     Space *space = PyCapsule_GetPointer(capsule, NAME);
@@ -457,7 +457,7 @@ static int read_cube(Space *space, PyObject *cube) {
     return 1;
 }
 
-/* A number and the steps that it took; a number that has failed without an exception took too many. */
+/* A result and its number of steps. Without an exception, the result FAILED means too many steps. */
 static PyObject *with_steps(const Space *space, unsigned long long found) {
     return PyErr_Occurred() ? NULL : Py_BuildValue("KL", found, space->spent);
 }

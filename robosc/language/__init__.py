@@ -1,6 +1,6 @@
 """The language: text to syntax tree, and the files of a run.
 
-The names are imported on use: other languages share words with this one, and not its parser.
+The names are imported on use: front ends of other languages share some modules, but not the parser.
 """
 
 from typing import TYPE_CHECKING

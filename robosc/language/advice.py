@@ -1,6 +1,6 @@
-"""Advice on how to fix a syntax error: the word that was meant, or what a habit of another language should be here.
+"""Advice on how to fix a syntax error: the word that was meant, or how to write a construct of another language here.
 
-Whoever obeys it to the letter gets rid of the error: an editor does so (`robosc.editing.fixes`).
+Advice that is followed literally removes the error; editors apply it automatically (`robosc.editing.fixes`).
 """
 
 import difflib
@@ -312,7 +312,7 @@ _ENDS_OF_LISTS = ({"','", "'}'"}, {"an operator", "','", "'}'"})
 
 
 def _of_what_is_missing(token: str, expected: Sequence[str]) -> str:
-    """Advice where nothing tells more than what is expected."""
+    """Advice if only the expected tokens are known."""
     if token in RESERVED_WORDS and any(word in expected for word in ("a name", "an expression", "a type")):
         return f"If '{token}' is meant as a name, write '^{token}'."
     if len(set(expected)) == 1 and expected[0][0] == "'":

@@ -1,7 +1,7 @@
-"""Advice for whoever writes a control node of a behaviour tree: the same in components, states and requirements.
+"""Advice for users who write a control node of a behaviour tree: how to write it with components, states, requirements.
 
-A condition before what it is about is a requirement. An order, and another way after a failure, are the states of a
-component. What the executor does anyway needs nothing at all.
+A condition before an action becomes a requirement. An order, or another way after a failure, becomes states of a
+component. Some nodes need no replacement, because the executor already does the same.
 """
 
 from collections.abc import Iterator, Sequence
@@ -34,8 +34,8 @@ _WHY = {
     Family.REPEAT: "what is allowed is requested again anyway",
     Family.KEEP_RUNNING: "what is allowed is requested again anyway",
     Family.RUN_ONCE: "what happens once leads to a state that nothing leaves",
-    Family.TIMEOUT: "the deployment's settings 'service_timeout' and 'action_timeout' tell how long a reply may take",
-    Family.RATE: "the deployment's setting 'period' tells how often it is decided",
+    Family.TIMEOUT: "the deployment's settings 'service_timeout' and 'action_timeout' say how long a reply may take",
+    Family.RATE: "the deployment's setting 'period' says how often the executor decides",
     Family.TREE: "what is in a robot needs nothing around it",
 }
 
@@ -87,7 +87,7 @@ def why(family: Family) -> str:
 
 
 def advise(node: Node, declared: Declared, place: Place, written: str) -> str:
-    """Return the sentence that tells what a control node is in this language.
+    """Return the sentence that says what a control node is in this language.
 
     Args:
         node: The node.

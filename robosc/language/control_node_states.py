@@ -1,8 +1,8 @@
-"""States of one component that do what a control node does, for `control_node_advice`.
+"""States of one component that replace a control node, for `control_node_advice`.
 
-Each leaf is a state. Where its success and its failure lead is known from the nodes above it, as a compiler knows the
-targets of jumps from the statements around (A. V. Aho, M. S. Lam, R. Sethi, J. D. Ullman, Compilers, 2nd ed., 2006,
-sec. 6.6). Behind the whole node it begins again.
+Each leaf is a state. The nodes above it determine where its success and its failure lead, as the enclosing statements
+determine the targets of jumps in a compiler (A. V. Aho, M. S. Lam, R. Sethi, J. D. Ullman, Compilers, 2nd ed., 2006,
+sec. 6.6). After the whole node, the component begins again.
 """
 
 from collections.abc import Callable, Sequence

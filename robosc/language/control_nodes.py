@@ -1,7 +1,7 @@
-"""Control nodes of behaviour trees and SMACH in a text: which words they are, and what stands in them.
+"""Control nodes of behaviour trees and SMACH in a text: their words and their content.
 
-The language has no control nodes. People who come from there write them all the same; `control_node_advice` tells
-what their node is in this language, made of the names in it.
+The language has no control nodes, but people who know behaviour trees write them. `control_node_advice` says how to
+write such a node in this language, with the names that it uses.
 
 Sources: M. Colledanchise, P. Ogren, Behavior Trees in Robotics and AI, 2018, ch. 1; the nodes of BehaviorTree.CPP,
 py_trees and Nav2, and the containers of SMACH, by their names there.

@@ -1,10 +1,10 @@
-"""A place among the tokens of a text, and what a recursive-descent parser does there.
+"""A place among the tokens of a text, with the basic operations of a recursive-descent parser.
 
-It knows what words were expected, reports syntax errors, and goes on behind them.
+It remembers the expected words, reports syntax errors, and continues after them.
 
-After an error the parser goes on in panic mode (A. V. Aho, M. S. Lam, R. Sethi, J. D. Ullman, Compilers, 2nd ed., 2006,
-sec. 4.8): it skips to a word that can begin an item of one of the lists that are open, or to the brace that closes
-the innermost one.
+After an error the parser continues in panic mode (A. V. Aho, M. S. Lam, R. Sethi, J. D. Ullman, Compilers, 2nd ed.,
+2006, sec. 4.8): it skips to a word that can begin an item of one of the open lists, or to the brace that closes the
+innermost list.
 """
 
 import difflib
@@ -123,7 +123,7 @@ class Cursor:
         Args:
             expected: Words for what would have fitted, such as `a name` or `'{'`.
             related: Other places that explain it.
-            fix: Advice on how to fix it, where more is known than the tokens tell.
+            fix: Advice on how to fix it, if more is known than the tokens show.
         """
         index = self.place
         token = self.texts[index]
@@ -397,7 +397,7 @@ class Cursor:
         )
 
     def _reads_body(self, begin: int, opening: int) -> bool:
-        """Read the list that a broken item still has, if its first word tells what it is a list of."""
+        """Read the list that a broken item still has, if its first word says what the list contains."""
         words = difflib.get_close_matches(self.texts[begin][:MAXIMUM_NAME], self._lists[-1], n=1, cutoff=_NEAR)
         reader = self.body_of(words[0], self.texts[begin + 1]) if words else None
         if reader is None:

@@ -1,6 +1,6 @@
-"""Finds the definitions of the middleware types that a model uses: the `.msg`, `.srv` and `.action` files of ROS.
+"""Search for the definitions of the middleware types that a model uses: the `.msg`, `.srv` and `.action` files of ROS.
 
-ROS itself is not needed for that, only its files.
+It needs only the files of ROS, not ROS itself.
 """
 
 import os
@@ -21,7 +21,7 @@ _NEARBY = 3
 """Folders of a model that are searched: its own and those above it, where the packages of a workspace lie."""
 
 _GENERATED = ("idl",)
-"""Endings of definitions that are not read, but tell that a type exists."""
+"""Endings of definitions that are not read, but show that a type exists."""
 
 
 def interface_folders() -> tuple[Path, ...]:

@@ -1,4 +1,4 @@
-"""Limits on how much of a text the language takes."""
+"""Limits on the size of a text of the language."""
 
 MAXIMUM_NESTING = 200
 """Brackets in brackets, and levels of an expression, beyond which a text is refused."""

@@ -1,6 +1,6 @@
-"""The word `not` where an operand begins: an operator before what could not follow a name, else a name.
+"""The word `not` at the beginning of an operand: a name if a token that can follow a name comes next, else an operator.
 
-So a model in which something is called `not` keeps its meaning, and `^not` is always a name.
+So a model that uses `not` as a name keeps its meaning; `^not` is always a name.
 """
 
 from collections.abc import Sequence
@@ -54,9 +54,9 @@ def _is_behind_operand(texts: Sequence[str], kinds: Sequence[int], index: int) -
 
 
 def _is_conditional(texts: Sequence[str], kinds: Sequence[int], index: int) -> bool:
-    """Return True if the `if` at a token has a `then`: else it is the condition of a provide statement.
+    """Return True if the `if` at a token has a `then`; if not, it is the condition of a provide statement.
 
-    Operands and what stands behind them take turns, which tells the word `then` from a name.
+    Operands and operators alternate, which distinguishes the keyword `then` from a name.
     """
     conditions = depth = 0
     is_operand_next = True

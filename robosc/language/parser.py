@@ -1,8 +1,8 @@
-"""Text to syntax tree: a recursive-descent parser of the language's definitions, which goes on behind errors.
+"""Text to syntax tree: a recursive-descent parser of the language's definitions, which continues after errors.
 
-It is written by hand because it must do what no general parser does at once: tell errors in the language's
-words, read on behind them, keep contextual words free as names, and be fast and linear on any text. The grammar
-in `tests/support/robosc.tx`, read by textX, is its opponent in the tests.
+It is written by hand because no general parser does all of this: report errors in the words of the language, continue
+after them, allow contextual keywords as names, and take linear time on any text. Tests compare it with textX and the
+grammar `tests/support/robosc.tx`.
 """
 
 from collections.abc import Callable, Mapping
@@ -356,7 +356,7 @@ class _Parser(GoalParser):
         return syntax.Variable(name, type_, self.initial_value() if self.takes("=") else None)
 
     def _type_of_variable(self, name: str) -> str:
-        """The type that a variable without one has by the values that it is given and compared with, as far as told."""
+        """The type of a variable that declares none, from the values that it is assigned or compared with."""
         if self.texts[self.place] == "(" or self.kinds[self.place] == _NAME:
             return ""
         values = [self.place + 1] if self.texts[self.place] == "=" else []
@@ -369,7 +369,7 @@ class _Parser(GoalParser):
         return f"integer(0..{max(whole)})" if whole and types[0].isdigit() else next(iter(types), "boolean")
 
     def _type_of_value(self, index: int) -> str:
-        """The type of the value at a token: a whole number stands for itself; empty where nothing tells it."""
+        """The type of the value at a token; the digits of a whole number; empty if the type is not known."""
         texts = self.texts
         value, read = texts[index], range(min(len(texts) - 2, _MAXIMUM_READ))
         if value in ("true", "false"):

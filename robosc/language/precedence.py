@@ -1,9 +1,9 @@
-"""Builds the tree of an expression from the flat run of operands and operators that the parser reads.
+"""Tree of an expression, built from the flat sequence of operands and operators that the parser reads.
 
-One climber over A.3's table replaces a tower of grammar rules, which a recursive-descent parser would walk down for
-every literal. Binary operators associate to the left. Long chains of `and` and `or`
-become balanced trees: both are associative, and a chain of a thousand conditions must not need a thousand levels of
-recursion.
+Precedence climbing over the table of language A.3 replaces one grammar rule for each precedence, which a
+recursive-descent parser would pass through for every literal. Binary operators associate to the left. Long chains of
+`and` and `or` become balanced trees: both are associative, and a chain of a thousand conditions must not need a
+thousand levels of recursion.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""Reads one text: of the language, or of another one that is read beside it."""
+"""Reader of one text, of this language or of another one."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""The syntax tree of RoboSC: what was written, with places, before any name is bound.
+"""The syntax tree of RoboSC: the text as it was written, with places, before any name is bound.
 
 Frozen values with tuples inside. A large text has hundreds of thousands of them, so msgspec makes them, and the
 garbage collector does not look at them: trees have no cycles.

@@ -103,9 +103,9 @@ def tokenize(text: str) -> Tokens:
 
 
 def tokenize_broken(text: str) -> Tokens:
-    """Tokenize like `tokenize`; if a text in quotes is never closed, each ends with its line at last.
+    """Tokenize like `tokenize`; if a text in quotes is never closed, every such text ends at the end of its line.
 
-    One quote too many turns all behind it inside out: this way it spoils its own line alone.
+    One quote too many swaps texts and code in all that follows. Ended by line, it spoils only its own line.
     """
     tokens = tokenize(text)
     last = len(tokens.texts) - _ENDS - 1
@@ -205,7 +205,7 @@ def obstacle(file: SourceFile, tokens: Tokens, places: Places) -> Diagnostic | N
         if is_open_comment(token):
             return found("unclosed-comment", "this comment is never closed", start, "Close it with '*/'.")
         if is_open_string(token):
-            # One quote too few turns all behind it inside out: its own line tells where.
+            # A missing quote swaps texts and code in all that follows: tokens by line show where it is missing.
             for other, other_kind, begin in zip(*tokenize_broken(text), strict=True):
                 if other_kind == Kind.OTHER and is_open_string(other):
                     token, start = other, begin

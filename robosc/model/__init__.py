@@ -1,1 +1,1 @@
-"""The checked model: what a robot is once every name is bound and every type is known."""
+"""The checked model: the description of a robot with every name bound and every type known."""

@@ -361,7 +361,7 @@ class _RobotChecker:
 
 @dataclass(frozen=True, slots=True)
 class _Unknown:
-    """Reports a communication that a behaviour names and nobody has."""
+    """Report a communication that a behaviour names and that no component has."""
 
     part: Part
     robot: Unit

@@ -126,7 +126,7 @@ def with_conditions(
     scopes: RobotScopes,
     findings: Findings,
 ) -> dict[str, Communication]:
-    """The communications with the conditions (`when`) that tell those on one identifier apart."""
+    """The communications with the conditions (`when`) that distinguish messages on one identifier."""
     found = dict(communications)
     for item in trees:
         communication = found.get(item.tree.name.text)
@@ -240,6 +240,6 @@ def check_topics(
                     "shared-topic",
                     f"'{item.component}' and '{speaker.component}' both publish on '{item.identifier}'",
                     places[item.name],
-                    "Give each its own identifier: a receiver cannot tell who spoke.",
+                    "Give each its own identifier: a receiver cannot tell which component sent a message.",
                     RelatedPlace("the other one is here", places[speaker.name]),
                 )

@@ -1,4 +1,4 @@
-"""Collects what the checks find."""
+"""Collection of the findings of all checks."""
 
 import re
 from collections.abc import Collection, Iterable
@@ -59,9 +59,9 @@ class Findings:
         self._broken_words: set[str] = set()
 
     def file_is_broken(self, file: SourceFile, diagnostics: Iterable[Diagnostic]) -> None:
-        """Add what the grammar finds in a library; what only its missing parts bring about is not told.
+        """Add the syntax errors of a library, and suppress the findings that follow from them.
 
-        That is all that is found in the file beyond its grammar, and unknown names elsewhere that stand in it.
+        Suppressed are all other findings in that file, and unknown names elsewhere that occur in its text.
         """
         self.diagnostics.extend(diagnostics)
         self._broken_files.add(file.name)

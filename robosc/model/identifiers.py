@@ -1,7 +1,7 @@
 """Names that ROS accepts for a topic, service or action.
 
 Rules of ROS 2: "Topic and Service name mapping to DDS", design.ros2.org, 2018, section "ROS 2 Name Space Tokens" and
-"ROS Topic and Service Name Constraints"; names of ROS 1 are stricter nowhere that matters here.
+"ROS Topic and Service Name Constraints"; the rules of ROS 1 are not stricter in any point that matters here.
 """
 
 import re

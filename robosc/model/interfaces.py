@@ -161,7 +161,7 @@ class InterfaceChecker:
             return None
         fitting = next((outcome for outcome in outcomes.values() if not outcome.faults), None)
         if fitting is None:
-            # Told are the faults of the version that comes nearest.
+            # Faults are reported against the version that fits best.
             chosen = [outcome for (_, language), outcome in outcomes.items() if language is Language.PYTHON]
             for fault in min(chosen, key=lambda outcome: len(outcome.faults)).faults:
                 self._report_once(fault)

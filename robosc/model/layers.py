@@ -16,7 +16,7 @@ def without_controller_findings(diagnostics: Iterable[Diagnostic]) -> tuple[Diag
 
 
 def confusable(model: Model) -> tuple[tuple[Communication, Communication], ...]:
-    """Incoming messages that a layer could not tell from another one on the same identifier, each with that one."""
+    """Pairs of incoming messages on one identifier that a layer could not distinguish."""
     shared: dict[str, list[Communication]] = {}
     for item in model.communications:
         if item.kind is CommunicationKind.INCOMING_MESSAGE:
@@ -25,7 +25,7 @@ def confusable(model: Model) -> tuple[tuple[Communication, Communication], ...]:
 
 
 def layer_findings(model: Model, places: Places) -> tuple[Diagnostic, ...]:
-    """Incoming messages on one identifier that a layer could not tell apart."""
+    """Errors about incoming messages on one identifier that a layer could not distinguish."""
     return tuple(
         Diagnostic(
             Severity.ERROR,

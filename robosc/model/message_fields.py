@@ -1,7 +1,7 @@
 """Comparison of the model's types with the fields of a middleware type, as a generated node compares them at its start.
 
-`robosc.targets.ros.runtime.messages` is what Python nodes do, `robosc/targets/cpp/runtime/values.hpp` what compilers of
-C++ nodes do.
+`robosc.targets.ros.runtime.messages` has the comparison of Python nodes, and `robosc/targets/cpp/runtime/values.hpp`
+that of C++ nodes, which their compilers make.
 """
 
 from collections.abc import Iterable

@@ -40,9 +40,9 @@ class OwnRequests:
     def breaking(self, action: str, requirement: Expression) -> str | None:
         """A component in which the request of an action makes a requirement false, whatever the others do.
 
-        Judged by what a component alone tells: a requirement counts as false only if nothing else could make it true.
-        After many thousand judgements no more are made: it is a note only, and all requirements with all transitions
-        of one request are the model's square.
+        Only the component's own states and variables are read: a requirement counts as false only if no other
+        component could make it true. The number of these checks is limited, because it grows with the square of the
+        model and the finding is only a note.
         """
         if self._judgements > _MAXIMUM_JUDGEMENTS or _tests_knowledge(requirement):
             return None
@@ -57,7 +57,7 @@ class OwnRequests:
 def _distinct_states(
     requirement: Expression, component: str, behaviour: Behaviour, transition: Transition
 ) -> Iterator[str]:
-    """The states that a transition can be taken in, of those that a requirement does not tell apart only the first."""
+    """The states in which a transition can be taken; only the first of those that a requirement treats alike."""
     if transition.source is not None:
         yield transition.source
         return
@@ -77,7 +77,7 @@ def _breaks(requirement: Expression, component: str, transition: Transition, sta
 def _known_value(
     expression: Expression, component: str, state: str, variables: Mapping[str, Value | None]
 ) -> Value | None:
-    """The value of an expression as far as one component's state and variables tell; None if they do not."""
+    """The value of an expression, if one component's state and variables determine it; else None."""
     return evaluate(  # type: ignore[no-any-return]
         expression,
         lambda owner, variable: variables.get(variable) if owner == component else None,  # type: ignore[arg-type, return-value]

@@ -1,4 +1,4 @@
-"""Ranges of the integers that a condition speaks of, where it is true (interval arithmetic)."""
+"""Ranges of the integers in a condition, in the states where the condition is true (interval arithmetic)."""
 
 import math
 from collections import Counter

@@ -1,4 +1,4 @@
-"""Messages that a controller sends: headers that nothing stamps, and values that do not fit into their fields."""
+"""Messages that a controller sends: headers without a stamp, and values that do not fit their fields."""
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
@@ -109,7 +109,7 @@ class SentMessages:
 
 
 def _leaves_frame_empty(value: ProvidedValue) -> bool:
-    """True if a provided value holds an empty frame: by name, where no definition tells headers from other fields."""
+    """True if a provided value holds an empty frame; without a definition, a field counts as a frame by its name."""
     if not isinstance(value, ObjectValue):
         return False
     return any(

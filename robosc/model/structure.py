@@ -1,8 +1,7 @@
-"""The checked model: what a robot is once every name is bound and every type is known.
+"""The checked model: the description of a robot with every name bound and every type known.
 
-Frozen values that travel inside the supervisor file, therefore msgspec structures with constrained
-names. Everything is listed in *source order*: the order of the robot file's text, an imported
-component standing where it is imported.
+The supervisor file contains these frozen values, so they are msgspec structures with constrained names. Everything is
+listed in *source order*: the order of the robot file's text, with an imported component at its import.
 """
 
 from enum import StrEnum

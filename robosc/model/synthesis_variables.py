@@ -41,7 +41,7 @@ def mark_synthesis_variables(
     invariants: Iterable[Invariant],
     aims: Iterable[Goal | Assumption],
 ) -> dict[str, Behaviour]:
-    """The behaviours with every variable told apart: in synthesis, or code-only."""
+    """The behaviours with every variable classified: part of synthesis, or code-only."""
     found = set[Key]()
     conditions = [item.expression for item in requirements]
     conditions += [item.expression for item in invariants]

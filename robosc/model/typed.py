@@ -1,4 +1,4 @@
-"""Typed expressions: what fits where, and the types and bounds of results (language A.5)."""
+"""Typed expressions: compatibility of types, and the types and bounds of results (language A.5)."""
 
 from dataclasses import dataclass
 

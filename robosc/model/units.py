@@ -178,7 +178,7 @@ class Libraries:
     def _find(self, name: syntax.Name) -> Unit | None:
         found: dict[str, syntax.File] = {}
         partly: dict[str, syntax.File] = {}
-        # A broken library that nothing imports is nobody's error, so only those that are asked for are parsed.
+        # An error in a library that nothing imports does not matter, so only requested libraries are parsed.
         for file in self._declaring.get(name.text, ()):
             if file.name not in self._parsed:
                 self._parsed[file.name] = parsed = parse(file)

@@ -1,4 +1,4 @@
-"""Model checking of the controlled system: properties in computation tree logic, verdicts, and runs that show them."""
+"""Model checking of the controlled system: properties in computation tree logic, verdicts, and runs as evidence."""
 
 from robosc.model_checking.checking import verify_properties
 from robosc.model_checking.formulas import Property, formula_text

@@ -91,7 +91,7 @@ class _Checker:
         return found[1]
 
     def _whole(self, formula: Formula) -> Any:
-        """The same for a whole property, as far as it takes to tell where among the initial states it holds."""
+        """The states in which a whole property holds, exact only for the initial states."""
         initial = self._structure.initial
         match formula:
             case Finally(quantifier="E", operand=operand):

@@ -1,9 +1,9 @@
-"""A run that shows why a formula holds in a state or does not, as far as one run can show it.
+"""A run that shows why a formula holds or does not hold in a state, as far as one run can show it.
 
-That there is a run with some property is shown by such a run; that all runs have one is shown by none, but the
-opposite is. So a formula is followed into the states that a run leads to, as long as what is left to show there is of
-the first kind (E. M. Clarke, O. Grumberg, K. L. McMillan and X. Zhao, "Efficient generation of counterexamples and
-witnesses in symbolic model checking", DAC 1995, pp. 427-432); what is not is named with its place in the run.
+A run is evidence that some run has a property, but no run is evidence that all runs have it; for a false formula it is
+the other way round. So the formula is followed along a run, as long as a run is evidence for the remaining part
+(E. M. Clarke, O. Grumberg, K. L. McMillan and X. Zhao, "Efficient generation of counterexamples and witnesses in
+symbolic model checking", DAC 1995, pp. 427-432). A part without such evidence is named with its place in the run.
 """
 
 from collections.abc import Callable

@@ -1,7 +1,8 @@
-"""The controlled system as a Kripke structure of predicates: its states, its steps, and the state behind a predicate.
+"""The controlled system as a Kripke structure of predicates: its states, its steps, and the states of a predicate.
 
-Every event of the controlled system is a way on. A state without any has itself as its only successor, as is usual
-where every state needs one: its runs stay there for ever (so does spin, which lets a finished run stutter).
+Every event of the controlled system is a step. A state without events has itself as its only successor, because every
+state of a Kripke structure needs one: its runs stay there for ever. Spin does the same when it lets a finished run
+stutter.
 """
 
 from collections.abc import Callable, Mapping, Sequence

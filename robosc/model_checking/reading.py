@@ -1,8 +1,8 @@
 """Properties as text: expressions of the language with temporal operators among their operands.
 
-A temporal operator is a call whose name no text can spell, so that the language's own parser and its checks of
-depth take it like any other operand. The words are operators only where no name could stand: a name of the model
-that is spelt like one is followed by `.`, or escaped by `^`.
+A temporal operator becomes a call with a name that no text can contain, so that the language's own parser and its check
+of depth treat it like any other operand. A word is an operator only where no name can be: a name of the model with the
+same spelling is followed by `.`, or escaped by `^`.
 """
 
 from collections.abc import Sequence

@@ -1,7 +1,7 @@
-"""From what was written to formulas: names bound and types checked by the language's own checker.
+"""Conversion of parsed properties to formulas: the language's own checker binds names and checks types.
 
-The names of a property are those of a robot's requirements, but for constants, which a checked model no longer has;
-beside them stand the services and actions with the locations of their plants.
+A property can use the names of a robot's requirements, except constants, which a checked model does not contain. It can
+also use services and actions, with the locations of their plants.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,10 +1,10 @@
 """Runs through sets of states: shortest paths, and lassos.
 
 Source: E. M. Clarke, O. Grumberg, K. L. McMillan and X. Zhao, "Efficient generation of counterexamples and witnesses
-in symbolic model checking", DAC 1995, pp. 427-432: rings of a breadth-first search and one state at a time back; a
-cycle is looked for through one state, and where that state is on none, from further on. Instead of the state at the
-far end of the search we go on from the nearest one that has an endless past as well as an endless future, which is on
-a cycle or between two: that keeps the way to the cycle short.
+in symbolic model checking", DAC 1995, pp. 427-432: rings of a breadth-first search, and one state at a time back. A
+cycle is searched through one state; if that state is on no cycle, the search goes on from a later one. The paper takes
+the state at the far end of the search. We take the nearest state with an infinite past and an infinite future, which is
+on a cycle or between two, so that the way to the cycle stays short.
 """
 
 from bisect import bisect_left

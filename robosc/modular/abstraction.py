@@ -1,6 +1,6 @@
-"""Abstractions of an automaton that keep conflicts: whatever is composed with it, both or neither are nonblocking.
+"""Abstractions of an automaton that preserve conflicts: its composition with any other automaton stays blocking or not.
 
-Each is a rule by itself, from an automaton to one that is no larger, and takes no other one to have been used before.
+Each rule is independent of the others, and turns an automaton into one that is no larger.
 
 Sources: H. Flordal and R. Malik, "Compositional verification in supervisory control", SIAM J. Control Optim. 48(3),
 2009, pp. 1914-1938 (the rules); R. Malik, "The language of certain conflicts of a nondeterministic process", Working
@@ -14,19 +14,19 @@ from collections.abc import Callable, Iterable
 from robosc.modular.graphs import SILENT, Edges, Graph, Label, leading_to, quotient, silent_components
 
 MAXIMUM_WORK = 3_000_000
-"""Parts of signatures that are made for one abstraction, beyond which it is left as it is."""
+"""Maximum number of parts of signatures for one abstraction; beyond it the automaton is left unchanged."""
 
 MAXIMUM_ROUNDS = 100
-"""Times that certain conflicts are looked for because of others."""
+"""Maximum number of rounds of the search for certain conflicts: each finding may lead to others."""
 
 MAXIMUM_SPREAD = 8
-"""Steps that may come in place of one, so that an automaton with fewer states has not many more steps."""
+"""Maximum number of steps that replace one step: an automaton with fewer states must not have many more steps."""
 
 type Rule = Callable[[Graph], Graph]
 
 
 def reduced(graph: Graph) -> Graph:
-    """Return a smaller automaton that blocks the same others, on which no rule finds anything more."""
+    """Return a smaller automaton with the same conflicts, which no rule can reduce further."""
     graph = certain_conflicts(_reachable(graph))
     size = len(graph.edges) + 1
     while len(graph.edges) < size:
@@ -37,11 +37,11 @@ def reduced(graph: Graph) -> Graph:
 
 
 def certain_conflicts(graph: Graph) -> Graph:
-    """Rule of certain conflicts, as far as they are found soon: states that are surely blocked become one.
+    """Rule of certain conflicts, as far as they are found quickly: states that certainly block become one state.
 
-    These are the states that reach no marked state, and those with a silent step to such a one, which nothing else can
-    keep from it. Where a label leads to one, other steps with that label are no way out: who takes part in it cannot
-    choose. They are dropped, and then more states may reach no marked state.
+    Such states reach no marked state, or have a silent step to such a state, which no other automaton can prevent. If
+    a label leads to such a state, other steps with the same label are no way out, because another automaton cannot
+    choose between them. These steps are dropped, and then more states may reach no marked state.
     """
     edges: Edges = [list(steps) for steps in graph.edges]
     marked, lost = set(graph.marked), set[int]()
@@ -61,13 +61,13 @@ def certain_conflicts(graph: Graph) -> Graph:
 
 
 def _surely(steps: list[tuple[Label, int]], lost: set[int]) -> list[tuple[Label, int]]:
-    """The steps without those whose label leads to a lost state, too."""
+    """The steps whose label does not also lead to a blocking state."""
     leading = {label for label, target in steps if target in lost}
     return [(label, target) for label, target in steps if label not in leading or target in lost]
 
 
 def silent_circles(graph: Graph) -> Graph:
-    """Take states that silent steps lead to each other from as one; these are weakly bisimilar."""
+    """Merge states that reach each other by silent steps; these states are weakly bisimilar."""
     components = silent_components(graph)
     is_alone = max(components, default=-1) == len(components) - 1
     if is_alone and not any((SILENT, state) in steps for state, steps in enumerate(graph.edges)):
@@ -76,9 +76,9 @@ def silent_circles(graph: Graph) -> Graph:
 
 
 def only_silent_outgoing(graph: Graph) -> Graph:
-    """Rule of only silent outgoing steps: an unmarked state that has no other ones is left out.
+    """Rule of only silent outgoing steps: an unmarked state that has no other outgoing steps is left out.
 
-    Whoever comes there can do nothing but go on, so that steps to it lead to where its own steps lead.
+    Steps to this state lead to the targets of its own steps instead.
     """
     graph = silent_circles(graph)
     instead: dict[int, frozenset[int]] = {}
@@ -99,9 +99,9 @@ def only_silent_outgoing(graph: Graph) -> Graph:
 
 
 def silent_incoming(graph: Graph) -> Graph:
-    """Rule of silent incoming steps: a state that nothing else leads to, and that a silent step leaves, is left out.
+    """Rule of silent incoming steps: a state with only silent incoming steps and a silent outgoing step is left out.
 
-    Those that lead to it take its steps. What it alone could be held back in, the silent step leads on to.
+    The states before it get its steps. A conflict in this state is also one in the target of its silent step.
     """
     graph = silent_circles(graph)
     before: list[int] = [0] * len(graph.edges)
@@ -133,9 +133,9 @@ def silent_incoming(graph: Graph) -> Graph:
 
 
 def silent_continuation(graph: Graph) -> Graph:
-    """Rule of silent continuation: states that the same leads to, and that a silent step leaves, become one.
+    """Rule of silent continuation: states with equal incoming steps, and with silent outgoing steps, are merged.
 
-    What is held back in one of them, is so in a state further on that no silent step leaves and that stays by itself.
+    A conflict in one of them also occurs in a later state without silent outgoing steps, which is not merged.
     """
     graph = silent_circles(graph)
     incoming = _incoming(graph)
@@ -151,9 +151,9 @@ def silent_continuation(graph: Graph) -> Graph:
 
 
 def active_events(graph: Graph) -> Graph:
-    """Rule of active events: states that the same leads to become one if the same labels, or being marked, are next.
+    """Rule of active events: states with equal incoming steps, equal next labels and equal marking are merged.
 
-    Where it is held back after the first of these, it could have been in another one of the states before.
+    A conflict after a next label could also have occurred from another one of the merged states.
     """
     graph = silent_circles(graph)
     incoming = _incoming(graph)
@@ -172,7 +172,7 @@ def active_events(graph: Graph) -> Graph:
 
 
 def weak_bisimulation(graph: Graph) -> Graph:
-    """Take weakly bisimilar states as one: those that can do the same, and get to the same classes by it."""
+    """Merge weakly bisimilar states: states with the same labels that lead to the same classes."""
     graph = silent_circles(graph)
     blocks = _weak_blocks(graph)
     return graph if blocks is None else _with_classes(graph, blocks)
@@ -190,7 +190,7 @@ RULES: tuple[Rule, ...] = (
 
 
 def _later_first(graph: Graph) -> list[int]:
-    """The states, each after those that silent steps lead to from it; there are no circles of these."""
+    """The states, each after its successors by silent steps; there must be no cycle of silent steps."""
     return sorted(range(len(graph.edges)), key=silent_components(graph).__getitem__)
 
 
@@ -199,16 +199,16 @@ def _reachable(graph: Graph) -> Graph:
 
 
 def _with_classes(graph: Graph, classes: Iterable[object]) -> Graph:
-    """Take states of one class as one."""
+    """Merge the states of each class."""
     numbers: dict[object, int] = {}
     blocks = [numbers.setdefault(item, len(numbers)) for item in classes]
     return graph if len(numbers) == len(blocks) else quotient(graph, blocks)
 
 
 def _incoming(graph: Graph) -> list[frozenset[object]] | None:
-    """For each state what leads to it: the steps with a label, or the beginning, that silent steps may follow.
+    """For each state its incoming steps with a label, or the beginning, each possibly followed by silent steps.
 
-    None where that takes too much work. There are no circles of silent steps.
+    None if that takes too much work. There must be no cycle of silent steps.
     """
     found: list[set[object]] = [set() for _ in graph.edges]
     for state in graph.initial:
@@ -229,9 +229,9 @@ def _incoming(graph: Graph) -> list[frozenset[object]] | None:
 
 
 def _weak_blocks(graph: Graph) -> list[int] | None:
-    """For each state the number of its class of weak bisimulation; None where that takes too much work.
+    """For each state the number of its class of weak bisimulation; None if that takes too much work.
 
-    There are no circles of silent steps.
+    There must be no cycle of silent steps.
     """
     work, count = 0, len(graph.edges)
     silent = [[target for label, target in steps if label is SILENT] for steps in graph.edges]

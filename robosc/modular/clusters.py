@@ -16,13 +16,13 @@ INFLATION = 2.0
 """Exponent by which strong flows become stronger: the larger, the smaller the clusters."""
 
 SMALLEST_FLOW = 1e-3
-"""Flow that counts as none."""
+"""Smallest flow that counts."""
 
 MAXIMUM_ROUNDS = 20
-"""Rounds that flows are given to settle; symmetric graphs may never."""
+"""Maximum number of rounds until flows are stable; in symmetric graphs they may never be."""
 
 MAXIMUM_NODES = 30
-"""Nodes that a demand may connect: one on more of them says little about which belong together."""
+"""Maximum number of nodes that a demand connects: a demand on more says little about which ones belong together."""
 
 MAXIMUM_BITS = 14.0
 """Logarithm of the combinations of values up to which requirements of one cluster share a module."""
@@ -31,7 +31,7 @@ _Column = dict[int, float]
 
 
 def modules_of(partition: Partition, maximum_bits: float = MAXIMUM_BITS) -> tuple[Module, ...]:
-    """The modules of a system: each demand is in one, and each part in one at least.
+    """The modules of a system: each demand is in one module, and each part in at least one.
 
     Args:
         partition: The system in parts.
@@ -153,7 +153,7 @@ def _connected(partition: Partition, demands: Iterable[int]) -> list[Module]:
 
 
 def _without_smaller(modules: list[Module]) -> tuple[Module, ...]:
-    """The modules, where those whose parts another one has, too, are part of that one."""
+    """The modules, after each module whose parts another one contains was merged into that one."""
     found: list[Module] = []
     by_part = defaultdict[int, list[int]](list)
     for module in sorted(modules, key=lambda item: (-len(item.parts), sorted(item.parts))):

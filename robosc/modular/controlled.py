@@ -1,4 +1,4 @@
-"""Modules under their supervisors, as automata that are composed: with one label for each thing that parts can do."""
+"""Modules under their supervisors, as automata for composition: each possible step of a part has one label."""
 
 from collections import Counter, defaultdict
 from collections.abc import Callable, Iterable, Sequence
@@ -76,12 +76,12 @@ def _always_true(state: State) -> bool:
 def graphs_of(modules: Sequence[ControlledModule], part_of: dict[str, int]) -> list[Graph]:
     """The automata of modules, to be composed.
 
-    A part that several modules have is in the same state in each of them: where an event, or the beginning, leaves open
-    what it does, each outcome has a label of its own.
+    A part that several modules share is in the same state in each of them. If an event, or the beginning, can lead such
+    a part to several states, each outcome has a label of its own.
 
     Args:
         modules: The modules.
-        part_of: The part of each event that one has.
+        part_of: The part of each event that belongs to one.
     """
     count = Counter(part for item in modules for part in item.module.parts)
     shared = {part for part in count if count[part] > 1}

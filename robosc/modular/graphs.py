@@ -1,4 +1,4 @@
-"""Automata with numbered states and labels: composed, hidden, taken together by classes of states."""
+"""Automata with numbered states and labels: composition, hiding of labels, and merging of classes of states."""
 
 from collections import defaultdict
 from collections.abc import Hashable, Iterator, Sequence
@@ -8,7 +8,7 @@ type Label = Hashable
 type Edges = list[list[tuple[Label, int]]]
 
 SILENT: Label = None
-"""Label of a step that no other automaton takes part in."""
+"""Label of a silent step, in which no other automaton takes part."""
 
 
 class TooLargeError(Exception):
@@ -21,8 +21,8 @@ class Graph:
 
     Attributes:
         labels: Labels that it takes part in.
-        initial: States that it may begin in.
-        edges: For each state the labels of its steps, each with the state that it leads to.
+        initial: The initial states.
+        edges: For each state the labels of its steps, each with the target state.
         marked: The marked states.
     """
 
@@ -33,13 +33,13 @@ class Graph:
 
 
 def hidden(graph: Graph, kept: frozenset[Label]) -> Graph:
-    """Return an automaton that takes the steps with other labels than some silently."""
+    """Return the automaton in which all labels except the given ones are silent."""
     edges = [[(label if label in kept else SILENT, target) for label, target in steps] for steps in graph.edges]
     return Graph(kept, graph.initial, edges, graph.marked)
 
 
 def composed(one: Graph, other: Graph, limit: int) -> Graph:
-    """Return the synchronous composition of two automata, as far as it can be reached.
+    """Return the reachable part of the synchronous composition of two automata.
 
     Raises:
         TooLargeError: It has more than `limit` states.
@@ -99,7 +99,7 @@ def leading_to(edges: Edges, states: set[int]) -> set[int]:
 
 
 def is_nonblocking(graph: Graph) -> bool:
-    """Return True if an automaton by itself can always get to a marked state."""
+    """Return True if an automaton alone can always reach a marked state."""
     alive = leading_to(graph.edges, graph.marked)
     found, waiting = set(graph.initial), list(graph.initial)
     while waiting:
@@ -114,7 +114,7 @@ def is_nonblocking(graph: Graph) -> bool:
 
 
 def silent_components(graph: Graph) -> list[int]:
-    """For each state the number of its component under silent steps, larger than those of components it leads to."""
+    """For each state the number of its component under silent steps; it is larger than those of its successors."""
     silent = [[target for label, target in steps if label is SILENT] for steps in graph.edges]
     return components(silent)
 
@@ -161,7 +161,7 @@ def components(following: Sequence[Sequence[int]]) -> list[int]:
 
 
 def quotient(graph: Graph, blocks: Sequence[int]) -> Graph:
-    """Return the automaton whose states are classes of states, as far as they can be reached."""
+    """Return the reachable part of the automaton whose states are classes of states."""
     members = defaultdict[int, list[int]](list)
     for state, block in enumerate(blocks):
         members[block].append(state)

@@ -1,7 +1,7 @@
-"""Search whether automata that share events block each other, on abstractions: none ever holds all of their states.
+"""Check whether automata that share events block each other, on abstractions, without the product of all automata.
 
-Two automata at a time are composed; events that no other one has are hidden, and what is left is made as small as
-abstractions that keep conflicts make it. So are events that one of them never allows, or that change nothing.
+Two automata at a time are composed. Events that no other automaton has are hidden, and abstractions that preserve
+conflicts reduce the result. Events that one automaton never allows, or that change nothing, are removed.
 
 Sources: H. Flordal and R. Malik, "Compositional verification in supervisory control", SIAM J. Control Optim. 48(3),
 2009, pp. 1914-1938; C. Pilbrow and R. Malik, "An algorithm for compositional nonblocking verification using special
@@ -16,11 +16,11 @@ from robosc.modular.abstraction import reduced
 from robosc.modular.graphs import Graph, Label, TooLargeError, composed, hidden, is_nonblocking
 
 SMALL_LIMITS = (200, 1_000)
-"""States of a composition up to which two automata are looked for that together are no larger than apart."""
+"""Limits on the states of a composition, tried in turn, in the search for a pair that does not grow."""
 
 
 def is_nonconflicting(graphs: Iterable[Graph], *, limit: int, should_stop: Callable[[], bool] = lambda: False) -> bool:
-    """Return True if automata together can always get to where all of them are marked.
+    """Return True if automata together can always reach a state in which all of them are marked.
 
     Args:
         graphs: The automata.
@@ -28,7 +28,7 @@ def is_nonconflicting(graphs: Iterable[Graph], *, limit: int, should_stop: Calla
         should_stop: Function called between two compositions; once it returns true, the work ends.
 
     Raises:
-        TooLargeError: A composition has more states, whichever two are composed.
+        TooLargeError: The composition of every pair has more states.
         SynthesisCancelled: `should_stop` became true.
     """
     return _Search(graphs, limit, should_stop).result()
@@ -59,7 +59,7 @@ class _Search:
         )
 
     def _next(self) -> tuple[int, int, Graph]:
-        """The next two automata, and what is to come in their place: no larger than both, or not much.
+        """The next two automata and the automaton that replaces them, which is not much larger than both.
 
         Raises:
             TooLargeError: The composition of each pair has too many states.
@@ -85,7 +85,7 @@ class _Search:
         return len(whole.edges) - sum(len(self._waiting[number].edges) for number in pair)
 
     def _whole(self, pair: tuple[int, int], most: int) -> Graph | None:
-        """The composition of two automata, made smaller; None where it has more states than allowed."""
+        """The reduced composition of two automata; None if it has more states than allowed."""
         found = self._tried.get(pair)
         if isinstance(found, int):
             found = None if found < most else found
@@ -116,11 +116,11 @@ class _Search:
         self._reduce([one], is_done=True)
 
     def _forget(self, *numbers: int) -> None:
-        """Forget the compositions of automata that are other ones now, or gone."""
+        """Forget the compositions of automata that have changed or are gone."""
         self._tried = {pair: found for pair, found in self._tried.items() if not set(numbers).intersection(pair)}
 
     def _pairs(self) -> Iterator[tuple[int, int]]:
-        """The pairs that share a label: the smallest automaton first, with those that give it smaller compositions."""
+        """The pairs that share a label: those of the smallest automaton first, the most promising partners first."""
         for number in sorted(self._waiting, key=lambda item: len(self._waiting[item].edges)):
             shared = defaultdict[int, int](int)
             local = defaultdict[int, int](int)
@@ -135,7 +135,7 @@ class _Search:
     # Reduction
 
     def _reduce(self, numbers: list[int], *, is_done: bool = False) -> None:
-        """Make some automata smaller, unless that is done, and others that have an event alone or no more by that."""
+        """Reduce some automata that are not reduced yet, and then others whose events this changes."""
         changed = dict.fromkeys(numbers, is_done)
         while changed:
             number = next(iter(changed))
@@ -174,9 +174,9 @@ def idle_labels(graph: Graph) -> frozenset[Label]:
 
 
 def is_ignored(graph: Graph, label: Label) -> bool:
-    """Return True if an automaton has a label that changes nothing in all states; those that are blocked count for it.
+    """Return True if an automaton has a label that changes nothing in all states; blocked states do not matter.
 
-    From an unmarked state without a step nothing gets to a marked state, whatever else happens.
+    From an unmarked state without a step no marked state can be reached, whatever other automata do.
     """
     return all(
         any(item == label for item, _ in steps) or not (steps or state in graph.marked)

@@ -1,4 +1,4 @@
-"""Parts of a system that nothing but requirements connects, and what each requirement is about.
+"""Parts of a system that only requirements connect, and the parts that each requirement is about.
 
 Source: M. Goorden, J. van de Mortel-Fronczak, M. Reniers, W. Fokkink and J. Rooda, "Structuring multilevel
 discrete-event systems with dependence structure matrices", IEEE TAC 65(4), 2020, pp. 1625-1639: product systems, and
@@ -17,7 +17,7 @@ from robosc.expressions.tree import conjunction, conjuncts
 
 @dataclass(frozen=True, slots=True)
 class Demand:
-    """Requirements that stand together, since one reads what another one says.
+    """Requirements that belong together, because one reads another.
 
     Attributes:
         parts: Parts that they are about.
@@ -38,7 +38,7 @@ class Demand:
 
 @dataclass(frozen=True, slots=True)
 class Module:
-    """Parts with the demands that are made on them together.
+    """Parts with the demands on them.
 
     Attributes:
         parts: Places in `Partition.parts`.
@@ -59,7 +59,7 @@ class Partition:
     Attributes:
         system: The system.
         parts: Names of the automata of each part: no two parts share an event, and none reads another one.
-        demands: All that connects parts.
+        demands: The demands, each of which connects some parts.
     """
 
     system: System
@@ -71,7 +71,7 @@ class Partition:
         return self.problem_of(module, SystemPlaces())[0]
 
     def problem_of(self, module: Module, places: SystemPlaces) -> tuple[System, SystemPlaces]:
-        """The synthesis problem of a module, with the places of its parts, as far as those of the whole are known."""
+        """The synthesis problem of a module, with the source locations of its parts, as far as they are known."""
         demands = [self.demands[place] for place in sorted(module.demands)]
         names = {name for place in module.parts for name in self.parts[place]}
         names |= {name for demand in demands for name in demand.automata}
@@ -132,14 +132,14 @@ class Groups[T: Hashable]:
         self._above = {item: item for item in items}
 
     def first(self, item: T) -> T:
-        """Return the member that stands for a member's set."""
+        """Return the member that represents the set of a member."""
         while self._above[item] != item:
             self._above[item] = self._above[self._above[item]]
             item = self._above[item]
         return item
 
     def join(self, items: Iterable[T]) -> None:
-        """Let the sets of some members be one."""
+        """Merge the sets of some members."""
         first, *others = map(self.first, items)
         for other in others:
             self._above[self.first(other)] = self.first(first)
@@ -154,7 +154,7 @@ class Groups[T: Hashable]:
 
 @dataclass(slots=True)
 class _Element:
-    """One requirement: what it is, the automata and events that it is about, and events whose data it reads."""
+    """One requirement: its kind, the automata and events that it is about, and the events whose data it reads."""
 
     demand: Demand
     reads: frozenset[str] = frozenset()
@@ -164,7 +164,7 @@ class _Element:
 
 
 def partition(system: System) -> Partition:
-    """Return the parts of a system, as small as can be, and the demands on them."""
+    """Return the smallest possible parts of a system, and the demands on them."""
     plants = _Plants(system)
     place_of = {name: place for place, part in enumerate(plants.parts) for name in part}
     part_of = {event: place_of[name] for event, name in plants.owners.items()}
@@ -233,9 +233,9 @@ class _Plants:
     """Plants, and the requirement automata that they read, in groups that share events or read each other.
 
     Attributes:
-        names: Names of all of them.
+        names: Names of all automata.
         parts: The groups.
-        owners: One of them for each event that any has.
+        owners: One automaton for each event that any automaton has.
     """
 
     def __init__(self, system: System) -> None:

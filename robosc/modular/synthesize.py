@@ -1,8 +1,9 @@
 """Synthesis module by module, until the modules do not block each other.
 
-Modules are right by construction: parts share nothing but requirements, so what the supervisor of the whole allows is
-allowed by the supervisor of each module, and where these together are nonblocking, they allow exactly that. Where they
-are not, two of them become one module; where that takes too much to find out, all that share something do.
+Modular supervisors are correct by construction. Parts share only requirements, so the supervisor of each module allows
+everything that the supervisor of the whole system allows. If the modular supervisors together are nonblocking, they
+allow exactly the same. If they are not, two of the modules are merged into one. If that check would take too much work,
+all modules that share something are merged.
 
 Source: W. M. Wonham and P. J. Ramadge, "Modular supervisory control of discrete-event systems", Mathematics of Control,
 Signals and Systems 1, 1988, pp. 13-30.
@@ -28,10 +29,10 @@ from robosc.synthesis import SynthesisProgress, SynthesisResult, SynthesisStatus
 from robosc.synthesis.engines import EngineOptions
 
 STATES = 10_000
-"""States of a module, and of a composition, up to which it is found out whether modules block each other."""
+"""Maximum number of states of a module, and of a composition, for the check whether modules block each other."""
 
 JOINING_STEPS = 1_000_000
-"""Steps that joining the conditions of several modules on one event may take."""
+"""Maximum number of steps to combine the conditions of several modules on one event."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -60,12 +61,12 @@ class ModularResult:
 
     Attributes:
         partition: The system in parts.
-        modules: The modules with their supervisors; without a supervisor the first one that has none.
+        modules: The modules with their supervisors; if there is no supervisor, only the first module that has none.
         groups: Places of modules that share parts or events, and were found not to block each other.
         added: Conditions that the supervisors together add to events, in the system's order.
         initial: Condition on the initial states; None if the system may begin in all of them.
-        states: Reachable states of the controlled system where each group is one module; else None, for these states
-            are never all at hand.
+        states: Reachable states of the controlled system, if each group is one module; else None, because these states
+            are never all computed.
     """
 
     partition: Partition
@@ -77,7 +78,7 @@ class ModularResult:
 
     @property
     def unsolved(self) -> ModuleSupervisor | None:
-        """The module without a supervisor; None where there is none."""
+        """The module without a supervisor; None if every module has one."""
         return next((item for item in self.modules if item.result.status is SynthesisStatus.EMPTY), None)
 
 
@@ -95,7 +96,7 @@ def synthesize_modular(
     Args:
         system: The system.
         engine: Name of the engine for decision diagrams, or its options.
-        limit: States of a module, or of a composition, up to which it is found out whether modules block each other.
+        limit: Maximum number of states of a module, or of a composition, for the check of mutual blocking.
         module_bits: Logarithm of the combinations of values up to which requirements share a module.
         should_stop: Function called before each step of the work; once it returns true, the work ends.
         on_progress: Function called with the progress of the work, in words.
@@ -104,7 +105,7 @@ def synthesize_modular(
         SynthesisCancelled: `should_stop` became true.
         NodeLimitError: Diagrams of a module became larger than the options allow.
         UnknownEngineError: There is no such engine.
-        UnsupportedModelError: A module, or the conditions of several together, are outside what synthesis handles.
+        UnsupportedModelError: Synthesis does not support a module, or the combined conditions of several modules.
     """
     parts = partition(system)
     return _Synthesis(parts, engine, limit, should_stop, on_progress).result(modules_of(parts, module_bits))
@@ -137,7 +138,7 @@ class _Synthesis:
         }
 
     def result(self, first: Sequence[Module]) -> ModularResult:
-        """The supervisors of all modules, or the first module without one; of some modules to begin with."""
+        """The supervisors of all modules, or the first module without one, from given initial modules."""
         modules = list(first)
         while True:
             for number, module in enumerate(modules):
@@ -185,7 +186,7 @@ class _Synthesis:
     # Blocking
 
     def _is_nonblocking(self, modules: Sequence[Module]) -> bool | None:
-        """Return True if modules do not block each other; None where that takes too many states to find out."""
+        """Return True if modules do not block each other; None if the check needs too many states."""
         if len(modules) == 1:
             return True
         self._on_progress(f"nonblocking: {len(modules)} modules together")
@@ -214,7 +215,7 @@ class _Synthesis:
         return self._controlled[module]
 
     def _blocking_pairs(self, modules: Sequence[Module]) -> list[tuple[Module, Module]]:
-        """Pairs of modules that share something, no two of one: those that block each other; else any."""
+        """Disjoint pairs of modules that share something: those that block each other, or else any."""
         pairs: list[tuple[Module, Module]] = []
         users: dict[object, list[Module]] = {}
         for module in modules:
@@ -263,7 +264,7 @@ class _Synthesis:
         )
 
     def _all_of(self, diagrams: Sequence[DecisionDiagram], what: str) -> DecisionDiagram:
-        """Return the diagram that is true where all of some are.
+        """Return the conjunction of some diagrams.
 
         Raises:
             UnsupportedModelError: It becomes too large.

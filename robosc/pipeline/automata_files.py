@@ -1,4 +1,4 @@
-"""Files of automata (CIF, libFAUDES, Supremica), loaded: what `robosc.synthesize(system)` takes is made of them."""
+"""Files of automata (CIF, libFAUDES, Supremica): loading and checking of the systems that `robosc.synthesize` takes."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,7 +15,7 @@ SUFFIXES = frozenset({_CIF, ".gen", ".wmod"})
 
 
 def is_automata(path: Path) -> bool:
-    """Return True if a file holds automata: the ending of its name tells."""
+    """Return True if a file holds automata, by the ending of its name."""
     return path.suffix in SUFFIXES
 
 
@@ -24,10 +24,10 @@ def load_automata_file(path: Path, text: str | None = None) -> Bundle:
 
     Args:
         path: The file.
-        text: Text of the file, which then need not be there.
+        text: Text of the file; the file then need not exist.
 
     Raises:
-        FileAccessError: The file is not there or cannot be read.
+        FileAccessError: The file does not exist or cannot be read.
         LanguageError: A file is too large or not UTF-8.
     """
     from robosc.cif import load_cif
@@ -53,7 +53,7 @@ def load_automata_file(path: Path, text: str | None = None) -> Bundle:
 
 
 def check_automata_file(bundle: Bundle) -> "CheckedSystem":
-    """Check a file of automata, as its ending says what it is."""
+    """Check a file of automata, in the format of its ending."""
     if bundle.main.name.endswith(_CIF):
         from robosc.cif import check_cif
 

@@ -22,7 +22,7 @@ _OF_ROBOTS = ("deployment", "allow_livelock", "verified_states")
 
 
 def checked_automata(model: LoadedAutomata, options: SynthesisOptions = DEFAULT_OPTIONS) -> CheckedSystem:
-    """Return what checking automata finds, before they are synthesized with these options.
+    """Return the findings about automata, before a synthesis with these options.
 
     Raises:
         ValueError: An option is for models of robots alone.
@@ -34,10 +34,10 @@ def checked_automata(model: LoadedAutomata, options: SynthesisOptions = DEFAULT_
 
 
 def begun(system: System, initial: str) -> System:
-    """Return automata that begin only where a description of their states holds, such as `tank.level = 1`.
+    """Return automata with fewer initial states: those that a description fits, such as `tank.level = 1`.
 
     Raises:
-        RequestError: It names what is not there.
+        RequestError: The description names something that does not exist.
     """
     from robosc.explanation.requests import SystemQuestionReader
 
@@ -57,7 +57,7 @@ def automata_synthesis(
 
     Raises:
         ValueError: An option is for models of robots alone.
-        RequestError: `initial` names what is not there.
+        RequestError: `initial` names something that does not exist.
     """
     found = CheckedSystem(model, ()) if isinstance(model, System) else checked_automata(model, options)
     diagnostics = Findings(found.diagnostics, None if isinstance(model, System) else model)
@@ -80,7 +80,7 @@ def automata_verification(
     *,
     is_strict: bool,
 ) -> Verification:
-    """Synthesize the supervisor of automata, and verify it by other means than it was made."""
+    """Synthesize the supervisor of automata, and verify it independently."""
     from robosc.explanation import EmptyExplanation, document
 
     made = automata_synthesis(model, options, on_progress, should_stop)
@@ -105,10 +105,10 @@ def file_verification(
     *,
     is_strict: bool,
 ) -> Verification:
-    """Verify a supervisor that was read from a file, which has to be of the automata of a model.
+    """Verify a supervisor that was read from a file; its automata must be those of the model.
 
     Raises:
-        InvalidSupervisorError: It is one of other automata.
+        InvalidSupervisorError: It is the supervisor of other automata.
     """
     checked = checked_automata(model, options)
     diagnostics = Findings(checked.diagnostics, model)

@@ -9,10 +9,10 @@ def check(model: ModelLike) -> Findings:
     """Return everything that is wrong with a model, library or automata, sorted by place.
 
     Args:
-        model: The model, as `load` returns it, or the path of one.
+        model: The model, as `load` returns it, or the path of its file.
 
     Raises:
-        FileAccessError: The file is not there or cannot be read.
+        FileAccessError: The file does not exist or cannot be read.
         LanguageError: A file is too large or not UTF-8.
     """
     from robosc.model.check import check as check_bundle

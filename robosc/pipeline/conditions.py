@@ -21,10 +21,10 @@ class Condition:
 
     Attributes:
         event: The event.
-        text: The condition in one line, in the model's words; `true` where nothing is added. Of a condition without
-            a formula that reads well, the size of its diagram.
-        formula: The condition as an expression, or None where none reads well.
-        diagram: The condition as a decision diagram, which is what counts.
+        text: The condition in one line, in the model's words; `true` if nothing is added; the size of the diagram if
+            there is no readable formula.
+        formula: The condition as an expression, or None if there is no readable one.
+        diagram: The condition as a decision diagram, which is authoritative.
         vocabulary: Vocabulary that puts the diagram's nodes into words.
     """
 
@@ -36,12 +36,12 @@ class Condition:
 
     @property
     def lines(self) -> tuple[Line, ...]:
-        """The diagram's nodes in words, the root first; empty where there is a formula."""
+        """The diagram's nodes in words, the root first; empty if there is a formula."""
         return () if self.formula is not None else diagram_lines(self.diagram, self.vocabulary)
 
     @property
     def adds_nothing(self) -> bool:
-        """True if the supervisor leaves the event as plants and requirements have it."""
+        """True if the supervisor does not restrict the event beyond plants and requirements."""
         return self.formula == TRUE
 
     def __repr__(self) -> str:
@@ -57,7 +57,7 @@ class Condition:
 
 
 class Conditions(Mapping[str, Condition]):
-    """For each controllable event, in source order, what a supervisor adds to it."""
+    """Conditions that a supervisor adds to each controllable event, in source order."""
 
     __slots__ = ("_conditions",)
 
@@ -99,14 +99,14 @@ class Conditions(Mapping[str, Condition]):
 
 
 def unknown_event(event: object, known: Sequence[str] | Mapping[str, object], what: str = "event") -> str:
-    """Return the message that there is no such event, with the nearest one that there is."""
+    """Return the message that an event does not exist, with the most similar event."""
     near = did_you_mean(str(event), known)
     hint = f"did you mean '{near}'?" if near else f"there are {', '.join(known) or 'none'}"
     return f"there is no {what} {str(event)!r:.100}; {hint}"
 
 
 def conditions_of(added: Sequence[AddedCondition], system: System, components: frozenset[str]) -> Conditions:
-    """Return what a supervisor adds to each controllable event.
+    """Return the conditions that a supervisor adds to each controllable event.
 
     Args:
         added: Conditions that the supervisor adds.

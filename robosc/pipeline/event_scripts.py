@@ -1,8 +1,8 @@
-"""Events with their data as a person writes them, one a line, or as an event log tells them.
+"""Events with their data, written by a person, one a line, or recorded in an event log.
 
 A line is the name of an event, and then nothing, data in JSON, or properties: `scan.response`, `level.response 3`,
 `scan.response {"front": 0.7}`, `scan.response front=0.7 word="two words"`. A word that is no JSON is a text, so that
-the value of an enum needs no quotes. Empty lines and those that begin with `#` say nothing.
+the value of an enum needs no quotes. Empty lines and lines that begin with `#` are ignored.
 """
 
 import json
@@ -21,14 +21,14 @@ from robosc.model.structure import Model
 from robosc.pipeline.received_data import MAXIMUM_ELEMENTS, NO_DATA
 
 MAXIMUM_BYTES = 1 << 24
-"""Size of a file of events beyond which it is not read; event logs may be larger."""
+"""Maximum size of a file of events; event logs may be larger."""
 
 _PROPERTY = re.compile(r"([A-Za-z_]\w*)=")
 _WORD = re.compile(r"\S+")
 
 
 class ScriptError(RoboscError, ValueError):
-    """Text that tells no event; the message says why."""
+    """Text that names no event; the message says why."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,9 +37,9 @@ class ScriptedEvent:
 
     Attributes:
         line: Number of its line, from 1.
-        event: Its name; empty: the model begins again.
-        data: Data that it carries; NO_DATA where none is reported.
-        target: Parts of the state that it leads to, as told; of events of automata.
+        event: Its name; empty if the model begins again.
+        data: Data of the event; NO_DATA if none is given.
+        target: Parts of the state that the event leads to, as they are written; only for automata.
     """
 
     line: int
@@ -54,11 +54,11 @@ def read_script(stream: BinaryIO, name: str, model: Model | None) -> tuple[Scrip
     Args:
         stream: The file, at its beginning.
         name: Name of the file, for messages.
-        model: Model that the events are of; None: they are of automata, of which there are no logs, and what follows
-            the name of an event, its data, may tell where it leads.
+        model: Model of the events. None for automata: they have no logs, and the state that an event leads to may
+            follow its name and data.
 
     Raises:
-        ScriptError: A line tells no event, or there is too much; the message begins with the place.
+        ScriptError: A line names no event, or the script is too large; the message begins with the place.
         OSError: It cannot be read.
     """
     content = stream.read(MAXIMUM_BYTES + 1)
@@ -91,7 +91,7 @@ def target_split(text: str) -> tuple[str, str]:
 
 
 def parse_event(text: str) -> tuple[str, object]:
-    """Return the name of an event and its data, NO_DATA where there is none.
+    """Return the name of an event and its data, or NO_DATA if there is none.
 
     Raises:
         ScriptError: The rest of the line is no data.
@@ -123,10 +123,10 @@ def _properties(text: str) -> dict[str, object]:
 
 
 def _value(text: str, place: int) -> tuple[object, int]:
-    """The value at a place, and where it ends: JSON, or else a word.
+    """The value at a place, JSON or else a word, and the place of its end.
 
     Raises:
-        ScriptError: There is none.
+        ScriptError: There is no value.
     """
     try:
         value, end = json.JSONDecoder().raw_decode(text, place)
@@ -143,7 +143,7 @@ def _value(text: str, place: int) -> tuple[object, int]:
 
 
 class _Joined:
-    """A stream of which the beginning was read already."""
+    """A stream whose beginning was read already."""
 
     def __init__(self, content: bytes, rest: BinaryIO) -> None:
         self._content = content
@@ -151,7 +151,7 @@ class _Joined:
         self._rest = rest
 
     def readline(self, most: int, /) -> bytes:
-        """Return the next line, or as much of it as was asked for."""
+        """Return the next line, or its first part if a limit is given."""
         end = self._content.find(b"\n", self._place) + 1 or len(self._content)
         line = self._content[self._place : min(end, self._place + most)]
         self._place += len(line)
@@ -164,7 +164,7 @@ def _logged(stream: _Joined, name: str, model: Model) -> Iterator[ScriptedEvent]
     """Yield the events of an event log.
 
     Raises:
-        ScriptError: It is none, or not one of this model.
+        ScriptError: The file is no event log, or not one of this model.
     """
     try:
         run = read_log_stream(stream, name)
@@ -187,7 +187,7 @@ def _logged(stream: _Joined, name: str, model: Model) -> Iterator[ScriptedEvent]
 
 
 def _joined(given: Mapping[tuple[PathStep, ...], object]) -> object:
-    """Data of which these parts are reported, and the rest is unknown."""
+    """Data that consists of these parts; all other parts are unknown."""
     known = {path: value for path, value in given.items() if value is not None and value is not NOT_TOLD}
     if () in known:
         return known[()]

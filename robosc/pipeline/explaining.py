@@ -1,4 +1,4 @@
-"""Explanation: of what synthesis did to a model, and of findings."""
+"""Explanation of the effect of synthesis on a model, and of findings."""
 
 from dataclasses import dataclass, replace
 from typing import overload
@@ -57,14 +57,14 @@ def explain(
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Explained | Page:
-    """Explain what synthesis did to a model: what restricts its events, or what is to blame; or explain a finding.
+    """Explain the effect of synthesis on a model (restrictions of events, or the parts to blame), or explain a finding.
 
     Args:
         model: The model, as `load` returns it, the path of one, or a `robosc.automata.System`; or a finding, whose code
             is explained.
         options: Options for making the supervisor.
         code: Code of a finding to explain, such as `unknown-name`, instead of a model.
-        event: The event to explain; None: all of them, and warnings.
+        event: The event to explain; None: all events, and warnings.
         state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
         after: Run after which to explain what can happen, such as `open, jam.response`.
         on_progress: Function called with the progress of the work.
@@ -73,8 +73,8 @@ def explain(
     Raises:
         TypeError: Neither a model nor a code is given, or both are.
         UnknownCodeError: There is no such code.
-        RequestError: Something that is asked about is not there: an event, a part of the model, a state, a run.
-        FileAccessError: The file is not there or cannot be read.
+        RequestError: The event, the part of the model, the state or the run does not exist.
+        FileAccessError: The file does not exist or cannot be read.
         LanguageError: A file is too large or not UTF-8.
         InvalidSystemError: The automata do not fit together.
         NodeLimitError: Decision diagrams became larger than the options allow.
@@ -117,7 +117,7 @@ def _status(explanation: Explanation) -> SynthesisStatus:
 
 @dataclass(frozen=True, slots=True)
 class ExplanationSubject:
-    """Subject of an explanation; without any, all controllable events and warnings.
+    """Subject of an explanation; if all attributes are empty, all controllable events and warnings.
 
     Attributes:
         event: The event to explain.
@@ -138,7 +138,7 @@ def explained(
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> SynthesisOutcome | tuple[SynthesisProblem, Explanation]:
-    """Return the synthesis problem and what synthesis did to it; or how it ended before synthesis."""
+    """Return the synthesis problem with an explanation, or the outcome of an attempt that ended before synthesis."""
     problem = prepare(bundle, deployment)
     if isinstance(problem, SynthesisOutcome):
         return problem
@@ -153,7 +153,7 @@ def explained_system(
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Explained:
-    """Return what synthesis did to automata that fit together."""
+    """Return the explanation of a synthesis of valid automata."""
     try:
         explanation = _explanation(words, engine, asked, on_progress, should_stop)
     except UnsupportedModelError as error:

@@ -1,4 +1,4 @@
-"""Exploration of everything that a robot, or automata, may do under their supervisor."""
+"""Exploration of all states that a robot, or automata, can reach under their supervisor."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -32,9 +32,9 @@ class Exploration(Outcome):
     Attributes:
         status: Outcome of the synthesis.
         diagnostics: Every finding about the model, sorted by place.
-        reason: Reason why there is no graph, in one sentence; empty where there is one.
+        reason: Reason why there is no graph, in one sentence; empty if there is one.
         graph: The graph, or None.
-        explanation: Explanation of why there is no supervisor; None where there is one.
+        explanation: Explanation of why there is no supervisor; None if there is one.
     """
 
     status: SynthesisStatus
@@ -46,13 +46,13 @@ class Exploration(Outcome):
     def write(self, file: FileName) -> Path:
         """Write the graph, whole or not at all, and return the file's path.
 
-        Its name ends in what it becomes: `.json` is what `robosc explore --json` prints, `.txt` the table, `.dot` and
-        `.gv` are for Graphviz, `.svg`, `.png` and `.pdf` are the picture that Graphviz draws.
+        The ending of its name is the format: `.json` as `robosc explore --json` prints it, `.txt` for the table, `.dot`
+        and `.gv` for Graphviz, `.svg`, `.png` and `.pdf` for the picture that Graphviz draws.
 
         Raises:
             NothingGeneratedError: There is no graph.
-            FileAccessError: The file cannot be written, or its name ends in something else.
-            DrawingUnavailableError: A picture is wanted, and Graphviz is not installed or gave up.
+            FileAccessError: The file cannot be written, or its name has another ending.
+            DrawingUnavailableError: Graphviz, which draws the picture, is not installed or failed.
         """
         if self.graph is None:
             raise NothingGeneratedError(f"there is no graph to write: {self.reason or self.status}")
@@ -68,7 +68,7 @@ class Exploration(Outcome):
 
 
 def _content(graph: Graph, path: Path) -> bytes:
-    """The graph as the end of a file's name says."""
+    """The graph in the format of the ending of a file's name."""
     match path.suffix.removeprefix("."):
         case "json":
             return json_text(graph.to_json()).encode()
@@ -90,18 +90,18 @@ def explore(
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Exploration:
-    """Return the graph of everything that a robot, or automata, may do under their supervisor.
+    """Return the graph of all states that a robot, or automata, can reach under their supervisor.
 
     Args:
-        model: The model, as `load` returns it, the path of one, a `robosc.automata.System`, or a supervisor that was
-            made of either.
+        model: The model, as `load` returns it, the path of its file, a `robosc.automata.System`, or the supervisor of
+            either.
         options: Options for making the supervisor; silent steps that never end are allowed.
-        maximum_states: States beyond which it is given up; None: 100,000.
+        maximum_states: Maximum number of states of the graph; None: 100,000.
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
 
     Raises:
-        FileAccessError: The file is not there or cannot be read.
+        FileAccessError: The file does not exist or cannot be read.
         LanguageError: A file is too large or not UTF-8.
         InvalidSystemError: The automata do not fit together.
         NodeLimitError: Decision diagrams became larger than the options allow.

@@ -1,4 +1,4 @@
-"""Files of a user, read within bounds and written whole or not at all."""
+"""Files of a user: reading is bounded, and a file is written whole or not at all."""
 
 import errno
 import os
@@ -11,14 +11,14 @@ type FileName = str | os.PathLike[str]
 
 
 class FileAccessError(RoboscError, OSError):
-    """A file or folder that is not there, or cannot be read or written."""
+    """A file or folder that does not exist, or cannot be read or written."""
 
 
 def given_path(name: FileName) -> Path:
     """A file or folder that a caller names.
 
     Raises:
-        FileAccessError: The name is empty; that is no name of the current folder.
+        FileAccessError: The name is empty, which does not mean the current folder.
     """
     text = os.fspath(name)
     if not text:
@@ -27,28 +27,28 @@ def given_path(name: FileName) -> Path:
 
 
 def read_bounded(path: Path, most: int) -> bytes:
-    """Return the bytes of a file; of one that has more than allowed, one byte too many.
+    """Return the bytes of a file; if it is too large, one byte more than allowed.
 
     Args:
         path: The file.
-        most: Bytes that are allowed.
+        most: Number of allowed bytes.
 
     Raises:
-        FileAccessError: It cannot be read.
+        FileAccessError: The file cannot be read.
     """
     try:
         with path.open("rb") as stream:
-            # One byte more than is allowed tells that there are too many; a device could go on for ever.
+            # Reading one byte more than is allowed shows that the file is too large; a device might never end.
             return stream.read(most + 1)
     except OSError as error:
         raise FileAccessError(f"cannot read {path}: {error.strerror or error}") from error
 
 
 def write_whole(path: Path, content: bytes) -> None:
-    """Write a result file whole or not at all; what is no plain file (a device, a pipe) is written to as it is.
+    """Write a result file whole or not at all; a device or pipe is written to directly.
 
     Raises:
-        FileAccessError: The place cannot be written.
+        FileAccessError: The file cannot be written.
     """
     temporary: Path | None = None
     try:
@@ -75,7 +75,7 @@ def write_whole(path: Path, content: bytes) -> None:
 
 
 def _umask() -> int:
-    """The permissions that this process takes from new files; it can only be read by setting it."""
+    """The permissions that this process removes from new files; the mask can only be read by setting it."""
     mask = os.umask(0o077)
     os.umask(mask)
     return mask

@@ -1,4 +1,4 @@
-"""Findings about a model, as a tuple that shows itself to people."""
+"""Findings about a model, as a tuple that notebooks and terminals display."""
 
 from collections.abc import Iterable
 from typing import Self
@@ -23,7 +23,7 @@ class Findings(tuple[Diagnostic, ...]):
 
         Args:
             diagnostics: The findings.
-            bundle: The texts that they are about, for the lines that they point at; None: those are not at hand.
+            bundle: The texts that the findings are about, from which their lines are shown; None if there are no texts.
         """
         made = super().__new__(cls, diagnostics)
         made._bundle = bundle
@@ -36,17 +36,17 @@ class Findings(tuple[Diagnostic, ...]):
 
     @property
     def errors(self) -> "Findings":
-        """Those that make the model unusable."""
+        """The findings that make the model unusable."""
         return self._of(Severity.ERROR)
 
     @property
     def warnings(self) -> "Findings":
-        """Those that a robot could do without."""
+        """The findings that are very likely mistakes."""
         return self._of(Severity.WARNING)
 
     @property
     def notes(self) -> "Findings":
-        """Those that are worth knowing."""
+        """The findings that are worth knowing."""
         return self._of(Severity.NOTE)
 
     def to_json(self) -> dict[str, object]:

@@ -1,4 +1,4 @@
-"""Generation of what runs a supervisor."""
+"""Generation of files that run a supervisor."""
 
 from dataclasses import replace
 
@@ -35,18 +35,18 @@ def generate(
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Generation:
-    """Generate the files of a target around a supervisor, which is made of a model unless it is given.
+    """Generate the files of a target around a supervisor; from a model, the supervisor is made first.
 
-    Nothing is written: that is `write` of the result.
+    Nothing is written before `write` of the result.
 
     Args:
-        model: A supervisor that `synthesize` has made, what `load` returns, or the path of a model. Of one that was
-            read from a file nothing is generated: some findings about its model are errors for a target. Or automata,
-            or their supervisor, for the targets c99, cif and python.
+        model: A supervisor that `synthesize` has made, a model as `load` returns it, or the path of a model; for the
+            targets c99, cif and python also automata or their supervisor. A supervisor that was read from a file is
+            refused, because some findings about its model are errors for a target.
         target: Name of the target, or `all`.
         generation: Choices about the files.
         options: Options for making the supervisor of a model.
-        initial: Description of the state in which automata begin that may begin in several, such as `tank.level = 1`.
+        initial: Description of the initial state of automata that have several, such as `tank.level = 1`.
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
 
@@ -54,8 +54,8 @@ def generate(
         UnknownTargetError: There is no such target.
         TypeError: `initial` is given for a model of a robot or for a supervisor.
         ValueError: An option is for models of robots, and the file holds automata.
-        RequestError: `initial` names what is not there.
-        FileAccessError: The file is not there or cannot be read.
+        RequestError: `initial` names something that does not exist.
+        FileAccessError: The file does not exist or cannot be read.
         LanguageError: A file is too large or not UTF-8.
         InvalidSystemError: The automata do not fit together.
         NodeLimitError: Decision diagrams became larger than the options allow.

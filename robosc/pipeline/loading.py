@@ -1,4 +1,4 @@
-"""Models that are loaded: from files, as the command line finds them, or from a text."""
+"""Loading of models: from files, which are found in the same way as on the command line, or from a text."""
 
 import os
 from collections.abc import Sequence
@@ -15,7 +15,7 @@ TEXT_NAME = "model.rscd"
 class LoadedModel(Bundle):
     """Texts of a model and of the libraries that it imports: read, not yet checked.
 
-    It is a `robosc.source.Bundle`, so whatever takes the texts of a model takes it.
+    It is a `robosc.source.Bundle`, so every function that takes the texts of a model takes it.
     """
 
     __slots__ = ()
@@ -36,7 +36,7 @@ class LoadedModel(Bundle):
         return self.main.text
 
     def _repr_markdown_(self) -> str:
-        """Return the page that `robosc doc` writes; of a text that holds no robot without errors, the text."""
+        """Return the page that `robosc doc` writes, or the text itself if it holds no robot or has errors."""
         from robosc.documentation import page
         from robosc.model.check import check
 
@@ -47,9 +47,9 @@ class LoadedModel(Bundle):
 
 
 class LoadedAutomata(LoadedModel):
-    """Text of automata (CIF, libFAUDES, Supremica), with the files that it imports: what `load` makes of such a file.
+    """Text of automata (CIF, libFAUDES, Supremica), with the files that it imports.
 
-    Its synthesis is a `SystemSynthesis`.
+    `load` returns it for such a file; its synthesis is a `SystemSynthesis`.
     """
 
     __slots__ = ()
@@ -59,7 +59,7 @@ class LoadedAutomata(LoadedModel):
 
 
 type ModelLike = Bundle | FileName
-"""A model where one is wanted: what `load` returns, or the name of a file."""
+"""Argument for a model: a loaded model, or the name of its file."""
 
 
 def load(
@@ -70,11 +70,11 @@ def load(
     library_paths: Sequence[FileName] = (),
     interface_paths: Sequence[FileName] = (),
 ) -> LoadedModel:
-    """Load a model, library or automata, with all that is imported; `check` tells what is wrong with it.
+    """Load a model, library or automata, with all imported files; `check` reports what is wrong with it.
 
-    Libraries are looked for in the model's folder, in its sibling `../shared` and in `library_paths`; those of a text
-    as if it were a file of the current folder. A name that ends in `.cif`, `.gen` or `.wmod` is that of automata, which
-    are a `LoadedAutomata`; files that a CIF model imports are found from the folder of the file that imports them.
+    Libraries are looked for in the model's folder, in its sibling `../shared` and in `library_paths`. A text without a
+    file counts as a file of the current folder. A name that ends in `.cif`, `.gen` or `.wmod` names automata, which
+    become a `LoadedAutomata`. Files that a CIF model imports are found from the folder of the importing file.
 
     Args:
         path: File of the model.
@@ -85,8 +85,8 @@ def load(
             `-I` of the command line; those of an installed ROS and around the model are always searched.
 
     Raises:
-        TypeError: Neither a file nor a text is given, or both are; or automata are to have libraries or ROS packages.
-        FileAccessError: A file or folder is not there or cannot be read.
+        TypeError: Neither a file nor a text is given, or both are; or libraries or ROS packages are given for automata.
+        FileAccessError: A file or folder does not exist or cannot be read.
         LanguageError: A file is too large or not UTF-8.
     """
     if (path is None) == (text is None):
@@ -101,10 +101,10 @@ def load(
 
 
 def loaded(model: ModelLike) -> LoadedModel:
-    """A model that a function was given, loaded if it is the name of a file.
+    """The model of an argument, which is loaded if it is the name of a file.
 
     Raises:
-        TypeError: It is neither.
+        TypeError: The argument is no model and no name.
         FileAccessError, LanguageError: As `load`.
     """
     if isinstance(model, LoadedModel):
@@ -136,10 +136,10 @@ def read_model(
         model: File of the model.
         library_paths: More folders with libraries.
         interface_paths: More folders with ROS packages.
-        text: Text of the model, which then need not be a file.
+        text: Text of the model; the file then need not exist.
 
     Raises:
-        FileAccessError: The file or a folder is not there or cannot be read.
+        FileAccessError: The file or a folder does not exist or cannot be read.
         LanguageError: A file is too large or not UTF-8.
     """
     from robosc.language import decode_source, load_bundle
@@ -175,7 +175,7 @@ def _model_path(path: FileName) -> Path:
     """The path of a model.
 
     Raises:
-        FileAccessError: It is empty, or is a model's text.
+        FileAccessError: The path is empty, or is the text of a model.
     """
     if isinstance(path, str) and ("{" in path or "\n" in path) and not Path(path).exists():
         raise FileAccessError("this is the text of a model, not the path of one: load it with robosc.load(text=...)")
@@ -188,11 +188,11 @@ def _loaded(bundle: Bundle) -> LoadedModel:
 
 
 def property_file(file: FileName | SourceFile) -> SourceFile:
-    """A file of properties, read unless it is at hand.
+    """A file of properties, which is read unless it was read already.
 
     Raises:
-        FileAccessError: It is not there or cannot be read.
-        LanguageError: It is no text.
+        FileAccessError: The file does not exist or cannot be read.
+        LanguageError: The file is no text.
     """
     from robosc.language import read_source
 

@@ -1,4 +1,4 @@
-"""Runs that somebody leads event by event: what is the same of a robot's and of automata that have no model."""
+"""Manual runs, event by event: the common part of runs of robots and of automata without a model."""
 
 from abc import ABC, abstractmethod
 from collections.abc import Collection, Iterator, Mapping
@@ -56,7 +56,7 @@ class ManualRun(ABC):
     @property
     @abstractmethod
     def is_marked(self) -> bool:
-        """True if the state counts as completed."""
+        """True if the state is marked."""
 
     @abstractmethod
     def _make_walker(self) -> Walker:
@@ -68,23 +68,23 @@ class ManualRun(ABC):
 
     @abstractmethod
     def _why_not(self, event: str) -> tuple[str, ...]:
-        """The reasons why an event cannot happen now, which it cannot."""
+        """The reasons why an event that cannot happen now cannot happen."""
 
     @abstractmethod
     def _snapshot(self) -> Any:
-        """The current state, as `_restore` takes it."""
+        """The current state, for `_restore`."""
 
     @abstractmethod
     def _restore(self, snapshot: Any) -> None:
-        """Back to a state."""
+        """Return to a state."""
 
     @abstractmethod
     def _begin(self) -> None:
-        """Back to the initial state."""
+        """Return to the initial state."""
 
     @abstractmethod
     def data_fields(self, event: str) -> tuple[DataField, ...]:
-        """The parts of the data that an event carries, which can be given with it.
+        """The parts of the data of an event that a caller can give.
 
         Raises:
             UnknownEventError: There is no such event; the message names the nearest one.
@@ -122,7 +122,7 @@ class ManualRun(ABC):
 
     @property
     def possible(self) -> tuple[str, ...]:
-        """Every event that can happen now, in source order: `enabled`, and those of the environment."""
+        """Every event that can happen now, in source order: the `enabled` ones and those of the environment."""
         return tuple(filter(self._can_happen, self._events))
 
     def is_controllable(self, event: str) -> bool:
@@ -134,7 +134,7 @@ class ManualRun(ABC):
         return self._events[self._require_event(event)]
 
     def blocked(self) -> dict[str, tuple[str, ...]]:
-        """Every event that cannot happen now, with the reasons why not, one sentence each."""
+        """Every event that cannot happen now, with the reasons, one sentence each."""
         return {event: self._why_not(event) for event in self._events if not self._can_happen(event)}
 
     def reasons(self, event: str) -> tuple[str, ...]:
@@ -146,10 +146,10 @@ class ManualRun(ABC):
         return () if self._can_happen(self._require_event(event)) else self._why_not(event)
 
     def _require_event(self, event: str) -> str:
-        """The event, which there is.
+        """Return the event if it exists.
 
         Raises:
-            UnknownEventError: There is not.
+            UnknownEventError: There is no such event.
         """
         if event not in self._events:
             raise UnknownEventError(unknown_event(event, self._events))
@@ -188,7 +188,7 @@ class ManualRun(ABC):
         return self._move(self._taken, self._undone)
 
     def redo(self) -> Step | None:
-        """Take the event again that was taken back last, and return it; None if there is none."""
+        """Take again the event that was taken back last, and return it; None if there is none."""
         return self._move(self._undone, self._taken)
 
     def _move(self, source: list[tuple[Step, Any]], target: list[tuple[Step, Any]]) -> Step | None:
@@ -200,22 +200,22 @@ class ManualRun(ABC):
         return step
 
     def restart(self) -> None:
-        """Back to the initial state, with an empty history."""
+        """Return to the initial state, with an empty history."""
         self._begin()
         self._taken.clear()
         self._undone.clear()
         self._walker.forget()
 
     def walk(self, steps: int, seed: int = 0) -> tuple[Step, ...]:
-        """Take events by chance, as an executor could in some world; ends early where nothing can happen.
+        """Take random events that an executor could take in some world; ends early if nothing can happen.
 
-        Resets and tau transitions are taken as soon as they are allowed, and nothing is requested before the first
-        message of a sensor with a `max_age`, as an executor does. Otherwise each event that can happen is as likely
-        as the others, with data that is known, and near to the numbers that the model names.
+        As in an executor, resets and tau transitions are taken as soon as they are allowed, and nothing is requested
+        before the first message of a sensor with a `max_age`. Otherwise all possible events are equally likely. Their
+        data is known, and its numbers are near to those in the model.
 
         Args:
             steps: Number of events.
-            seed: Seed of the chance: the same one leads the same way.
+            seed: Seed of the random numbers: the same seed gives the same events.
         """
         return self._walker.walk(steps, seed)
 
@@ -224,7 +224,7 @@ class ManualRun(ABC):
     ) -> WalkFinding | None:
         """Walk by chance until there is a finding, and return it; None if there was none.
 
-        What was found stays told: the next walk of this run goes on to something else.
+        Trouble that was found is not reported again: the next walk of this run looks for other trouble.
 
         Args:
             steps: Most events to take.
@@ -234,10 +234,10 @@ class ManualRun(ABC):
         return self._walker.walk_until_finding(steps, seed, kinds)
 
     def save(self, file: FileName) -> Path:
-        """Write the events so far, an event log (`.jsonl`) whose clock counts them, a second each; returns its path.
+        """Write the events so far as an event log (`.jsonl`) with one second for each event; return its path.
 
         Raises:
-            FileAccessError: The file cannot be written, or its name ends in something else.
+            FileAccessError: The file cannot be written, or its name has another ending.
         """
         path = given_path(file)
         if path.suffix != ".jsonl":
@@ -270,7 +270,7 @@ class ManualRun(ABC):
         return html_table(("", "event", "changes"), rows, caption=f"{self._name}: {self._allowed()}")
 
     def _rows(self) -> Iterator[tuple[int, tuple[str, str]]]:
-        """Yield for each step its number, the event with its data, and what it changed."""
+        """Yield for each step its number, the event with its data, and the changes of the state."""
         before = self._initial
         for number, step in enumerate(self.history, start=1):
             yield number, (event_text(step), changes_text(before, step.state))

@@ -14,14 +14,14 @@ class SynthesisOptions:
     """Options for making a supervisor.
 
     Attributes:
-        deployment: Place where the supervisor will stand.
+        deployment: Deployment of the supervisor: controller or supervision layer.
         engine: Name of the engine for decision diagrams, or `auto`, the fastest that is installed.
         allow_livelock: True if a supervisor is made even if silent steps of its controller never end.
         allow_reordering: True if the engine may change the order of its variables while it works.
-        maximum_nodes: Nodes of decision diagrams beyond which the work is given up; None: no limit of the caller's.
-        verified_states: States up to which the supervisor is verified one by one; None: 200,000.
-        condition_seconds: Seconds after which synthesis on this machine makes no further condition shorter (for each
-            module of its own); None: only steps limit it, and the same comes out every time.
+        maximum_nodes: Maximum number of nodes of decision diagrams; None: only the limit of the engine.
+        verified_states: States up to which the supervisor is verified state by state; None: 200,000.
+        condition_seconds: Seconds after which synthesis on this machine shortens no further condition, for each module
+            separately; None: only steps limit this work, and every run gives the same result.
 
     Raises:
         ValueError: There is no such deployment.
@@ -40,10 +40,10 @@ class SynthesisOptions:
         object.__setattr__(self, "deployment", Deployment(self.deployment))
 
     def engine_options(self) -> "EngineOptions":
-        """The same for the engine of this machine.
+        """The options for the engine of this machine.
 
         Raises:
-            ValueError: No diagram fits into so few nodes, or the seconds are less than none.
+            ValueError: No diagram fits into so few nodes, or the seconds are negative.
         """
         from robosc.synthesis import EngineOptions
 
@@ -57,4 +57,4 @@ class SynthesisOptions:
 DEFAULT_OPTIONS = SynthesisOptions()
 
 FOREIGN_STATES = 1_000_000
-"""States up to which a foreign supervisor is searched one by one: a minute or so at most."""
+"""States up to which an untrusted supervisor is verified state by state: about a minute at most."""

@@ -1,4 +1,4 @@
-"""Data that comes with an event: checked as a person gives it, drawn by chance, and described for a form."""
+"""Data of events: checked when a person gives it, drawn at random, and described for a form."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
@@ -33,15 +33,15 @@ from robosc.model.received import converted_paths
 from robosc.model.structure import EventKind, Model, is_tau
 
 MAXIMUM_ELEMENTS = 1000
-"""Elements of an array that is drawn by chance: what lies beyond them is unknown."""
+"""Number of elements of a random array: elements beyond it are unknown."""
 
 
 class DataError(RoboscError, ValueError):
-    """Data that an event does not carry; the message says what it carries."""
+    """Data that does not fit an event; the message says which data fits."""
 
 
 class _NoData:
-    """Placeholder for data that was not given, which is something else than None."""
+    """Placeholder for data that was not given; None means unknown data."""
 
     def __repr__(self) -> str:
         return "NO_DATA"
@@ -64,11 +64,11 @@ class DataField:
     """A part of the data that comes with an event, which a person can enter.
 
     Attributes:
-        path: Names of the properties that lead to it; empty: it is all of the data.
+        path: Names of the properties that lead to it; empty for the whole data.
         type: Its declared type, in the model's words.
-        choices: Its values by name, of an enum or boolean; empty: others.
+        choices: Names of its values, for an enum or boolean; else empty.
         is_number: True if it is a number.
-        is_read: True if something in the model depends on it.
+        is_read: True if the model reads it.
     """
 
     path: tuple[str, ...]
@@ -93,7 +93,7 @@ class DataField:
 
 
 def data_fields(model: Model, event: str) -> tuple[DataField, ...]:
-    """The parts of the data that comes with an event, in the model's order; none where it carries nothing."""
+    """The parts of the data of an event, in the model's order; none if it carries no data."""
     type_ = received_type(model, event)
     if type_ is None:
         return ()
@@ -111,7 +111,7 @@ def _fields(model: Model, type_: Type, path: tuple[str, ...], read: set[tuple[st
 
 
 def data_field(path: tuple[str, ...], type_: Type, *, is_read: bool) -> DataField:
-    """Return the part of a datum at a path, of a type that has no parts."""
+    """Return the part of a datum at a path, whose type has no parts itself."""
     match type_:
         case EnumType(values=names):
             choices = tuple(names)
@@ -123,10 +123,10 @@ def data_field(path: tuple[str, ...], type_: Type, *, is_read: bool) -> DataFiel
 
 
 def one_datum(event: str, data: object, fields: Mapping[str, object]) -> object:
-    """Return the data of an event that is given as one value or as keywords.
+    """Return the data of an event that was given as one value or as keywords.
 
     Raises:
-        DataError: It is given as both.
+        DataError: Both were given.
     """
     if fields and data is not NO_DATA:
         raise DataError(f"the data of '{event}' is given either as one value or as keywords, not as both")
@@ -134,7 +134,7 @@ def one_datum(event: str, data: object, fields: Mapping[str, object]) -> object:
 
 
 class GivenData:
-    """Checks data that a person gives by hand against the types of the model.
+    """Check of data from a person against the types of the model.
 
     Args:
         model: The model.
@@ -147,15 +147,15 @@ class GivenData:
         self._event = event
 
     def value(self, type_: Type, given: object, path: str = "value") -> object:
-        """A value as the interpreter reads it.
+        """A value in the form that the interpreter reads.
 
         Args:
             type_: Its declared type.
-            given: The value as given; None: it is unknown.
+            given: The value as it was given; None: unknown.
             path: Its place in the data, for messages.
 
         Raises:
-            DataError: It is not a value of that type.
+            DataError: The value does not have that type.
         """
         if given is None:
             return None
@@ -219,10 +219,10 @@ class GivenData:
 
 
 class RandomData:
-    """Draws data by chance that events may carry: whatever the model reads of it is known.
+    """Random data of events, in which every part that the model reads is known.
 
-    Of an enum a value is drawn, of a number one that is near to a constant of the model, since that is where
-    comparisons change.
+    For an enum, one of its values is drawn. For a number, one near to a constant of the model is drawn, because
+    comparisons change there.
 
     Args:
         model: The model.
@@ -239,13 +239,13 @@ class RandomData:
         self._length = min(max(_indices(model), default=0) + 1, MAXIMUM_ELEMENTS)
 
     def draw(self, event: str, dice: Random) -> object:
-        """Data of an event, as a person would give it; NO_DATA where the model reads none."""
+        """Data of an event, in the form that a person would give it; NO_DATA if the model reads none."""
         type_ = received_type(self._model, event)
         paths = converted_paths(self._model, event)
         return NO_DATA if type_ is None or not paths else self._draw(type_, paths, dice)
 
     def _draw(self, type_: Type, paths: Sequence[tuple[PathStep, ...]], dice: Random) -> object:
-        """A value of which the parts at some paths are known; an empty path is all of it."""
+        """A value whose parts at some paths are known; an empty path means the whole value."""
         match type_:
             case ObjectType(name=name):
                 found = {}

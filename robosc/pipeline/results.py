@@ -1,4 +1,4 @@
-"""Results of tasks, as values: the same whether this machine did them or a server."""
+"""Results of tasks as values: the same ones from this machine and from a server."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -32,9 +32,9 @@ class VerificationStatus(StrEnum):
     PASSED = "passed"
     FAILED = "failed"
     NOT_CHECKED = "not checked"
-    """No check failed, and not all were made."""
+    """No check failed, but not all checks were made."""
     PROPERTY_ERRORS = "property errors"
-    """A property cannot be understood: the diagnostics tell."""
+    """A property cannot be understood; the diagnostics say why."""
     NO_SUPERVISOR = "no supervisor"
     """The model has errors, or no supervisor exists."""
     UNSUPPORTED_MODEL = "unsupported model"
@@ -52,8 +52,8 @@ class Summary:
         controllable_events: Number of controllable events.
         uncontrollable_events: Number of uncontrollable events.
         states: Reachable states of the controlled system.
-        transitions: Transitions between them, or None where they were not counted.
-        added: Event and what the supervisor adds to it, for each controllable event.
+        transitions: Transitions between them, or None if they were not counted.
+        added: Each controllable event with the condition that the supervisor adds.
         text: The summary as `robosc synth` prints it.
     """
 
@@ -70,10 +70,10 @@ class Summary:
 
 @dataclass(frozen=True, slots=True, repr=False)
 class NoSupervisor:
-    """Explanation of why there is no supervisor of a model that has errors or cannot be handled.
+    """Explanation of why there is no supervisor for a model that has errors or is not supported.
 
     Attributes:
-        reason: Reason in one sentence; empty where the errors say it all.
+        reason: Reason in one sentence; empty if the errors are the reason.
         diagnostics: Every finding about the model.
     """
 
@@ -92,7 +92,7 @@ class NoSupervisor:
 
 
 class Outcome:
-    """Appearance of a task's result: its status, the findings and the reason; a subclass adds what was made."""
+    """Display of a task's result: its status, the findings and the reason; a subclass adds its product."""
 
     __slots__ = ()
 
@@ -101,11 +101,11 @@ class Outcome:
     reason: str
 
     def _product(self) -> object:
-        """The value that was made, or None."""
+        """The product of the task, or None."""
         return None
 
     def _why(self) -> "EmptyExplanation | None":
-        """An explanation of why nothing was made, beyond the reason; None where there is none."""
+        """An explanation, in addition to the reason, of why there is no product; None if there is none."""
         explanation: EmptyExplanation | NoSupervisor | None = getattr(self, "explanation", None)
         return None if isinstance(explanation, NoSupervisor) else explanation
 
@@ -147,10 +147,10 @@ class Generation(Outcome):
     Attributes:
         status: Outcome of the synthesis.
         diagnostics: Every finding about the model, sorted by place.
-        reason: Reason why there are no files, in one sentence; empty where there are.
-        files: The files, or None where there are none.
-        explanation: Explanation of why no supervisor exists, or None where there is nothing to explain.
-        target: Target that was asked for; empty where that is not known.
+        reason: Reason why there are no files, in one sentence; empty if there are files.
+        files: The files, or None.
+        explanation: Explanation of why no supervisor exists, or None.
+        target: The requested target; empty if it is not known.
     """
 
     status: SynthesisStatus
@@ -164,12 +164,12 @@ class Generation(Outcome):
         """Write the files into a folder, as `robosc generate` does.
 
         Args:
-            folder: The folder; it is made if it is not there.
-            force: True if files are replaced even where somebody has changed them.
+            folder: The folder; it is created if it does not exist.
+            force: True if files that a user has changed are replaced, too.
 
         Raises:
             NothingGeneratedError: There are no files.
-            OverwriteError: Writing would lose something of the user's, or the folder cannot be written.
+            OverwriteError: Writing would overwrite a user's changes, or the folder cannot be written.
         """
         if self.files is None:
             raise NothingGeneratedError(f"nothing was generated: {self.reason or self.status}")
@@ -188,8 +188,8 @@ class Explained(Outcome):
     Attributes:
         status: Outcome of the synthesis.
         diagnostics: Every finding about the model, sorted by place.
-        reason: Reason why there is no explanation, in one sentence; empty where there is one.
-        explanation: The explanation; of a model that has errors or cannot be handled, what says so.
+        reason: Reason why there is no explanation, in one sentence; empty if there is one.
+        explanation: The explanation; a `NoSupervisor` if the model has errors or is not supported.
     """
 
     status: SynthesisStatus
@@ -208,9 +208,9 @@ class Verification(Outcome):
     Attributes:
         status: Outcome of the verification.
         diagnostics: Every finding about the model or the properties, sorted by place.
-        reason: Reason why there is no verdict, in one sentence; empty where there is one.
+        reason: Reason why there is no verdict, in one sentence; empty if there is one.
         report: Output of `robosc verify --json`, as values.
-        text: Output of `robosc verify` for people; empty where only the report is at hand.
+        text: Output of `robosc verify` for people; empty if only the report is known.
     """
 
     status: VerificationStatus
@@ -221,12 +221,12 @@ class Verification(Outcome):
 
     @property
     def passed(self) -> bool:
-        """True if everything that was asked holds for certain."""
+        """True if every property holds and every check passed."""
         return self.status is VerificationStatus.PASSED
 
     @property
     def holds(self) -> tuple[bool, ...]:
-        """The verdict on each property, in their order; empty where no properties were verified."""
+        """The verdict on each property, in their order; empty if no properties were verified."""
         return tuple(bool(item["holds"]) for item in self.report.get("properties", ()))
 
     def __repr__(self) -> str:

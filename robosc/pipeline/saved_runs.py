@@ -1,4 +1,4 @@
-"""Runs that are kept: as an event log, and as a test for pytest that leads a run the same way."""
+"""Saved runs: as an event log, and as a test for pytest that takes the same events."""
 
 import math
 import os
@@ -21,7 +21,7 @@ _WIDTH = 112
 
 @dataclass(frozen=True, slots=True)
 class ModelOfTest:
-    """A model, or a supervisor's file, as a test loads it.
+    """A model, or a supervisor's file, that a test loads.
 
     Attributes:
         path: Its file.
@@ -72,11 +72,11 @@ def event_log(steps: Iterable[Step]) -> str:
 
 
 def entries_of(step: Step, number: int) -> Iterator[dict[str, Any]]:
-    """Yield the entries of an event log that tell a step.
+    """Yield the entries of an event log that record a step.
 
     Args:
         step: The step.
-        number: Its number in the run, from 1, which is its time in seconds, too.
+        number: Its number in the run, from 1, which is also its time in seconds.
     """
     values = step.provided if step.is_controllable else dict(step.data)
     if step.unknown:
@@ -95,7 +95,7 @@ def entries_of(step: Step, number: int) -> Iterator[dict[str, Any]]:
 
 
 def state_by_component(state: StateInWords) -> dict[str, dict[str, Any]]:
-    """The state and variables of each component with a behaviour, as event logs and executors tell them."""
+    """The state and variables of each component with a behaviour, in the form of event logs and executors."""
     found: dict[str, dict[str, Any]] = {
         name: {"state": place, "variables": {}} for name, place in state.components.items()
     }
@@ -150,7 +150,7 @@ def pytest_module(run: ReplayableRun, model: ModelOfTest, file: Path) -> str:
     Args:
         run: The run.
         model: The model that the test loads.
-        file: File that the test will stand in: the model is named as seen from there.
+        file: File of the test: the path of the model is relative to it.
     """
     again = run.again()
     enabled, state = again.enabled, again.initial.parts
@@ -190,7 +190,7 @@ def _is_same(a: object, b: object) -> bool:
 
 
 def _plain(given: Any) -> Any:
-    """Data as literals of Python; ... where none was given."""
+    """Data as literals of Python; `...` if none was given."""
     if given is NO_DATA:
         return ...
     if isinstance(given, Mapping):
@@ -202,7 +202,7 @@ def _plain(given: Any) -> Any:
 
 
 class _Text(str):
-    """A number that Python has no literal for, as the expression that stands for it."""
+    """A number without a literal in Python, as an expression."""
 
     def __repr__(self) -> str:
         return str(self)

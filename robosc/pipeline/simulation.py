@@ -1,7 +1,7 @@
-"""Simulation by hand: a supervisor's controlled system, event by event, on the reference interpreter.
+"""Manual simulation: a supervisor's controlled system, event by event, on the reference interpreter.
 
-Whoever simulates plays the robot and the executor: uncontrollable events come with data as the model sees it, and
-controllable ones are taken where they are allowed.
+The user takes the part of the robot and of the executor: uncontrollable events carry data in the form of the model, and
+controllable events are taken only if they are allowed.
 """
 
 from collections.abc import Iterator, Mapping
@@ -79,14 +79,14 @@ class Run(ManualRun):
 
     @property
     def is_marked(self) -> bool:
-        """True if the state counts as completed: every component, service and action is in a marked location."""
+        """True if the state is marked: every component, service and action is in a marked location."""
         state = self.state
         places = {**state.components, **state.communications}
         return all(place in self._marked[name] for name, place in places.items())
 
     @property
     def state(self) -> StateInWords:
-        """The current state: of components with all their variables, of services and of actions."""
+        """The current state of components, with all their variables, of services and of actions."""
         found = self._system.state()
         return StateInWords(
             components={name: str(values["state"]) for name, values in found.items()},
@@ -99,7 +99,7 @@ class Run(ManualRun):
         )
 
     def event_called(self, name: str) -> str:
-        """The event that a name stands for: itself, or of a message, service or action its first one.
+        """The event of a name: the event itself, or the first event of a message, service or action.
 
         Raises:
             UnknownEventError: There is no such event; the message names the nearest one.
@@ -110,7 +110,7 @@ class Run(ManualRun):
         return first.get(name, name)
 
     def data_fields(self, event: str) -> tuple[DataField, ...]:
-        """The parts of the data that an event carries, which can be given with it.
+        """The parts of the data of an event that a caller can give.
 
         Raises:
             UnknownEventError: There is no such event; the message names the nearest one.
@@ -123,7 +123,7 @@ class Run(ManualRun):
         return {name: self._system.location(name) for name in self._calls}
 
     def blocked(self) -> dict[str, tuple[str, ...]]:
-        """Every event that cannot happen now, with the reasons why not, one sentence each."""
+        """Every event that cannot happen now, with the reasons, one sentence each."""
         blocked = self._requests.availability(self._system.state(), self.locations).blocked
         found = {item.event: item.why for item in blocked}
         return {
@@ -133,11 +133,12 @@ class Run(ManualRun):
         }
 
     def step(self, event: str, data: object = NO_DATA, /, **fields: object) -> Step:
-        """Take an event; where that is not possible, nothing changes.
+        """Take an event; if that is not possible, nothing changes.
 
-        Data is what the event carries as the model declares it: a value, or the properties of an object as keywords or
-        as a mapping. What is left out is unknown, as it would be to the robot. Of an enum either one of its values is
-        given, or what it is made of: then its rules decide. A text that names a value is that value.
+        The data has the type that the model declares: it is a value, or the properties of an object, as keywords or as
+        a mapping. A property that is left out is unknown, as it would be to the robot. For an enum, give one of its
+        values, or a value of its source type, which its rules convert. A text that names a value of the enum is that
+        value.
 
         Args:
             event: The event, such as `scan.response` or `move.request`.
@@ -146,8 +147,8 @@ class Run(ManualRun):
 
         Raises:
             UnknownEventError: There is no such event; the message names the nearest one.
-            EventNotPossibleError: It cannot happen in the current state; the message says why.
-            DataError: It does not carry such data.
+            EventNotPossibleError: The event cannot happen in the current state; the message says why.
+            DataError: The event does not carry such data.
         """
         self._require_event(event)
         given = one_datum(event, data, fields)
@@ -171,17 +172,17 @@ class Run(ManualRun):
         return Run(self._supervisor)
 
     def save(self, file: FileName, model: ModelOfTest | None = None) -> Path:
-        """Write the events so far, an event log (`.jsonl`) or a test for pytest (`.py`); returns the file's path.
+        """Write the events so far as an event log (`.jsonl`) or a test for pytest (`.py`); return the file's path.
 
-        The log's clock counts the events, a second each. The test leads a run through the same events, and compares
-        what is enabled and the state after each.
+        The log has one second for each event. The test takes the same events, and compares the enabled events and the
+        state after each one.
 
         Args:
             file: File to write.
-            model: Model that the test is to load; needed for a test alone.
+            model: Model that the test loads; needed only for a test.
 
         Raises:
-            FileAccessError: The file cannot be written, or its name ends in something else.
+            FileAccessError: The file cannot be written, or its name has another ending.
         """
         path = given_path(file)
         if model is None or path.suffix == ".jsonl":
@@ -213,7 +214,7 @@ class Run(ManualRun):
         return ModelWalker(self, self._system, self._model, RandomData(self._model))
 
     def _reading(self, event: str, data: object) -> Reading | None:
-        """The data of an event as the model sees it; None of an event that carries none.
+        """The data of an event in the form of the model; None if the event carries none.
 
         Raises:
             DataError: The event does not carry such data.
@@ -227,7 +228,7 @@ class Run(ManualRun):
         return self._system.read(event, raw)
 
     def _explained(self, event: str) -> Iterator[str]:
-        """Yield the reasons why an event that is no request cannot happen."""
+        """Yield the reasons why an event other than a request cannot happen."""
         found = self._supervisor.executable.events[event]
         if found.moves is not None:
             name = event.partition(".")[0]
@@ -287,7 +288,7 @@ class ModelWalker(Walker):
                 yield event
 
     def _is_deaf(self) -> bool:
-        """Return True if a sensor with a `max_age` has told nothing yet."""
+        """Return True if a sensor with a `max_age` has sent no message yet."""
         silent = set(self._sensors)
         for step in self._run.history if silent else ():
             silent.discard(self._identifiers.get(step.event, ""))
@@ -335,19 +336,18 @@ def simulate(supervisor: SupervisorLike) -> Run: ...
 def simulate(
     supervisor: SupervisorLike | SystemSupervisor, *, initial: Mapping[str, Value] | None = None
 ) -> Run | SystemRun:
-    """Return a run of the system that a supervisor controls, to be stepped by hand.
+    """Return a run of the system that a supervisor controls, for manual steps.
 
     Args:
-        supervisor: A supervisor that was made, of a model or of automata; of a model also the path of its file or its
-            bytes.
-        initial: Parts of the state in which automata begin that may begin in several, such as `{"Machine": "idle"}`;
-            None: there is one.
+        supervisor: Supervisor of a model or of automata; for a model also the path of its file, or the file's bytes.
+        initial: Parts of the initial state, for automata with several initial states, such as `{"Machine": "idle"}`;
+            None if there is only one.
 
     Raises:
         FileAccessError: The file cannot be read.
-        InvalidSupervisorError: It is no supervisor.
-        ChoiceError: The automata may begin in several states, or in none of those that are asked for.
-        TypeError: It is no supervisor at all, or the beginning of a model is asked for, which has one.
+        InvalidSupervisorError: The file holds no supervisor.
+        ChoiceError: The automata have several initial states, or none that `initial` describes.
+        TypeError: The argument is no supervisor, or `initial` is given for a model, which has one initial state.
     """
     if isinstance(supervisor, SystemSupervisor):
         return SystemRun(supervisor, initial)

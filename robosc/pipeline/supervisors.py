@@ -1,4 +1,4 @@
-"""Supervisors as the Python API gives them: the value of the core, which also shows itself to people."""
+"""Supervisors of the Python API: the value of the core, with a display for notebooks and terminals."""
 
 import os
 from functools import cached_property
@@ -31,7 +31,7 @@ class Supervisor(CoreSupervisor, frozen=True, dict=True):
 
     @classmethod
     def of(cls, supervisor: CoreSupervisor, diagnostics: tuple[Diagnostic, ...] | None = None) -> Self:
-        """Take a supervisor of the core, with the findings about its model; None: they are not known."""
+        """Take a supervisor of the core, with the findings about its model, or None if they are not known."""
         made = cls.supervising(supervisor.executable, supervisor.added, supervisor.certificate)
         # No field: a supervisor's file does not hold them.
         made.__dict__["diagnostics"] = None if diagnostics is None else Findings(diagnostics)
@@ -43,7 +43,7 @@ class Supervisor(CoreSupervisor, frozen=True, dict=True):
 
         Raises:
             FileAccessError: The file cannot be read.
-            InvalidSupervisorError: It is no supervisor.
+            InvalidSupervisorError: The file holds no supervisor.
         """
         return cls.of(decode(read_bounded(given_path(file), MAXIMUM_BYTES)))
 
@@ -51,7 +51,7 @@ class Supervisor(CoreSupervisor, frozen=True, dict=True):
         """Write the supervisor's file (`.rsup`), whole or not at all, and return its path.
 
         Raises:
-            FileAccessError: The place cannot be written.
+            FileAccessError: The file cannot be written.
             UnsupportedModelError: The file would become too large, or an expression is nested too deeply.
         """
         path = given_path(file)
@@ -64,7 +64,7 @@ class Supervisor(CoreSupervisor, frozen=True, dict=True):
 
     @cached_property
     def diagnostics(self) -> Findings | None:
-        """The findings about its model; None if they are not known, as of a supervisor that was read from a file."""
+        """The findings about its model; None if they are not known, as for a supervisor that was read from a file."""
         return None
 
     @cached_property
@@ -74,7 +74,7 @@ class Supervisor(CoreSupervisor, frozen=True, dict=True):
 
     @cached_property
     def conditions(self) -> Conditions:
-        """For each controllable event what it adds, in the model's words."""
+        """Conditions that it adds to each controllable event, in the model's words."""
         components = frozenset(item.name for item in self.model.components)
         return conditions_of(self.added, self.system, components)
 
@@ -85,7 +85,7 @@ class Supervisor(CoreSupervisor, frozen=True, dict=True):
 
     @property
     def transitions(self) -> int | None:
-        """Transitions between them; None where they were not counted."""
+        """Transitions between them; None if they were not counted."""
         return None if self.certificate.transitions is None else int(self.certificate.transitions)
 
     @cached_property
@@ -127,16 +127,16 @@ def _restored(
 
 
 type SupervisorLike = CoreSupervisor | bytes | FileName
-"""A supervisor where one is wanted: itself, the content of its file as a server sends it, or the file's name."""
+"""Argument for a supervisor: the value itself, the content of its file as a server sends it, or the file's name."""
 
 
 def supervisor_of(given: SupervisorLike) -> Supervisor:
-    """A supervisor that a function was given, read if it is a file or its content.
+    """The supervisor of an argument, which is read if it is a file's name or content.
 
     Raises:
-        TypeError: It is none of these.
+        TypeError: The argument is none of these.
         FileAccessError: The file cannot be read.
-        InvalidSupervisorError: It is no supervisor.
+        InvalidSupervisorError: The file holds no supervisor.
     """
     if isinstance(given, Supervisor):
         return given

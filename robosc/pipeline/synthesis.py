@@ -1,4 +1,4 @@
-"""Synthesis of supervisors, of models and of automata."""
+"""Synthesis of supervisors for models and for automata."""
 
 from dataclasses import dataclass
 from typing import Literal, overload
@@ -27,11 +27,11 @@ class Synthesis(Outcome):
     Attributes:
         status: Outcome of the synthesis.
         diagnostics: Every finding about the model, sorted by place.
-        reason: Reason why there is no supervisor, in one sentence; empty where there is one, or where the findings
-            say it.
+        reason: Reason why there is no supervisor, in one sentence; empty if there is one, or if the findings are the
+            reason.
         supervisor: The supervisor, or None.
-        statistics: Figures of the work, or None where there was no synthesis.
-        explanation: Explanation of why there is no supervisor; None where there is one.
+        statistics: Figures of the work, or None if there was no synthesis.
+        explanation: Explanation of why there is no supervisor; None if there is one.
     """
 
     status: SynthesisStatus
@@ -43,7 +43,7 @@ class Synthesis(Outcome):
 
     @property
     def summary(self) -> Summary | None:
-        """The supervisor in figures and words, or None where there is none."""
+        """The supervisor in figures and words, or None if there is no supervisor."""
         return None if self.supervisor is None else self.supervisor.summary
 
     def _product(self) -> object:
@@ -62,7 +62,7 @@ def synthesize(  # type: ignore[overload-overlap]
 ) -> SystemSynthesis: ...
 
 
-# The name of a file alone tells no type checker what is in it; modules are of automata.
+# A type checker cannot know from a file's name what is in it. Modules are made of automata only.
 @overload
 def synthesize(
     model: ModelLike,
@@ -92,20 +92,20 @@ def synthesize(
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Synthesis | SystemSynthesis:
-    """Synthesize, verify and certify the supervisor of a model, or synthesize that of automata.
+    """Synthesize, verify and certify the supervisor of a model, or synthesize the supervisor of automata.
 
     Args:
-        model: The model, as `load` returns it, the path of one, or a `robosc.automata.System`.
-        options: Options for making the supervisor. For automata, those about the engine.
-        is_modular: True if automata are to be synthesized in modules: for systems of many parts, of which one diagram
-            cannot hold the states.
+        model: The model, as `load` returns it, the path of its file, or a `robosc.automata.System`.
+        options: Options for making the supervisor; for automata only those about the engine.
+        is_modular: True if automata are synthesized in modules: for systems of many parts whose states do not fit into
+            one diagram.
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
 
     Raises:
         TypeError: `is_modular` is given for a model of a robot.
         ValueError: An option is for models of robots, and the file holds automata.
-        FileAccessError: The file is not there or cannot be read.
+        FileAccessError: The file does not exist or cannot be read.
         LanguageError: A file is too large or not UTF-8.
         InvalidSystemError: The automata do not fit together.
         NodeLimitError: Decision diagrams became larger than the options allow.
@@ -123,12 +123,12 @@ def synthesize(
 
 @dataclass(frozen=True, slots=True)
 class Unsupported:
-    """Attempt at a model that is correct, but cannot be handled.
+    """Outcome for a model that is correct, but not supported.
 
     The error itself is not kept: its frames would hold predicates of an engine that has ended.
 
     Attributes:
-        reason: Reason why not.
+        reason: Reason why it is not supported.
     """
 
     reason: str
@@ -145,7 +145,7 @@ def make(
     *,
     allow_livelock: bool,
 ) -> Attempt:
-    """Make a supervisor as the options say."""
+    """Make a supervisor with some options."""
     states = options.verified_states
     try:
         return make_supervisor(
@@ -162,7 +162,7 @@ def make(
 
 
 def findings_of(attempt: Attempt, bundle: LoadedModel) -> Findings:
-    """Return the findings about a model of which a supervisor was to be made."""
+    """Return the findings about the model of an attempted synthesis."""
     found: tuple[Diagnostic, ...] = (
         attempt.diagnostics if isinstance(attempt, SynthesisOutcome) else check(bundle).diagnostics
     )
@@ -170,14 +170,14 @@ def findings_of(attempt: Attempt, bundle: LoadedModel) -> Findings:
 
 
 def status_of(attempt: Attempt) -> tuple[SynthesisStatus, str]:
-    """Return how an attempt to make a supervisor has ended, and the reason why there is none."""
+    """Return the status of an attempted synthesis, and the reason why there is no supervisor."""
     if isinstance(attempt, SynthesisOutcome):
         return SynthesisStatus(str(attempt.status)), attempt.reason
     return SynthesisStatus.UNSUPPORTED_MODEL, attempt.reason
 
 
 def why_not(attempt: Attempt, diagnostics: Findings) -> EmptyExplanation | NoSupervisor:
-    """Return the explanation of why an attempt has not made a supervisor."""
+    """Return the explanation of why an attempted synthesis has no supervisor."""
     if isinstance(attempt, SynthesisOutcome) and attempt.explanation is not None:
         return attempt.explanation
     _, reason = status_of(attempt)

@@ -1,7 +1,8 @@
-"""Simulation by hand of automata under their supervisor, on their explicit meaning (`robosc.automata.Semantics`).
+"""Manual simulation of automata under their supervisor, on their explicit semantics (`robosc.automata.Semantics`).
 
-Automata may leave open what happens: an uncontrollable event may have several edges, received data any value, and there
-may be several ways to begin. Nothing is chosen in silence: who leads the run says which, or is told the ways there are.
+Automata may be nondeterministic: an uncontrollable event may have several edges, received data may have any value, and
+there may be several initial states. The run never chooses by itself: its caller chooses, or gets an error that lists
+the choices.
 """
 
 from collections.abc import Iterable, Mapping, Sequence
@@ -30,18 +31,18 @@ from robosc.pipeline.walking import Walker, WalkFinding, WalkFindingKind
 from robosc.supervisor.predicates import state_predicates
 
 _MAXIMUM_WAYS = 4
-"""States that an error lists."""
+"""Maximum number of states that an error lists."""
 
 _MAXIMUM_VALUES = 8
-"""Values that an error lists."""
+"""Maximum number of values that an error lists."""
 
 
 class ChoiceError(RoboscError, ValueError):
-    """Automata that leave open what happens: several states are possible, or none of those that were asked for.
+    """An open choice in automata: several states are possible, or no possible state fits the given parts.
 
     Attributes:
-        problem: Choice that is open, without a way to make it.
-        example: Parts that choose one of several states; empty where there is none.
+        problem: Description of the choice, without the way to make it.
+        example: Parts that choose one of several states; empty if there is none.
     """
 
     def __init__(self, problem: str, example: Mapping[str, Value] | None = None, keyword: str = "") -> None:
@@ -52,11 +53,11 @@ class ChoiceError(RoboscError, ValueError):
 
 
 def state_parts(system: System, text: str) -> dict[str, Value]:
-    """The parts of a state that a text tells, such as `Buffer = full, Buffer.count = 2`.
+    """The parts of a state that a text names, such as `Buffer = full, Buffer.count = 2`.
 
     Raises:
         UnknownNameError: There is no such part; the message names the nearest one.
-        ChoiceError: A part has no such value, or the text tells none.
+        ChoiceError: A part has no such value, or the text gives none.
     """
     found: dict[str, Value] = {}
     known = {str(subject): subject for subject in subjects(system)}
@@ -73,10 +74,10 @@ def state_parts(system: System, text: str) -> dict[str, Value]:
 
 
 def initial_states_in_words(supervisor: SystemSupervisor) -> tuple[StateInWords, ...]:
-    """The states that automata under their supervisor may begin in, in the order of their values.
+    """The initial states of automata under their supervisor, in the order of their values.
 
     Raises:
-        UnsupportedModelError: They are too many to go through them.
+        UnsupportedModelError: There are too many to enumerate.
     """
     semantics = Semantics(supervisor.system)
     return tuple(state_in_words(supervisor.system, None, state) for state in _initial_states(semantics, supervisor))
@@ -92,11 +93,11 @@ def _initial_states(semantics: Semantics, supervisor: SystemSupervisor) -> list[
 class SystemRun(ManualRun):
     """A run of automata under their supervisor.
 
-    In its states, `components` has the location of each automaton, and `communications` nothing.
+    In its states, `components` has the location of each automaton, and `communications` is empty.
 
     Args:
         supervisor: Supervisor of the automata.
-        initial: Parts of the state to begin in; None: there is one.
+        initial: Parts of the initial state; None if there is only one.
     """
 
     def __init__(self, supervisor: SystemSupervisor, initial: Mapping[str, Value] | None = None) -> None:
@@ -125,11 +126,11 @@ class SystemRun(ManualRun):
 
     @property
     def is_marked(self) -> bool:
-        """True if the state counts as completed: every automaton is marked, and the marker condition is true."""
+        """True if the state is marked: every automaton is in a marked location, and the marker condition is true."""
         return self._semantics.is_marked(self._now)
 
     def data_fields(self, event: str) -> tuple[DataField, ...]:
-        """The parts of the data that an event carries, which can be given with it.
+        """The parts of the data of an event that a caller can give.
 
         Raises:
             UnknownEventError: There is no such event; the message names the nearest one.
@@ -154,23 +155,23 @@ class SystemRun(ManualRun):
     def step(
         self, event: str, data: object = NO_DATA, /, *, to: Mapping[str, Value] | None = None, **fields: object
     ) -> Step:
-        """Take an event; where that is not possible, nothing changes.
+        """Take an event; if that is not possible, nothing changes.
 
-        What is left out of the data may have any value; None is unknown. An event that can lead to several states is
-        told which by its data, or by parts of the state it is to lead to.
+        Data that is left out may have any value; None means unknown. If the event can lead to several states, its data
+        or parts of the target state choose one of them.
 
         Args:
             event: The event.
-            data: Data that it carries: one value, or a mapping of what it consists of.
+            data: Data that it carries: one value, or a mapping of its parts.
             to: Parts of the state that it leads to, such as `{"Buffer": "full", "Buffer.count": 2}`.
             fields: Parts of the data, instead of `data`.
 
         Raises:
             UnknownEventError: There is no such event; the message names the nearest one.
             UnknownNameError: The state has no such part; the message names the nearest one.
-            EventNotPossibleError: It cannot happen in the current state; the message says why.
-            ChoiceError: It can lead to several such states, or to none.
-            DataError: It does not carry such data.
+            EventNotPossibleError: The event cannot happen in the current state; the message says why.
+            ChoiceError: The event can lead to several such states, or to none.
+            DataError: The event does not carry such data.
         """
         self._require_event(event)
         given = one_datum(event, data, fields)
@@ -243,7 +244,7 @@ class SystemRun(ManualRun):
         raise ChoiceError(f"{what} can {verb} {len(found)} states: {offered}", example, keyword)
 
     def _alternatives(self, states: Sequence[State]) -> str:
-        """States by what tells them apart; of very many the first."""
+        """Text that lists states by the values in which they differ; the first ones if there are very many."""
         places = _varying(states) if len(states) > 1 else range(len(self._subjects))
         offered = [
             ", ".join(f"{self._subjects[place]} = {value_text(state[place])}" for place in places)
@@ -254,7 +255,7 @@ class SystemRun(ManualRun):
     # Data
 
     def _given(self, event: str, data: object) -> dict[Path, Value | None]:
-        """The data of an event by its path; what is left out is not in it.
+        """The given data of an event, by path.
 
         Raises:
             DataError: The event does not carry such data.
@@ -273,7 +274,7 @@ class SystemRun(ManualRun):
 def _read(
     event: str, inputs: Mapping[Path, InputVariable], path: Path, data: Any, found: dict[Path, Value | None]
 ) -> None:
-    """Put data, which belongs to a path, where it belongs."""
+    """Put data at its path."""
     place = f"{expression_text(Received(path))} of '{event}'"
     if path in inputs:
         type_ = inputs[path].type
@@ -316,7 +317,7 @@ def _varying(states: Sequence[State]) -> list[int]:
 
 
 class _SystemWalker(Walker):
-    """Walker of automata: each event that can happen is as likely as the others, and so is each state it leads to."""
+    """Walker of automata: all possible events are equally likely, and so are all target states of an event."""
 
     def __init__(self, run: SystemRun) -> None:
         super().__init__(run)

@@ -1,4 +1,4 @@
-"""The core's second door: supervisors of automata that a program has built, without a RoboSC text."""
+"""Supervisors of automata that a program has built, without a RoboSC text."""
 
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
@@ -37,25 +37,25 @@ if TYPE_CHECKING:
     from robosc.verification import Limits, VerificationReport
 
 _MISCOUNT = "states"
-"""Fault of a supervisor that reports more or fewer states than there are."""
+"""Name of the check that fails if a supervisor states a wrong number of states."""
 
 _CHECKS = ("safe", "controllable", "nonblocking", "maximally_permissive")
 MAXIMUM_NAMES = 20
-"""Automata of a module without a supervisor that are named."""
+"""Maximum number of automata that are named for a module without a supervisor."""
 
 INITIALLY = "the initial state"
-"""Name of what a condition is about that is about no event."""
+"""Name in place of an event, for the condition on initial states."""
 
 
 @dataclass(frozen=True, slots=True)
 class SupervisedModule:
-    """A module of automata that were synthesized in modules: it is safe, controllable and nonblocking by itself.
+    """A module of a modular synthesis of automata: it is safe, controllable and nonblocking by itself.
 
     Attributes:
         automata: Names of its automata.
         states: Reachable states under the module's own supervisor.
-        group: Number of its group: modules of different groups share nothing, and those of one group were found not to
-            block each other.
+        group: Number of its group: modules of different groups share nothing, and modules of one group do not block
+            each other.
     """
 
     automata: tuple[str, ...]
@@ -70,9 +70,9 @@ class SystemSupervisor:
     Attributes:
         system: The automata that it supervises.
         added: Decision diagrams that it adds to events; `conditions` has them in words.
-        initial: Condition on the initial states in which it lets the system begin; None if in all.
-        statistics: Figures of the synthesis; of one in modules the sums, or largest, of those of the modules.
-        modules: Modules of a synthesis in modules; else none.
+        initial: Condition on the initial states that it allows; None if it allows all.
+        statistics: Figures of the synthesis; for a modular one the sums or maxima over the modules.
+        modules: Modules of a modular synthesis; else none.
     """
 
     system: System
@@ -83,19 +83,19 @@ class SystemSupervisor:
 
     @cached_property
     def conditions(self) -> Conditions:
-        """For each controllable event what it adds, in words."""
+        """Conditions that it adds to each controllable event, in words."""
         return conditions_of(self.added, self.system, whole_names(self.system))
 
     @property
     def initial_condition(self) -> Condition | None:
-        """Condition on the initial states in words; None where the system may begin in all of them."""
+        """Condition on the initial states in words; None if all of them are allowed."""
         if self.initial is None:
             return None
         formula = Formulas(diagram_domains(self.system)).formula(self.initial)
         return condition_of(INITIALLY, self.initial, formula, self.system, whole_names(self.system))
 
     def may_begin(self, state: State) -> bool:
-        """Return True if the system may begin in a state, one of its initial ones, in the order of `subjects`."""
+        """Return True if it allows an initial state, given by its values in the order of `subjects`."""
         return self._may_begin is None or self._may_begin(state)
 
     @cached_property
@@ -104,7 +104,7 @@ class SystemSupervisor:
 
     @property
     def states(self) -> int:
-        """Reachable states of the controlled system; 0 where modules share something, whose states nobody counts."""
+        """Reachable states of the controlled system; 0 if modules share something: these states are not counted."""
         return self.statistics.states
 
     @property
@@ -119,7 +119,7 @@ class SystemSupervisor:
 
         Raises:
             FileAccessError: The file cannot be read.
-            InvalidSupervisorError: It is not a supervisor of automata.
+            InvalidSupervisorError: The file holds no supervisor of automata.
         """
         return decode_system(read_bounded(given_path(file), MAXIMUM_BYTES))
 
@@ -127,7 +127,7 @@ class SystemSupervisor:
         """Write the supervisor's file (`.rsup`) with the automata, whole or not at all, and return its path.
 
         Raises:
-            FileAccessError: The place cannot be written.
+            FileAccessError: The file cannot be written.
             UnsupportedModelError: The file would become too large, or an expression is nested too deeply.
         """
         path = given_path(file)
@@ -179,10 +179,10 @@ _DECODER = msgspec.json.Decoder(_Document, strict=True)
 
 
 def decode_system(data: bytes) -> SystemSupervisor:
-    """The supervisor of automata in a file's bytes, consistent in itself; it is not verified here.
+    """The supervisor of automata in a file's bytes; it is checked for consistency, but not verified.
 
     Raises:
-        InvalidSupervisorError: The bytes are no supervisor of automata; says where in one sentence.
+        InvalidSupervisorError: The bytes are no supervisor of automata; the message names the place.
     """
     supervisor = decode_document(data, _DECODER).system_supervisor
     try:
@@ -209,11 +209,11 @@ class SystemSynthesis(Outcome):
 
     Attributes:
         status: Outcome of the synthesis.
-        reason: Reason why there is no supervisor; empty where there is one.
+        reason: Reason why there is no supervisor; empty if there is one.
         supervisor: The supervisor, or None.
-        statistics: Figures of the work; None where the automata cannot be handled.
-        diagnostics: Every finding about the file of the automata, sorted by place; empty where there is no file.
-        explanation: Explanation of why there is no supervisor, or None where there is one.
+        statistics: Figures of the work; None if the automata are not supported.
+        diagnostics: Every finding about the file of the automata, sorted by place; empty if there is no file.
+        explanation: Explanation of why there is no supervisor, or None if there is one.
     """
 
     status: SynthesisStatus
@@ -244,7 +244,7 @@ def synthesize_system(
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
         places: Places of the parts of the automata, for the explanation.
-        is_modular: True if it is to be synthesized in modules.
+        is_modular: True for a modular synthesis.
     """
     check_system(system)
     if is_modular:
@@ -351,7 +351,7 @@ def verify_system(
     *,
     is_strict: bool,
 ) -> Verification:
-    """Verify independently that a supervisor of automata is right."""
+    """Verify a supervisor of automata independently of its synthesis."""
     from robosc.verification import CheckOutcome
 
     verified = _verified(supervisor, options, limits, on_progress, should_stop)
@@ -361,7 +361,7 @@ def verify_system(
     # The figure in a file is not believed either; that of a wrong supervisor says nothing more.
     stated, counted = supervisor.states, found.states
     is_miscounted = stated > 0 and counted not in (None, stated) and not found.failures
-    miscount = f"it tells of {stated}, and there are {counted}" if is_miscounted else ""
+    miscount = f"it states {stated}, and there are {counted}" if is_miscounted else ""
     status = (
         VerificationStatus.FAILED
         if found.failures or miscount
@@ -394,7 +394,7 @@ def verify_system(
 
 
 def system_summary_text(supervisor: SystemSupervisor) -> str:
-    """Return the supervisor of automata for people, as `robosc synth` prints it."""
+    """Return the summary of a supervisor of automata, as `robosc synth` prints it."""
     initial = supervisor.initial_condition
     stated = str(supervisor) if initial is None else f"{supervisor}\nit begins only where {initial}"
     # Names of plain automata may be anything.
@@ -402,7 +402,7 @@ def system_summary_text(supervisor: SystemSupervisor) -> str:
 
 
 def system_verification_text(report: Mapping[str, Any]) -> str:
-    """Return the report about a verified supervisor of automata, for people."""
+    """Return the report on the verification of a supervisor of automata, as text."""
     lines = [f"{report['system']}: {report['status']}"]
     lines += [f"  {name.replace('_', ' '):<21} {outcome}" for name, outcome in report["checks"].items()]
     lines.append(f"  {'method':<21} {report['method']}")

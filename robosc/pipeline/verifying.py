@@ -81,18 +81,17 @@ def verify(
 ) -> Verification:
     """Verify properties of the robot under its supervisor, or check a supervisor against its model.
 
-    With `supervisor`, that is checked first, and nothing that it says of itself is believed; the properties are
-    verified if it has passed. Without, the supervisor is made of the model, or is the one given as `model`; if there
-    are no properties either, it is checked against its model. A supervisor of automata, which is made of them unless
-    it is given, is checked against these.
+    With `supervisor`, this supervisor is checked first, without trust in its certificate; properties are verified only
+    if it passes. Without `supervisor`, it is made from the model, or `model` is a supervisor; without properties it is
+    checked against its model. A supervisor of automata, made from them or given, is checked against the automata.
 
     Args:
-        model: The model, as `load` returns it, the path of one, or a supervisor that was made.
+        model: The model, as `load` returns it, the path of its file, or a supervisor from `synthesize`.
         properties: A property such as `AG EF Navigator.ready`, or several.
         property_files: Files with a property on each line.
-        supervisor: The supervisor to check: itself, the path of its file or its bytes.
-        options: Options for making the supervisor, and the deployment that one must be for; None: as it says.
-        maximum_states: States up to which a given supervisor is searched one by one; None: 1,000,000.
+        supervisor: The supervisor to check: the value, the path of its file or the file's bytes.
+        options: Options for making the supervisor, and the deployment that a given one must have; None: its own.
+        maximum_states: States up to which a given supervisor is searched state by state; None: 1,000,000.
         is_strict: True if a given supervisor passes only if permissiveness was checked, too.
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
@@ -100,7 +99,7 @@ def verify(
     Raises:
         TypeError: Arguments do not fit together.
         ValueError: The files hold no property, or `maximum_states` is negative.
-        FileAccessError: A file is not there or cannot be read.
+        FileAccessError: A file does not exist or cannot be read.
         LanguageError: A file is too large or not UTF-8.
         NodeLimitError: Decision diagrams became larger than the options allow.
         UnknownEngineError: There is no such engine.
@@ -142,7 +141,7 @@ def verify(
 
 
 class _SupervisorCheck:
-    """A supervisor to check, and how; without a model, it is checked against the one that it holds."""
+    """A supervisor to check, with options; without a model, it is checked against the model in its file."""
 
     def __init__(
         self,
@@ -174,8 +173,8 @@ class _Claims:
         """The properties of a robot.
 
         Raises:
-            LanguageError: They have errors.
-            ValueError: There is none.
+            LanguageError: The properties have errors.
+            ValueError: There is no property.
         """
         found = properties_of(model, self.texts, self.listings)
         if not found:
@@ -240,7 +239,7 @@ def verdicts_of(
 def _checked(
     given: _SupervisorCheck, claims: _Claims, on_progress: OnProgress, should_stop: ShouldStop
 ) -> Verification:
-    """Check the given supervisor; verify properties of its robot if it is right."""
+    """Check the given supervisor; verify properties of its robot if it passes."""
     engine = resolve_engine(given.options.engine)
     try:
         supervisor = supervisor_of(given.supervisor)
@@ -271,7 +270,7 @@ def _checked(
 def _synthesized(
     model: LoadedModel, claims: _Claims, options: SynthesisOptions, on_progress: OnProgress, should_stop: ShouldStop
 ) -> Verification | CoreSupervisor:
-    """Return the supervisor that is made of a model, or the result if a property is wrong or there is none."""
+    """Return the supervisor of a model, or the result if a property has errors or there is no supervisor."""
     # Errors of properties are reported before the synthesis, which may take long.
     robot = check(model).model
     errors = claims.errors(robot) if robot is not None and claims else None

@@ -17,13 +17,13 @@ class WalkFindingKind(StrEnum):
     DEADLOCK = "deadlock"
     """No event at all can happen, in a state that is not marked."""
     WAITING = "waiting"
-    """No event is allowed and no service or action is under way, in a state that is not marked: only a message from
-    outside can go on."""
+    """No event is allowed and no service or action is under way, in a state that is not marked: the robot waits for a
+    message from outside."""
     BLOCKED = "blocked"
-    """The behaviours could do a request that requirements or the supervisor forbid."""
+    """The behaviours allow a request that requirements or the supervisor forbid."""
     UNKNOWN = "unknown"
-    """Data was unknown: an enum fell to its default past an unknown rule, a number was moved into its range, an
-    update was skipped, or what a request sends is unknown, so that it is not issued."""
+    """Data was unknown: an enum got its default because a rule was unknown, a number was moved into its range, an
+    update was skipped, or the data of a request is unknown, so that it is not issued."""
 
 
 ALL_FINDINGS = frozenset(WalkFindingKind)

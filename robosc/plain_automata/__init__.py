@@ -1,6 +1,7 @@
-"""Plain automata, without variables, as other tools exchange them: files of libFAUDES (`.gen`) and Supremica (`.wmod`).
+"""Plain automata, without variables, in the files of other tools: libFAUDES (`.gen`) and Supremica (`.wmod`).
 
-A reader makes a system of them, beside the front ends for RoboSC and CIF; a writer takes a system of plain automata.
+A reader converts a file to a system, like the front ends for RoboSC and CIF; a writer converts a system of plain
+automata to a file.
 """
 
 from robosc.plain_automata.check import check_automata

@@ -1,4 +1,4 @@
-"""Files of plain automata, checked: every finding, and the automata of a file without errors."""
+"""Check of files of plain automata: every finding, and the automata of a file without errors."""
 
 from collections.abc import Callable
 from pathlib import PurePath

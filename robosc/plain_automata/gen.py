@@ -1,7 +1,7 @@
 """Generators of libFAUDES: text files of tokens between tags, one generator or several.
 
-Format: T. Moor and others, libFAUDES user reference, "Generator file format"; each rule of it was tried with libFAUDES
-2.34.5. A name stands in quotes or not, `%` begins a comment, and a state without a name is a number.
+Format: T. Moor and others, libFAUDES user reference, "Generator file format"; each rule was tried with libFAUDES
+2.34.5. A name may be in quotes, `%` begins a comment, and a state without a name is a number.
 """
 
 import re

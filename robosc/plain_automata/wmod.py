@@ -1,8 +1,8 @@
 """Modules of Supremica (`.wmod`): XML of Waters, as far as automata are plain.
 
 Format: the XML schema of Waters modules (R. Malik, K. Akesson, H. Flordal and M. Fabian, "Supremica - an efficient
-tool for large-scale discrete event systems", IFAC-PapersOnLine 50(1), 2017, pp. 5794-5799). An automaton none of whose
-states is `:accepting` is marked everywhere; a state that is `:forbidden` must not be entered.
+tool for large-scale discrete event systems", IFAC-PapersOnLine 50(1), 2017, pp. 5794-5799). An automaton without an
+`:accepting` state is marked everywhere; a `:forbidden` state must not be entered.
 """
 
 from collections.abc import Iterator

@@ -1,4 +1,4 @@
-"""The files that a new robot begins with: a model that teaches the language, its library, and what to do next."""
+"""The first files of a new robot: a model that teaches the language, its library, and a text on the next steps."""
 
 from robosc.starter.starter import MAXIMUM_STEM, InvalidNameError, Starter, make_starter
 

@@ -1,7 +1,7 @@
-"""Makes the texts of a new robot from the templates beside this module.
+"""Texts of a new robot, made from the templates beside this module.
 
-A pure function from a name to texts: whoever calls it writes them. Only names that were validated are put
-into a template, so that nothing has to be escaped there.
+A pure function turns a name into texts, and its caller writes them. Only validated names are put into a template, so
+nothing has to be escaped there.
 """
 
 import re

@@ -1,4 +1,4 @@
-"""The supervisor as a value: its conditions and certificate, how it is written and read, and what makes it valid."""
+"""The supervisor as a value: its conditions and certificate, writing and reading of its file, and validation."""
 
 from robosc.supervisor.codec import decode, encode
 from robosc.supervisor.structure import (

@@ -1,7 +1,7 @@
-"""The canonical JSON form of a supervisor (`.rsup`): written from our values, read as untrusted input.
+"""The canonical JSON form of a supervisor (`.rsup`): it is written from our values, and read as untrusted input.
 
-One line of UTF-8 JSON with sorted keys and no blanks, and a line end: equal supervisors give equal bytes,
-so a digest or signature of the file is one of the value. Reading accepts any layout of the same document.
+The form is one line of UTF-8 JSON with sorted keys and no blanks, and a line end. Equal supervisors give equal bytes,
+so a digest or signature of the file is also one of the value. Reading accepts any layout of the same document.
 """
 
 import json

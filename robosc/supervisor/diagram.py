@@ -94,7 +94,7 @@ def validate(diagram: DecisionDiagram, domains: Domains) -> None:
 def _require_order(diagram: DecisionDiagram) -> None:
     """Check that there is an order of places in which every path tests them, each at most once.
 
-    So a path is no longer than there are places, whoever wrote the diagram.
+    So no path is longer than the number of places, even in an untrusted diagram.
 
     Raises:
         ValueError: There is none.

@@ -1,7 +1,7 @@
 """The supervisor: one frozen value that holds all that a target or an executor needs.
 
-It is the checked model, the conditions that synthesis adds to controllable events, and the
-certificate of what was checked. Its JSON form (`robosc.supervisor.codec`) is untrusted input.
+It contains the checked model, the conditions that synthesis adds to controllable events, and the certificate. Its JSON
+form (`robosc.supervisor.codec`) is untrusted input.
 """
 
 from functools import cached_property
@@ -118,7 +118,7 @@ class Certificate(msgspec.Struct, frozen=True, omit_defaults=True):
         maximally_permissive: Nothing more is disabled than needed.
         states: Reachable states of the controlled system, exact.
         transitions: Transitions between them, or None where they were not counted.
-        controller: Properties of the controller, or None where nobody asked.
+        controller: Properties of the controller, or None if they were not checked.
         goals: Under the strategy every goal comes true while the assumptions do; None where there is no strategy.
     """
 

@@ -1,8 +1,8 @@
-"""Check that a supervisor that came from outside is consistent in itself.
+"""Check that a supervisor from outside is consistent.
 
-Shapes, sizes and identifiers are settled while decoding; this checks what one part says about another, so
-that no later stage meets a name, type or event that is not there. Whether the supervisor is *right* for a
-model is the verifier's question, not this module's.
+Decoding checks shapes, sizes and identifiers. This module checks references between the parts, so that no later stage
+meets a name, type or event that does not exist. The verifier, not this module, checks that the supervisor is *correct*
+for a model.
 """
 
 import re

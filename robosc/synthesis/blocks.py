@@ -1,7 +1,7 @@
-"""Places of a state that are computed with together, so that their bits are to be interleaved.
+"""Blocks of places that are compared or computed with each other, so that their bits are interleaved.
 
-Where the bits of one integer all stand above those of another, a comparison or a sum has to remember the whole of the
-first: its diagram is exponential in the bits. Bits of equal weight side by side need a carry only.
+If all bits of one integer are above those of another, the diagram of a comparison or a sum must represent every value
+of the first: it is exponential in the bits. With bits of equal weight side by side, it only represents a carry.
 
 Source: R. E. Bryant, "Graph-based algorithms for Boolean function manipulation", IEEE Trans. Computers C-35(8), 1986,
 pp. 677-691, section 4 (the order of a comparison's and an adder's inputs).

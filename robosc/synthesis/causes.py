@@ -1,4 +1,4 @@
-"""Reasons why an event can never happen in the controlled system: the first to blame, from the plants onwards."""
+"""Reason why an event can never happen in the controlled system: the first that applies, from the plants onwards."""
 
 from collections.abc import Callable
 from functools import cached_property

@@ -1,11 +1,12 @@
 """Chaining: steps are applied to whole predicates, one after the other, in an order that keeps diagrams small.
 
-Steps wait in a list of work, those first that touch the closest variables, of equally close ones the lowest; once a
-step has added states, every step that shares a variable with it waits again. So what is local is closed before anything
-that ties it to the rest moves: the idea of saturation (G. Ciardo, G. Luettgen and R. Siminiceanu, "Saturation: an
-efficient iteration strategy for symbolic state-space generation", TACAS 2001, LNCS 2031, pp. 328-342), here with whole
-predicates instead of nodes. Sweeps over all events instead let every part of a system move a little at a time, and what
-they find in between depends on all of the parts together: on dining philosophers that is exponential where this is not.
+Steps wait in a work list. Those whose variables are closest to each other come first; among equally close ones, the
+lowest. Once a step has added states, every step that shares a variable with it waits again. So local steps reach their
+fixed point before steps that connect parts are taken. This is the idea of saturation (G. Ciardo, G. Luettgen and R.
+Siminiceanu, "Saturation: an efficient iteration strategy for symbolic state-space generation", TACAS 2001, LNCS 2031,
+pp. 328-342), here with whole predicates instead of nodes. Sweeps over all events would move every part of a system a
+little at a time, and their intermediate predicates would depend on all parts together: for dining philosophers these
+are exponential, and those of chaining are not.
 """
 
 import heapq

@@ -1,4 +1,4 @@
-"""Values that edges write as constants, and those that they do not: only the latter need next-state variables."""
+"""Values that edges write as constants, and all other ones: only the other ones need next-state variables."""
 
 from collections import defaultdict
 from collections.abc import Iterable, Sequence

@@ -1,4 +1,4 @@
-"""Choices between edges that nobody controls, for languages that have none."""
+"""Nondeterministic choices between edges, for target languages without nondeterminism."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

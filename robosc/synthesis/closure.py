@@ -1,8 +1,8 @@
-"""The states that some steps lead to from given ones: by saturation, unless the engine may change its order meanwhile.
+"""The states that steps reach from given ones: by saturation, unless the engine may change its variable order.
 
 Measured on the families of the benchmarks, saturation takes from a thirtieth of the time of chaining (a hundred dining
-philosophers) to two thirds of it (cat and mouse), and it grows more slowly with their size. But it goes down the levels
-of the diagrams, which must stay where they are for that.
+philosophers) to two thirds of it (cat and mouse), and its time grows more slowly with the size. But it works level by
+level of the diagrams, so the variable order must not change.
 """
 
 from collections.abc import Iterable

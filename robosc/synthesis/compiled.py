@@ -1,4 +1,4 @@
-"""The kernel at work on predicates: the diagrams of CUDD inside dd."""
+"""The kernel's functions for predicates, on the diagrams of CUDD inside dd."""
 
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -87,10 +87,10 @@ class Kernel:
         """Return what `nodes.without` does."""
         return self._returned(self._module.without(self._manager, self.address(predicate), self._addresses(cubes)))
 
-    def told_apart(self, one: Any, other: Any, cubes: Sequence[Any]) -> tuple[Any, Any]:
-        """Return what `nodes.told_apart` does."""
+    def separated(self, one: Any, other: Any, cubes: Sequence[Any]) -> tuple[Any, Any]:
+        """Return what `nodes.separated` does."""
         addresses = self._addresses(cubes)
-        first, second = self._module.told_apart(self._manager, self.address(one), self.address(other), addresses)
+        first, second = self._module.separated(self._manager, self.address(one), self.address(other), addresses)
         return self._returned(first), self._returned(second)
 
     def _addresses(self, predicates: Sequence[Any]) -> tuple[int, ...]:
@@ -104,8 +104,8 @@ class Kernel:
         Args:
             predicate: The predicate.
             blocks: Blocks of places: for each place how many values it can hold, and the levels of its bits.
-            branches: Ranges of one place's values that a node may tell apart.
-            maximum: Ranges that all nodes together may tell apart.
+            branches: Ranges of one place's values that a node may distinguish.
+            maximum: Ranges that all nodes together may distinguish.
         """
         found = self._module.extract(self._manager, self.address(predicate), blocks, branches, maximum)
         return Extracted(*found)

@@ -1,4 +1,4 @@
-"""Answers to questions about the controlled system, on predicates: no state is ever looked at by itself."""
+"""Answers to questions about the controlled system, computed on predicates instead of single states."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from typing import Any
@@ -273,7 +273,7 @@ class ControlledSystem:
             earlier = self._manager.false
             for number, second in enumerate(group):
                 here = self._possible(second)
-                # One look tells whether there is any at all: of most groups no two are ever possible together.
+                # One test of all earlier events first: in most groups no two events are ever possible together.
                 rivals = group[:number] if here & earlier != self._manager.false else ()
                 for first in rivals:
                     both = here & self._possible(first)

@@ -13,7 +13,7 @@ MAXIMUM_BRANCHES = 100_000
 """Ranges of one variable's values beyond which a diagram is refused."""
 
 MAXIMUM_TOTAL = 400_000
-"""Ranges that all nodes of a diagram together may tell apart."""
+"""Ranges that all nodes of a diagram together may distinguish."""
 
 _Run = tuple[int, Any]
 """A first index and the predicate that holds from there on."""
@@ -76,7 +76,7 @@ class _Extractor:
                 raise _too_many_in_all(subject, self._maximum)
             for start, below in runs:
                 if start >= len(bits.domain):
-                    # Codes that stand for no value: what a predicate says of them is nobody's business.
+                    # Codes from here on stand for no value: the predicate is ignored there.
                     break
                 child = self._child(below, block, number + 1)
                 if not children or children[-1] != child:
@@ -132,7 +132,7 @@ class _Extractor:
 
 def _too_many_branches(subject: Subject) -> UnsupportedModelError:
     return UnsupportedModelError(
-        f"a condition of the supervisor tells apart more than {MAXIMUM_BRANCHES} ranges of the values of "
+        f"a condition of the supervisor distinguishes more than {MAXIMUM_BRANCHES} ranges of the values of "
         f"'{subject}'; use a smaller range"
     )
 
@@ -150,11 +150,11 @@ def extract(encoding: Encoding, predicate: Any, maximum: int = MAXIMUM_TOTAL) ->
     Args:
         encoding: The variables.
         predicate: The predicate.
-        maximum: Ranges that all nodes together may tell apart.
+        maximum: Ranges that all nodes together may distinguish.
 
     Raises:
-        UnsupportedModelError: It tells apart more than `MAXIMUM_BRANCHES` ranges of one variable's values, or more than
-            `maximum` in all.
+        UnsupportedModelError: The predicate distinguishes more than `MAXIMUM_BRANCHES` ranges of one variable's values,
+            or more than `maximum` in all.
     """
     kernel = kernel_of(encoding.manager)
     if kernel is None:

@@ -1,11 +1,11 @@
 """Locations, variables and received data as Boolean variables, and expressions as predicates over them.
 
-A value of a finite domain is encoded by its index, most significant bit first. Each bit has a variable for
-the current state and, next to it in the order, one for the next state if forward images need it: if some event writes
-it otherwise than as one constant. Bits of
-received data stand among those of the variable that is first in the order of those they are written to: were they
-apart, a relation that copies several data would have to remember all of them at once. Bits of wide integers that are
-compared or computed with together stand among each other, those of equal weight side by side: see `blocks`.
+A value of a finite domain is encoded by its index, most significant bit first. Each bit has a variable for the current
+state. Next to it in the order, it has one for the next state if forward images need it, because some event writes
+other values than one constant. Bits of received data are interleaved with those of the first variable, in the order,
+that the data is written to: if they were separate, a relation that copies several data would have to represent all of
+them at once. Bits of wide integers that are compared or computed with each other are interleaved, those of equal weight
+side by side: see `blocks`.
 """
 
 from collections import defaultdict
@@ -35,7 +35,7 @@ class Bits:
         names: Current-state variables, most significant first.
         domain: The values, in the order of their indices.
         type: Type of the value, or None for a location.
-        known: Variable that tells whether the value is known at all, or None if it always is.
+        known: Variable that is true if the value is known, or None if it always is.
     """
 
     names: tuple[str, ...]

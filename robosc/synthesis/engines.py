@@ -1,7 +1,7 @@
 """Engines for binary decision diagrams, found by name.
 
-dd offers one interface over CUDD (C) and over plain Python. `Manager` writes down what synthesis uses of it;
-what the two do differently (counting, restricting, complemented edges) is not used but done on the nodes.
+dd offers one interface over CUDD (C) and over plain Python. `Manager` declares the part that synthesis uses. Operations
+in which the two differ (counting, restricting, complemented edges) are not used, but implemented on the nodes.
 """
 
 import importlib
@@ -221,7 +221,7 @@ def limited(manager: Manager, maximum_nodes: int | None) -> Iterator[None]:
             raise
     # Outside of the handler: the error would keep the frames, and they the nodes of a manager that is to end.
     if has_failed:
-        # Which of CUDD's error codes it was, dd does not tell. Tables of the operation alone are free again already.
+        # dd does not report CUDD's error code. The tables of the failed operation are already free again.
         if _memory_of(manager) < _NEARLY * allowed_bytes:
             raise MemoryError("the decision diagrams were refused memory")
         raise node_limit_error(maximum_nodes)

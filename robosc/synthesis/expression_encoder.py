@@ -1,8 +1,8 @@
 """Expressions as predicates, with three truth values and exact numbers.
 
-Integers are bit vectors. Numbers that are or may become doubles are partitions: for each value it can
-have, the predicate where it has it; exact for every operation, and small since only variables with
-finitely many values take part. Their arithmetic is that of `robosc.expressions.values` itself.
+Integers are bit vectors. A number that is or may become a double is a partition: a predicate for each value that it can
+have. Partitions are exact for every operation, and small because only variables with finitely many values take part.
+Their arithmetic is that of `robosc.expressions.values` itself.
 """
 
 from dataclasses import dataclass

@@ -1,24 +1,23 @@
-"""Warnings that only synthesis can give about a model: what its controlled system never does, or does twice.
+"""Warnings that only synthesis can give about a model, such as events that never happen.
 
-- `never-enabled`: an event that can happen in no state of the controlled system. Where a communication can never be
-  requested, that alone is reported, not also that nothing ever comes back. A request counts whether or not a
-  behaviour reacts to it: whoever declares it wants it. Cancel counts only where a behaviour reacts to it: else nobody
-  wrote it, and an action whose requirements hold as long as it runs needs none. Resets belong to the protocol and
-  count.
-- `unused-requirement`: a written requirement that never restricts any of its communications. For an action it
-  also restricts where it turns false while the action runs, for then it is a reason to cancel; and any
-  requirement where synthesis keeps away from states because of it, as it does for one that must always hold (or
-  never): what counts is whether the controlled system would do more without it. All that are reported can go
-  together. What never is requested is never restricted.
-- `unreachable-state`: a state that its component never is in, whether or not its behaviour alone has a way there.
+- `never-enabled`: an event that can happen in no state of the controlled system. If a communication can never be
+  requested, only the request is reported, not also its replies. A request counts even if no behaviour reacts to it,
+  because it is declared to be used. A cancel counts only if a behaviour reacts to it: otherwise it is not in the text,
+  and an action whose requirements hold as long as it runs needs none. Resets belong to the protocol and count.
+- `unused-requirement`: a written requirement that never restricts any of its communications. A requirement on an action
+  also restricts if it turns false while the action runs, because it then causes a cancel. Any requirement also
+  restricts if synthesis avoids states because of it, as for one that must always (or never) hold. In short, a
+  requirement is used if the controlled system would do more without it. All reported requirements can be removed
+  together. A communication that is never requested is never restricted.
+- `unreachable-state`: a state that its component never reaches, even if its behaviour alone would reach it.
 - `unprompted-request`: a service or action that an executor, which takes resets and silent steps first, can request
-  again and again while nothing happens but requests, their replies and silent steps: no message of the robot, by which
-  somebody or something would ask for it. It is a note, since a patrol is meant to go on for ever. A loop is reported
-  once, for the request in it that is declared first. Only for the controller: in a layer the existing controller
-  asks. In a large system the search is given up.
+  again and again, with only requests, their replies and silent steps in between, and no message of the robot that would
+  prompt it. It is a note, because a patrol is meant to go on for ever. A loop is reported once, for its request that is
+  declared first. It is only for the controller, because in a layer the existing controller makes the requests. In a
+  large system the search is given up.
 - `competing-requests`: two communications of one kind (topics, services and actions have name spaces of their own)
-  with one identifier that can be requested in one state, with a shortest run to such a state. Only for the
-  controller: in a layer it is the existing controller that chooses.
+  with one identifier that can be requested in one state, with a shortest run to such a state. It is only for the
+  controller, because in a layer the existing controller chooses.
 """
 
 from collections import defaultdict, deque

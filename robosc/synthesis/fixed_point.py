@@ -1,9 +1,9 @@
-"""The fixed point of synthesis, and what the controlled system can reach.
+"""The fixed point of synthesis, and the reachable states of the controlled system.
 
 Source: L. Ouedraogo, R. Kumar, R. Malik and K. Akesson, "Nonblocking and safe control of discrete-event systems
 modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569, Algorithm 1, on predicates instead of
-guards. Predecessors are found by substitution, forward images with a relation for each event; `closure` says in which
-order.
+guards. Predecessors are computed by substitution, forward images with a relation for each event; `closure` determines
+the order of the events.
 """
 
 from collections.abc import Callable, Iterable, Iterator
@@ -99,7 +99,7 @@ class FixedPoint:
 
         Args:
             problem: The problem.
-            known: States that are told beforehand to be good.
+            known: States that are known beforehand to be good.
         """
         start = self.initial & problem.safe
         found, reached = self._first_of(
@@ -150,7 +150,7 @@ class FixedPoint:
         return monitor.result_of(lambda: work(solver))
 
     def good_states(self, problem: Problem, known: Any) -> GoodStates:
-        """The states from which a supervisor can solve a problem; `known` ones are told beforehand to be such."""
+        """The states from which a supervisor can solve a problem; `known` states are known beforehand to be good."""
         good, rounds = problem.safe, 0
         if self.initial == self._encoding.manager.false:
             where = " in which the plant invariants are true" if self._encoding.system.plant_invariants else ""

@@ -12,7 +12,7 @@ class ProgressMonitor:
 
     Args:
         should_stop: Asked before each step of the work with one event; once true, the work ends.
-        on_progress: Told after each event's encoding and after each round.
+        on_progress: Called after each event's encoding and after each round.
         check_nodes: Asked before each step, too: raises an error where there are too many.
 
     Attributes:

@@ -120,7 +120,7 @@ class _Counter:
 
 
 def without(manager: Manager, states: Any, cubes: Sequence[Any]) -> Any:
-    """States, whatever the variables of some cubes have.
+    """States with the variables of some cubes quantified: they may have any value.
 
     Args:
         manager: Their manager.
@@ -134,18 +134,20 @@ def without(manager: Manager, states: Any, cubes: Sequence[Any]) -> Any:
     return manager.exist(names, states) if names else states
 
 
-def told_apart(manager: Manager, one: Any, other: Any, cubes: Sequence[Any]) -> tuple[Any, Any]:
-    """Two sets of states that share none, whatever the variables of as many cubes as can go have, earlier ones first.
+def separated(manager: Manager, one: Any, other: Any, cubes: Sequence[Any]) -> tuple[Any, Any]:
+    """Two disjoint sets of states without the variables that are not needed to distinguish them.
+
+    The variables of each cube are left out, in order, if both sets stay disjoint without them.
 
     Args:
         manager: Their manager.
         one: Some states.
-        other: Other states.
-        cubes: The cubes, each of variables that go together.
+        other: Other states, disjoint from them.
+        cubes: Cubes, each of variables that are left out together.
     """
     kernel = kernel_of(manager)
     if kernel is not None:
-        return kernel.told_apart(one, other, cubes)
+        return kernel.separated(one, other, cubes)
     for cube in cubes:
         fewer = without(manager, one, [cube]), without(manager, other, [cube])
         if fewer[0] & fewer[1] == manager.false:

@@ -1,4 +1,4 @@
-"""Questions about a controlled system beside its supervisor, and the answers: plain values."""
+"""Questions about a controlled system, and their answers, as plain values."""
 
 from dataclasses import dataclass
 from enum import StrEnum
@@ -59,11 +59,11 @@ class Questions:
     """Questions about the controlled system.
 
     Attributes:
-        events: Events of which to tell whether they can ever happen.
-        restrictions: Restrictions of which to tell whether they ever restrict.
+        events: Events to check: can they ever happen?
+        restrictions: Restrictions to check: do they ever restrict?
         rivals: Groups of events of which no two should be possible together.
-        locations: Automata with one of their locations, of which to tell whether they are ever in it.
-        prompted: Events of which to tell whether they can happen again and again without a prompt.
+        locations: Automata with one of their locations to check: is it ever reached?
+        prompted: Events to check: can they happen again and again without a prompt?
         prompts: The events that are prompts.
         silent: Events that are taken before all others, as an executor does.
     """

@@ -2,9 +2,9 @@
 
 Source: E. M. Clarke, O. Grumberg, K. L. McMillan and X. Zhao, "Efficient generation of counterexamples and witnesses
 in symbolic model checking", DAC 1995, pp. 427-432 (rings of a breadth-first search; one state at a time on the way
-back). A ring is what one more event reaches, so events cannot be chained as they are where only the set counts; of
-many components that act by themselves the rings become far larger than the set is. Where that happens the search goes
-on with chained events: runs beyond that point are still runs, though another may be shorter.
+back). A ring has the states that one more event reaches, so events cannot be chained as in the computation of a set.
+For many independent components, the rings become far larger than the set. The search then continues with chained
+events: its runs are still possible, but they may not be shortest.
 """
 
 from bisect import bisect_left

@@ -1,15 +1,15 @@
-"""Saturation: steps are applied to the part of a decision diagram that they are about, lowest parts first.
+"""Saturation: steps are applied only to the parts of a decision diagram that they read or change, lowest parts first.
 
-A step that reads and changes no variable above some level cannot tell two states apart by what stands above it. So
-instead of a whole predicate, the parts of its diagram that begin at that level are closed under the step, each together
-with all steps below, and equal parts only once. What happens in one corner of a system then costs as much as that
-corner is large, where a whole predicate would be built anew from its root with each step.
+A step that reads and changes no variable above some level does not depend on the variables above that level. So only
+the subdiagrams that begin at that level are closed under the step, together with all steps below it, and equal
+subdiagrams only once. The cost of a step in one part of a system then depends on the size of that part, where other
+methods build the whole predicate anew from its root with each step.
 
 Sources: G. Ciardo, G. Luettgen and R. Siminiceanu, "Saturation: an efficient iteration strategy for symbolic
 state-space generation", TACAS 2001, LNCS 2031, pp. 328-342; Y. Zhao and G. Ciardo, "Symbolic CTL model checking of
-asynchronous systems using constrained saturation", ATVA 2009, LNCS 5799, pp. 368-381 (what states have to keep to is
-followed downwards with them); on binary diagrams T. van Dijk, J. Meijer and J. van de Pol, "Multi-core on-the-fly
-saturation", TACAS 2019, LNCS 11428, pp. 58-75.
+asynchronous systems using constrained saturation", ATVA 2009, LNCS 5799, pp. 368-381 (the predicate that states must
+satisfy is followed downwards together with them); on binary diagrams T. van Dijk, J. Meijer and J. van de Pol,
+"Multi-core on-the-fly saturation", TACAS 2019, LNCS 11428, pp. 58-75.
 """
 
 from collections import defaultdict

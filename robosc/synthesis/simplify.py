@@ -1,10 +1,11 @@
-"""Short condition that the supervisor adds to an event, of those that do the same in every state that matters.
+"""Short condition that the supervisor adds to an event, out of those that are equal in every state that matters.
 
-A condition matters where the controlled system can be, the plant enables the event and the requirements allow it.
-Among those that agree there, candidates are found in five ways: by restricting, by leaving out places of the state (of
-those that restricting leaves, and, where that does not read well, of all), as relations between variables, and as sums
-of products for what is wanted and for what is not. The one with the shortest formula is kept, and without any the one
-with the smallest diagram. What is kept is what the supervisor holds, so its formula is right in all states.
+A state matters if the controlled system can reach it, the plant enables the event there and the requirements allow it.
+Candidates that are equal in these states are found in five ways: by restricting; by leaving out places of the state
+(those that are left after restricting, or all places if that gives no readable result); as relations between variables;
+and as sums of products for the wanted states and for the unwanted ones. The candidate with the shortest formula is
+kept, or the one with the smallest diagram if none has a formula. The supervisor holds the kept candidate itself, so its
+formula is correct in all states.
 
 Source: O. Coudert and J. C. Madre, "A unified framework for the formal verification of sequential circuits", IEEE
 ICCAD 1990, pp. 126-129 (restrict).
@@ -29,7 +30,7 @@ from robosc.supervisor.diagram import Subject as Place
 from robosc.supervisor.diagram import diagram_domains
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.nodes import implies, restrict, told_apart, without
+from robosc.synthesis.nodes import implies, restrict, separated, without
 
 MAXIMUM_NODES = 20_000
 """Nodes of what matters up to which more than restricting is tried."""
@@ -46,7 +47,7 @@ MAXIMUM_EFFORT = 3_000_000
 by one: a third of a second with the faster engine."""
 
 MAXIMUM_RANGES = 10_000
-"""Ranges of values that the diagram of such a set of states may tell apart: bits of several places may take far fewer
+"""Ranges of values that the diagram of such a set of states may distinguish: bits of several places may take far fewer
 nodes than their values do."""
 
 
@@ -83,7 +84,7 @@ class Simplifier:
         }
         self._variables = encoding.all_of(map(self._manager.var, reversed(encoding.state_names)))
         self._formulas = Formulas(self._domains)
-        self._told_apart: dict[tuple[int, int], tuple[Any, Any, tuple[DecisionDiagram, ...]]] = {}
+        self._separating: dict[tuple[int, int], tuple[Any, Any, tuple[DecisionDiagram, ...]]] = {}
         self._vain = 0
         self._end = None if seconds is None else monotonic() + seconds
         self._more, self._left = Effort(TOTAL_STEPS), MAXIMUM_EFFORT
@@ -96,7 +97,7 @@ class Simplifier:
             care: The states that matter, each with valid codes only.
 
         Raises:
-            UnsupportedModelError: Each tells apart too many ranges of one variable's values.
+            UnsupportedModelError: Each condition distinguishes too many ranges of one variable's values.
         """
         if implies(self._manager, care, wanted):
             return None
@@ -160,16 +161,16 @@ class Simplifier:
         """Other conditions over some places that are true in the positive states and false in the negative ones."""
         if len(tested) > MAXIMUM_SUBJECTS:
             return
-        # Both stay apart: a condition over the places that are left tells them from each other.
+        # The two sets stay disjoint: a condition over the remaining places distinguishes them.
         positive, negative = self._over(tested, positive, negative)
         if max(positive.dag_size, negative.dag_size) <= MAXIMUM_KEPT_NODES:
-            yield from self._telling_apart(*self._needed(tested, positive, negative))
+            yield from self._conditions_between(*self._needed(tested, positive, negative))
 
     def _wider(self, wanted: Any, positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
-        """The same over few places of all that a condition tests.
+        """Other conditions over few places, chosen from all places that a condition tests.
 
-        Where places go together, as those of a token that is in one of them, restricting may leave one out that says
-        in one test what many others say together.
+        Places may depend on each other, such as those of a token that is in one of them. Restricting may then leave out
+        a place whose one test replaces the tests of many others.
         """
         places = self._places(wanted)
         positive, negative = self._over(places, positive, negative)
@@ -180,7 +181,7 @@ class Simplifier:
         for is_reversed in (False, True):
             states = self._needed(places, positive, negative, is_reversed=is_reversed)
             if len(self._places(*states)) <= SHORT:
-                yield from self._telling_apart(*states)
+                yield from self._conditions_between(*states)
 
     def _places(self, *predicates: Any) -> set[Subject]:
         """The places that predicates depend on."""
@@ -191,16 +192,16 @@ class Simplifier:
         away = [without(self._manager, self._variables, [self._cubes[subject] for subject in places])]
         return without(self._manager, positive, away), without(self._manager, negative, away)
 
-    def _telling_apart(self, positive: Any, negative: Any) -> Sequence[DecisionDiagram]:
+    def _conditions_between(self, positive: Any, negative: Any) -> Sequence[DecisionDiagram]:
         """Conditions that are true in the positive states and false in the negative ones."""
-        # Sets are kept with what was found: the engine could otherwise give the nodes to other ones. Many events of one
-        # system need the same.
+        # Many events of one system need the same conditions. The sets are kept with the conditions: the engine could
+        # otherwise give their numbers to other nodes.
         key = int(positive), int(negative)
-        if key not in self._told_apart:
-            self._told_apart[key] = positive, negative, tuple(self._new_telling_apart(positive, negative))
-        return self._told_apart[key][2]
+        if key not in self._separating:
+            self._separating[key] = positive, negative, tuple(self._new_conditions(positive, negative))
+        return self._separating[key][2]
 
-    def _new_telling_apart(self, positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
+    def _new_conditions(self, positive: Any, negative: Any) -> Iterator[DecisionDiagram]:
         try:
             diagrams = [extract(self._encoding, states, MAXIMUM_RANGES) for states in (positive, negative)]
         except UnsupportedModelError:
@@ -216,14 +217,14 @@ class Simplifier:
     def _needed(
         self, tested: Iterable[Subject], positive: Any, negative: Any, *, is_reversed: bool = False
     ) -> tuple[Any, Any]:
-        """The states without every place that is not needed to tell them from each other, larger ones first.
+        """Both sets of states without the places that are not needed to distinguish them; larger places go first.
 
         Args:
             tested: Places that may go.
             positive: Some states.
             negative: Other states.
-            is_reversed: True if of places of one size the first ones in the model's text go first: of several that
-                tell the same, others are left then.
+            is_reversed: True if among places of one size the first ones in the model's text go first. Among places
+                that distinguish the same states, other ones are then left.
         """
         direction = 1 if is_reversed else -1
 
@@ -232,7 +233,7 @@ class Simplifier:
             return -len(self._encoding.subjects[subject].domain), direction * rank
 
         cubes = [self._cubes[subject] for subject in sorted(tested, key=cost)]
-        return told_apart(self._manager, positive, negative, cubes)
+        return separated(self._manager, positive, negative, cubes)
 
     def _related(self, diagrams: Sequence[DecisionDiagram]) -> Iterator[DecisionDiagram]:
         """The states that relations between variables and a short sum of products describe together."""

@@ -1,4 +1,4 @@
-"""Steps: what events add to sets of states, whichever way the sets are closed under them."""
+"""Steps: the states that events add to a set of states, for every kind of closure."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""Synthesis of the maximally permissive supervisor: encoding, fixed point, what the supervisor adds, figures."""
+"""Synthesis of the maximally permissive supervisor: encoding, fixed point, added conditions, figures."""
 
 from collections.abc import Callable
 from typing import Any
@@ -31,7 +31,7 @@ def _never() -> bool:
 
 
 def _silent(progress: SynthesisProgress) -> None:
-    """Tell nobody."""
+    """Report nothing."""
 
 
 def synthesize(

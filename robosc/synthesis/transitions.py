@@ -1,8 +1,8 @@
 """Events as predicates and next-state functions, without the product of the automata's edges.
 
-For each bit that an event may change there is one function of the state before it (and of received data), right
-wherever the event is possible: an if-then-else over the edges of the automaton it belongs to. The predecessors of a
-predicate are then found by substitution, and no next-state variable is needed backwards.
+Each bit that an event may change has one function of the state before the event and of received data. It is correct
+wherever the event is possible: an if-then-else over the edges of the bit's automaton. The predecessors of a predicate
+are then computed by substitution, so backward images need no next-state variables.
 """
 
 from collections import defaultdict

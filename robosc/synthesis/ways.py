@@ -1,8 +1,8 @@
-"""Ways to a goal from wherever they begin: shortest ones, or where these are hard to find, led by layers around it.
+"""Runs to a goal: shortest ones, or runs along layers around the goal if shortest ones are hard to find.
 
-Rings outwards tell shortest runs, but they may become far larger than the goal is: many states to begin with, of which
-components go on by themselves. The goal is mostly simple, and so are the states that lead to it, as long as events are
-chained. A way then goes from the last ring one state at a time into the next inner layer.
+Forward search in rings finds shortest runs, but the rings may become far larger than the goal: there may be many
+initial states, and components move independently. The goal is mostly simple, and so are the states that lead to it,
+as long as events are chained. A run then goes from the last ring one state at a time into the next inner layer.
 
 Source: E. M. Clarke, O. Grumberg, K. L. McMillan and X. Zhao, "Efficient generation of counterexamples and witnesses
 in symbolic model checking", DAC 1995, pp. 427-432 (the way inwards through layers).

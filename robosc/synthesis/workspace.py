@@ -1,4 +1,4 @@
-"""Basis of all work on predicates: an engine, a system encoded in it, and the caller that waits for the result."""
+"""Basis of all work on predicates: an engine, a system encoded in it, and the monitor of the waiting caller."""
 
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager
@@ -55,7 +55,7 @@ def workspace(
         system: The system.
         engine: Name of the engine for decision diagrams, or more about it.
         should_stop: Asked again and again; once true, the work ends.
-        on_progress: Told where the work is.
+        on_progress: Called with the progress of the work.
 
     Raises:
         NodeLimitError: Diagrams became larger than the options allow.

@@ -1,7 +1,7 @@
-"""Targets: what a finished supervisor is turned into.
+"""Targets: generators that turn a finished supervisor into files.
 
-A target reads a supervisor and returns files as text (`GeneratedFiles`); `write_files` is the one place
-that writes them. Same supervisor, same bytes: no time, no machine path, everything sorted.
+A target reads a supervisor and returns files as text (`GeneratedFiles`); only `write_files` writes them. The same
+supervisor gives the same bytes: files contain no time and no machine path, and everything is sorted.
 """
 
 from robosc.targets.all_targets import (

@@ -1,6 +1,6 @@
-"""Conditions that allow a controllable event, also in words: the same for every language that is generated.
+"""Conditions that allow a controllable event, also in words, for all generated languages.
 
-The conditions that the supervisor adds come on top; each generator writes decision diagrams in its own way.
+The conditions that the supervisor adds are not included; each generator writes decision diagrams in its own way.
 """
 
 from typing import NamedTuple

@@ -1,4 +1,4 @@
-"""One target's files, or those of all targets that can do a model, each in a folder of its own."""
+"""Files of one target, or of all targets that support a model, each in a folder of its own."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field

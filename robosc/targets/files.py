@@ -1,7 +1,7 @@
-"""Generated files as values, and the one place that writes them.
+"""Generated files as values, and the only function that writes them.
 
-A manifest beside the files remembers what was generated, so that generating again replaces files that
-nobody touched and never loses a user's change.
+A manifest beside the files records what was generated, so that a later generation replaces unchanged files and never
+loses a user's change.
 """
 
 import contextlib
@@ -37,7 +37,7 @@ class Removal:
 
     Attributes:
         removed: Paths of the files that are gone, sorted.
-        kept: Paths of those that somebody changed, sorted; they are still there.
+        kept: Paths of the files that a user changed, sorted; they are still there.
     """
 
     removed: tuple[Path, ...] = ()
@@ -134,9 +134,9 @@ def write_files(files: GeneratedFiles, directory: Path, force: bool = False) -> 
 
 
 def remove_earlier(directory: Path, folders: Iterable[str]) -> Removal:
-    """Remove what earlier runs generated in some folders below the one written to, and folders left empty by that.
+    """Remove files of earlier runs from some folders below the one written to, and folders that become empty.
 
-    Only what the manifest knows and nobody changed is removed, and nothing through a symbolic link.
+    Only unchanged files of the manifest are removed, and none through a symbolic link.
 
     Raises:
         UnwritableError: Something cannot be removed.

@@ -1,6 +1,6 @@
 """Independent verification of a supervisor.
 
-Shares nothing with synthesis but the automata and their explicit meaning (an import contract says so).
+It shares with synthesis only the automata and their explicit semantics; an import contract checks this.
 """
 
 from robosc.verification.explicit_check import CheckOutcome, Failure, Verification, verify_explicitly

@@ -1,8 +1,8 @@
 """Check of a supervisor by explicit forward search of the controlled system.
 
-The controlled system is searched state by state under the plants, the requirements and the conditions
-that the supervisor adds. What is checked is what a supervisor promises, one property after the other:
-safe, controllable, nonblocking; maximally permissive by synthesizing anew, explicitly, and comparing.
+The controlled system is searched state by state under the plants, the requirements and the conditions that the
+supervisor adds. The check covers one property after the other: safe, controllable, nonblocking. For maximally
+permissive, a new explicit synthesis is compared with the supervisor.
 """
 
 from collections.abc import Callable, Iterable, Mapping

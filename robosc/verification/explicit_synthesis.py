@@ -1,4 +1,4 @@
-"""Supervisor synthesis on the explicit graph of reachable states: the twin that symbolic synthesis must agree with.
+"""Supervisor synthesis on the explicit graph of reachable states: symbolic synthesis must give the same result.
 
 The fixed point of Ramadge and Wonham, "Supervisory control of a class of discrete event processes",
 SIAM J. Control and Optimization 25(1), 1987, pp. 206-230, in the alternating form of Ouedraogo, Kumar,

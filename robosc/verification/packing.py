@@ -1,8 +1,8 @@
-"""States as whole numbers, and what events do to them, remembered: the explicit search's forms of both.
+"""States as whole numbers, and remembered effects of events on them, for the explicit search.
 
-Each place of a state has a field of bits that holds the index of its value. What an event does depends on few
-places, so it is worked out once for each of their values, by the explicit semantics, and found again with one
-mask and one look-up.
+Each place of a state has a field of bits with the index of its value. The effect of an event depends on few places, so
+the explicit semantics computes it once for each combination of their values. After that, one mask and one look-up find
+it.
 """
 
 from collections.abc import Callable, Iterable
@@ -144,7 +144,7 @@ class EventTable:
 
     Attributes:
         event: The event.
-        field: The bits that tell what it does, those that it changes included.
+        field: The bits that decide what the event does, and those that it changes.
         known: For the values of these bits met so far, what each possible step changes: bits to turn over. Nothing
             where the plants, the ranges or, for a controllable event, its conditions do not let it happen.
         bad: The values with which the event makes a state bad.

@@ -1,6 +1,6 @@
-"""The maximally permissive supervisor once more, on packed states: for the comparison with one that was handed in.
+"""The maximally permissive supervisor on packed states, for the comparison with a given supervisor.
 
-The same fixed point as `explicit_synthesis`, for some ten times as many states; the tests compare the two.
+It is the same fixed point as in `explicit_synthesis`, for about ten times as many states; tests compare the two.
 """
 
 from array import array

@@ -155,7 +155,8 @@ def blocking_state(found: Reached) -> int | None:
     is_marked = found.packing.marking()
     targets, offsets = found.targets, found.offsets
     reaches = bytearray(is_marked(code) for code in found.codes)
-    # From the last state found to the first: mostly one sweep tells nearly all, without a list of predecessors.
+    # States are visited from the last one found to the first: one sweep mostly marks nearly all that reach a marked
+    # state, without a list of predecessors.
     for number in range(len(reaches) - 1, -1, -1):
         if not reaches[number] and any(reaches[target] for target in targets[offsets[number] : offsets[number + 1]]):
             reaches[number] = True

@@ -1,4 +1,4 @@
-"""Verification of a supervisor of any size: state by state as far as that goes, on sets of states beyond."""
+"""Verification of a supervisor of any size: state by state if it is small enough, else on sets of states."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

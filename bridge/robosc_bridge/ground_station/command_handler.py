@@ -1,8 +1,8 @@
 """Handling of ground stations' commands: each is answered once, and none blocks the session.
 
-A command that is repeated because its answer was lost changes nothing a second time, and nothing at all once a stop has
-come in between. Stopping takes effect before it is answered. What the daemon answers later is waited for without
-waiting; what it does not answer has failed, and is undone where it could still make the robot move.
+A command that is repeated because its answer was lost has no second effect, and no effect at all if a stop has come in
+between. A stop takes effect before it is answered. Answers of the daemon are polled. A command that the daemon does not
+answer in time has failed, and is undone if it could still make the robot move.
 """
 
 import math
@@ -43,13 +43,13 @@ type _Key = tuple[Sender, int, bytes]
 
 @dataclass(frozen=True)
 class ReceivedCommand:
-    """A command as it came.
+    """Command as it was received.
 
     Attributes:
         sender: System and component.
         number: MAV_CMD.
-        parameters: Its seven.
-        is_repeated: True if its sender says that it was sent before.
+        parameters: The seven parameters.
+        is_repeated: True if its sender has marked it as sent before.
     """
 
     sender: Sender
@@ -59,7 +59,7 @@ class ReceivedCommand:
 
     @property
     def key(self) -> _Key:
-        """Key that makes it the same command; parameters may be no numbers."""
+        """Key by which equal commands are recognized; parameters may be NaN."""
         return self.sender, self.number, struct.pack("<7d", *self.parameters)
 
 
@@ -73,13 +73,13 @@ class _Pending:
 
 
 def acknowledgement(received: ReceivedCommand, result: Result) -> Make:
-    """The answer to a command, for its sender."""
+    """Return the answer to a command, for its sender."""
     system, component = received.sender
     return lambda codec: codec.command_ack_encode(received.number, int(result), 0, 0, system, component)
 
 
 class CommandHandler:
-    """Commands and their answers.
+    """Handler of commands and their answers.
 
     Args:
         operations: The daemon.
@@ -99,7 +99,7 @@ class CommandHandler:
         self._ordered: set[Stop] = set()
 
     def begin(self) -> None:
-        """Begin anew: commands from here on have not come yet when anything before was ordered, by whomever."""
+        """Begin anew: commands that come from now on are newer than every earlier order, whoever gave it."""
         self._ordered.clear()
 
     def _stop(self, stop: Stop, by: Sender, now_s: float) -> None:
@@ -115,7 +115,7 @@ class CommandHandler:
             self._operations.order(stop.command, _name(by))
 
     def take(self, received: ReceivedCommand, wanted: Meaning, now_s: float) -> list[Make]:
-        """Obey a command; return the messages for its sender that go out at once.
+        """Carry out a command; return the messages for its sender that are sent at once.
 
         Args:
             received: Command as it came.
@@ -147,7 +147,7 @@ class CommandHandler:
                 return [acknowledgement(received, result)]
 
     def poll(self, now_s: float) -> list[Make]:
-        """The answers that have come."""
+        """Return the answers that have come."""
         found = []
         for key, pending in list(self._pending.items()):
             limit_s = RESET_LIMIT_S if pending.command is OperatorCommand.RESET else ANSWER_LIMIT_S

@@ -1,7 +1,7 @@
 """Meaning of a ground station's commands: pure functions from numbers to meanings.
 
 Sources: mavlink.io (command protocol, MAV_CMD, MAV_RESULT) and what stations send in practice. Stopping is never
-refused, whatever else stands in the command.
+refused, whatever the other parameters of the command are.
 """
 
 import math
@@ -34,11 +34,11 @@ class Stop(StrEnum):
 
 @dataclass(frozen=True)
 class Change:
-    """Request that something is to change.
+    """Command that changes the state of the daemon.
 
     Attributes:
         command: Command for the daemon.
-        mode: The mode that was asked for by its number; None: no mode was.
+        mode: Number of the requested mode; None: no mode was requested.
     """
 
     command: OperatorCommand
@@ -47,11 +47,11 @@ class Change:
 
 @dataclass(frozen=True)
 class Interval:
-    """A message is to come that often.
+    """Request to send a message at an interval.
 
     Attributes:
-        message: Its number.
-        interval_s: Between two of it; `math.inf`: never; None: as it is by default.
+        message: Number of the message.
+        interval_s: Time between two messages, in seconds; `math.inf`: never; None: the default.
     """
 
     message: int
@@ -60,10 +60,10 @@ class Interval:
 
 @dataclass(frozen=True)
 class Once:
-    """A message is to come once.
+    """Request to send a message once.
 
     Attributes:
-        message: Its number.
+        message: Number of the message.
     """
 
     message: int
@@ -79,8 +79,8 @@ class Refusal:
     """Refusal of a command.
 
     Attributes:
-        result: As it is answered.
-        why: One sentence; empty: the result says it all.
+        result: Result in the answer.
+        why: Reason, one sentence; empty: the result is enough.
     """
 
     result: Result
@@ -129,7 +129,7 @@ def mode_meaning(base_mode: float, custom_mode: float) -> Meaning:
     """Return the meaning of a change of mode.
 
     Args:
-        base_mode: MAV_MODE_FLAG; without the bit for own modes, its other bits say what is meant.
+        base_mode: MAV_MODE_FLAG; without the bit for custom modes, its other bits define the mode.
         custom_mode: Mode of ArduPilot Rover.
     """
     if custom_mode == Mode.HOLD:

@@ -1,4 +1,4 @@
-"""Motion that is asked for by set-points, as requests of a program to a supervision layer.
+"""Motion that set-points request, as requests of a program to a supervision layer.
 
 Sources: mavlink.io (SET_POSITION_TARGET_LOCAL_NED, MANUAL_CONTROL) and ArduPilot Rover. Rotations are clockwise there
 and counter-clockwise here. A ground station that drives by hand must repeat its set-points: when the stream ends, the
@@ -27,14 +27,14 @@ _FULL = 1000.0
 
 
 class Unusable(Exception):
-    """A set-point cannot be followed; says why."""
+    """A set-point cannot be followed; the message says why."""
 
 
 def from_position_target(raw: Any) -> Velocity:
-    """The velocity that SET_POSITION_TARGET_LOCAL_NED asks for.
+    """Return the velocity that SET_POSITION_TARGET_LOCAL_NED requests.
 
     Raises:
-        Unusable: It asks for anything else than a speed ahead and a yaw rate.
+        Unusable: The set-point is not a forward speed, a yaw rate or both.
     """
     mask = raw.type_mask
     if raw.coordinate_frame not in _BODY_FRAMES:
@@ -62,7 +62,7 @@ def from_manual_control(raw: Any, fastest: Velocity) -> Velocity:
         fastest: Velocity of a full stick.
 
     Raises:
-        Unusable: An axis that is needed is not there.
+        Unusable: A required axis is missing.
     """
     if abs(raw.x) > _FULL or abs(raw.r) > _FULL:
         raise Unusable("A stick has no x or no r axis.")
@@ -70,14 +70,14 @@ def from_manual_control(raw: Any, fastest: Velocity) -> Velocity:
 
 
 def drive_message(mapping: ChannelMapping) -> Communication | None:
-    """The message to the robot that is mapped to the drive; of several, the first of the model."""
+    """Return the message to the robot that is mapped to the drive; of several, the first of the model."""
     return next(
         (item for item, _ in mapping.mapped_to(DriveChannel) if item.kind is CommunicationKind.INCOMING_MESSAGE), None
     )
 
 
 def drive_data(model: Model, message: Communication, velocity: Velocity) -> dict[str, Any]:
-    """A velocity in the shape of the message: a twist, or a twist with a stamp around it."""
+    """Return a velocity in the shape of the message: a twist, or a stamped twist."""
     twist = {
         "linear": {"x": velocity.linear_m_s, "y": 0.0, "z": 0.0},
         "angular": {"x": 0.0, "y": 0.0, "z": velocity.angular_rad_s},
@@ -97,7 +97,7 @@ class _Drive:
 
 
 class Driving:
-    """A person at the ground station who drives: attached to the layer while set-points come.
+    """Driver at the ground station, as a program that is attached to the layer while set-points come.
 
     Args:
         model: Model that the layer is for.
@@ -120,7 +120,7 @@ class Driving:
         self._drive: _Drive | None = None
 
     def take(self, now_s: float, velocity: Velocity) -> None:
-        """A set-point came."""
+        """Pass a set-point on as a request."""
         if self._drive is None:
             self._drive = _Drive(Program("MAVLink", self._notify, may_request=True), now_s, velocity)
             self._post(Attached(self._drive.program))
@@ -128,14 +128,14 @@ class Driving:
         self._request(self._drive, velocity)
 
     def poll(self, now_s: float) -> bool:
-        """End driving that has fallen silent; whether it has just ended while the robot was to move."""
+        """End driving without set-points; return True if it has just ended while motion was requested."""
         drive = self._drive
         if drive is None or now_s - drive.last_s < SILENCE_S:
             return False
         return self.end()
 
     def end(self) -> bool:
-        """End driving; whether the robot was to move."""
+        """End driving; return True if motion was requested."""
         drive, self._drive = self._drive, None
         if drive is None:
             return False

@@ -34,7 +34,7 @@ _JOIN_S = 3.0
 
 
 class GroundLink:
-    """A link to a ground station. Whatever happens to it, the daemon goes on.
+    """Link to a ground station; the daemon continues, whatever happens to the link.
 
     Args:
         operations: The daemon.
@@ -42,7 +42,7 @@ class GroundLink:
         host: Parts of its computer that it uses; readings and scans have their times from its clock, too.
 
     Raises:
-        SigningError: There is no key, or its time cannot be kept.
+        SigningError: There is no key, or the time stamp of signatures cannot be stored.
     """
 
     def __init__(self, operations: Operations, settings: GroundSettings, host: Host = SYSTEM_HOST) -> None:
@@ -63,21 +63,21 @@ class GroundLink:
 
     @property
     def port(self) -> int | None:
-        """Address of its own end, where there is a network and the line is open."""
+        """Port of its own end, if the line is open and has a network."""
         with self._guard:
             return self._line.port if isinstance(self._line, NetworkPort) else None
 
     @property
     def is_alive(self) -> bool:
-        """True if its thread runs; it ends with `stop` alone, whatever happens to the line."""
+        """True if its thread runs; only `stop` ends it, whatever happens to the line."""
         return self._thread.is_alive()
 
     def start(self) -> None:
-        """Begin; whether the station is there is nobody's concern."""
+        """Start the thread, whether or not the station is there."""
         self._thread.start()
 
     def stop(self) -> None:
-        """End, with a last heartbeat; may be called again, and before `start`."""
+        """Send a last heartbeat and end the thread; may be called again, and before `start`."""
         with self._ending:
             self._is_over = True
             self._ending.notify_all()

@@ -39,7 +39,7 @@ def happened(before: Snapshot | None, after: Snapshot) -> Iterator[Notice]:
 
 
 def blocking_notices(snapshot: Snapshot) -> Iterator[Notice]:
-    """Yield the notices of what stands in the way, or should be known, as long as it does."""
+    """Yield the notices about conditions that hold now: reasons why the robot does not move, and warnings."""
     if snapshot.problem:
         yield Severity.CRITICAL, snapshot.problem
     is_running = snapshot.state is State.RUNNING

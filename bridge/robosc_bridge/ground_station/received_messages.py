@@ -18,7 +18,7 @@ OLD = STOPPING | {Incoming.HEARTBEAT}
 
 @dataclass(frozen=True)
 class ReceivedMessage:
-    """A message that came.
+    """Message that was received.
 
     Attributes:
         sender: System and component.
@@ -41,7 +41,7 @@ class ReceivedMessage:
 
 
 def received_from(message: Any) -> ReceivedMessage:
-    """Return the message as it was heard, from a message of the library."""
+    """Return the received message, from a message of the library."""
     sender = (message.get_srcSystem(), message.get_srcComponent())
     return ReceivedMessage(sender, message.get_msgId(), message, is_signed(message), is_old(message))
 

@@ -20,7 +20,7 @@ _FILE_PAYLOAD = 251
 
 
 def answers(number: int, message: Any, sender: tuple[int, int], settings: GroundSettings, now_s: float) -> list[Make]:
-    """Return the answers to a request; empty: it is none.
+    """Return the answers to a request; empty: the message is no request.
 
     Args:
         number: Number of the message.

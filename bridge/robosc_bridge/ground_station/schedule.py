@@ -5,10 +5,10 @@ from collections.abc import Iterator, Mapping
 
 
 class Schedule:
-    """Messages that come again and again.
+    """Schedule of periodic messages.
 
     Args:
-        defaults: Seconds between two of each, by number; `math.inf`: only if somebody wants it.
+        defaults: Default interval of each message, in seconds, by number; `math.inf`: only on request.
     """
 
     def __init__(self, defaults: Mapping[int, float]) -> None:
@@ -17,11 +17,11 @@ class Schedule:
         self._due_s = dict.fromkeys(defaults, -math.inf)
 
     def interval_s(self, message: int) -> float:
-        """Return the interval at which a message comes, in seconds."""
+        """Return the interval of a message, in seconds."""
         return self._intervals_s[message]
 
     def change(self, message: int, interval_s: float | None) -> bool:
-        """Let a message come that often, None: as by default; whether it is one of these."""
+        """Change the interval of a message, None: to the default; return True if the message has a schedule."""
         if message not in self._defaults:
             return False
         self._intervals_s[message] = self._defaults[message] if interval_s is None else interval_s
@@ -29,7 +29,7 @@ class Schedule:
         return True
 
     def due(self, now_s: float) -> Iterator[int]:
-        """The messages whose time has come, who waits longest first; the next of each is an interval later."""
+        """Return the messages that are due, the one that waits longest first; each is due again an interval later."""
         waiting = [
             (due_s, message)
             for message, due_s in self._due_s.items()
@@ -41,11 +41,11 @@ class Schedule:
 
 
 class Bucket:
-    """A rate with bursts.
+    """Token bucket: a limited rate with bursts.
 
     Args:
-        rate_per_s: Over some time.
-        most: At once.
+        rate_per_s: Average rate.
+        most: Size of a burst.
     """
 
     def __init__(self, rate_per_s: float, most: float) -> None:
@@ -55,16 +55,16 @@ class Bucket:
         self._last_s: float | None = None
 
     def pass_time(self, now_s: float) -> None:
-        """Let time fill the budget again."""
+        """Refill the bucket for the time that has passed."""
         if self._last_s is not None:
             self._left = min(self._left + max(now_s - self._last_s, 0.0) * self._rate_per_s, self._most)
         self._last_s = now_s
 
     @property
     def has_some(self) -> bool:
-        """True if at least one is left."""
+        """True if at least one token is left."""
         return self._left >= 1.0
 
     def take(self, amount: float = 1.0) -> None:
-        """Use it, also beyond what is left: that is made up for before there is some again."""
+        """Take tokens, even more than are left: the bucket must then refill beyond zero first."""
         self._left = max(self._left - amount, -self._most)

@@ -1,7 +1,7 @@
-"""A session with a ground station, driven by time and bytes alone.
+"""A session with a ground station, which depends only on time and bytes.
 
-It needs no socket, thread or clock. Whatever comes is untrusted: garbage is counted, a message that makes no sense is
-answered or dropped, and nothing raises.
+It needs no socket, thread or clock. All input is untrusted: garbage is counted, an invalid message is answered or
+dropped, and no input raises an error.
 """
 
 import logging
@@ -56,16 +56,16 @@ _NOT_SIGNED = "Only stopping is obeyed here without a valid signature."
 
 
 class StationSession:
-    """Conversation with a ground station.
+    """Session with a ground station.
 
     Args:
         operations: The daemon.
         settings: Settings of the link.
-        now_s: The time, by the clock that readings and scans have theirs from.
+        now_s: Current time, by the clock of readings and scans, in seconds.
 
     Attributes:
-        accepted: Number of messages of stations that have come and count.
-        claims: Number of these that let their sender be the station in use: its sign of life, or a command.
+        accepted: Number of messages of stations that were accepted.
+        claims: Number of accepted messages that make their sender the station in use: a heartbeat, or a command.
 
     Raises:
         SigningError: There is no key, or its time cannot be kept.
@@ -104,7 +104,7 @@ class StationSession:
             _log.info("names at the ground station: %s", ", ".join(short))
 
     def step(self, now_s: float, data: bytes = b"", *, is_datagram: bool = False) -> bytes:
-        """Go on.
+        """Handle received bytes, and return the bytes to send.
 
         Args:
             now_s: The time.
@@ -141,10 +141,10 @@ class StationSession:
         return self._decoder.idle()
 
     def receive_from_other(self, now_s: float, data: bytes) -> bytes:
-        """A datagram of somebody else than the station in use, who may stop the robot and nothing more.
+        """Handle a datagram of a sender that is not the station in use, and that may only stop the robot.
 
         Returns:
-            What is to be sent to them.
+            Bytes to send to that sender.
         """
         self._pass_time(now_s)
         replies: list[Make] = []
@@ -157,12 +157,12 @@ class StationSession:
         return self._encoded(replies, ())
 
     def lost(self) -> None:
-        """The line is gone: nobody drives any more."""
+        """End driving, since the line is gone."""
         self._end_driving(self._driving is not None and self._driving.end())
         self._decoder.forget()
 
     def end(self, now_s: float) -> bytes:
-        """The bridge ends; what is to be sent last."""
+        """End the session with the bridge; return the last bytes to send."""
         self.lost()
         found = self.step(now_s)
         self._subscription.close()

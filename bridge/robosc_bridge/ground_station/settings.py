@@ -1,4 +1,4 @@
-"""Settings for reaching a ground station, and for what it may do; checked before anything starts."""
+"""Settings of the line to a ground station and of its permissions, checked before anything starts."""
 
 import ipaddress
 from dataclasses import dataclass
@@ -25,12 +25,12 @@ _RANGES_M = {"lds01": (0.12, 3.5), "lds02": (0.16, 8.0), "lds03": (0.05, 12.0)}
 
 
 class GroundSettingsError(BridgeError):
-    """A ground station cannot be reached as the configuration says."""
+    """The settings of the ground station in the configuration are invalid."""
 
 
 @dataclass(frozen=True)
 class GroundSettings:
-    """Settings for reaching a ground station.
+    """Settings of the line to a ground station.
 
     Attributes:
         address: Address of `transport.network_line`, or a serial port's path.
@@ -39,9 +39,9 @@ class GroundSettings:
         system: Number of the vehicle.
         component: Number of the bridge in it.
         signing: The key; None: nothing is signed.
-        accepts_unsigned: True if, without a key, more than stopping and asking is allowed.
+        accepts_unsigned: True if, without a key, more than stops and requests for messages is allowed.
         interval_s: Time between two messages of pose, and of obstacles, in seconds.
-        range_m: Shortest and longest that the LiDAR measures.
+        range_m: Shortest and longest distance that the LiDAR measures.
     """
 
     address: str
@@ -56,19 +56,19 @@ class GroundSettings:
 
     @property
     def bytes_per_s(self) -> float:
-        """Most that is sent, over some time: a serial line keeps a third free for what comes unasked."""
+        """Maximum average rate of sent bytes; a third of a serial line stays free for unsolicited messages."""
         return NETWORK_BYTES_PER_S if is_network_address(self.address) else self.baud / 10 * 2 / 3
 
 
 def ground_settings(configuration: Configuration, fastest: Velocity) -> GroundSettings | None:
-    """The settings of a configuration; None: there is no ground station.
+    """Return the settings of a configuration; None: there is no ground station.
 
     Args:
-        configuration: Configuration with them in its section `remote`.
+        configuration: Configuration with the settings in its section `remote`.
         fastest: Limits of speed and yaw rate.
 
     Raises:
-        GroundSettingsError: They do not go together.
+        GroundSettingsError: The settings contradict each other.
     """
     remote = configuration.remote
     if remote.mavlink_url is None:
@@ -92,7 +92,7 @@ def ground_settings(configuration: Configuration, fastest: Velocity) -> GroundSe
 
 
 def is_loopback(address: str) -> bool:
-    """Return True if only programs on this computer are reached there, and can reach it."""
+    """Return True if an address connects only programs on this computer."""
     if not is_network_address(address):
         return False
     host = address.split(":")[1]

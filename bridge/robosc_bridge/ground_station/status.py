@@ -1,4 +1,4 @@
-"""State of the daemon, in the words of a heartbeat: mode, whether it is armed, how it is.
+"""State of the daemon as the content of a heartbeat: mode, armed or not, system status.
 
 Sources: mavlink.io (HEARTBEAT, MAV_MODE_FLAG, MAV_STATE); the numbers of modes are those of ArduPilot Rover, which
 ground stations know by name for a ground rover.
@@ -50,7 +50,7 @@ class VehicleStatus:
 
 
 def is_held(snapshot: Snapshot) -> bool:
-    """Return True if an operator has stopped it."""
+    """Return True if an operator has stopped the robot."""
     return Reason.OPERATOR_STOP in snapshot.reasons
 
 
@@ -58,9 +58,9 @@ def status_of(snapshot: Snapshot | None, *, is_layer: bool, is_stale: bool) -> V
     """Return the content of the heartbeat.
 
     Args:
-        snapshot: The latest; None: there was none yet.
+        snapshot: Latest snapshot; None: there was none yet.
         is_layer: True if the supervisor is a supervision layer.
-        is_stale: True if it is so old that the loop must be taken for hung.
+        is_stale: True if the snapshot is so old that the loop counts as hung.
     """
     if snapshot is None:
         state = SystemStatus.EMERGENCY if is_stale else SystemStatus.BOOT
@@ -74,7 +74,7 @@ def status_of(snapshot: Snapshot | None, *, is_layer: bool, is_stale: bool) -> V
 
 
 def run_mode(is_layer: bool) -> Mode:
-    """The mode in which it drives: by itself, or as it is asked to within what the supervisor allows."""
+    """Return the mode of a run: AUTO for a controller, GUIDED for a supervision layer."""
     return Mode.GUIDED if is_layer else Mode.AUTO
 
 

@@ -56,7 +56,7 @@ type Sender = tuple[int, int]
 
 @dataclass(frozen=True)
 class Chunk:
-    """A piece of a text; number 0: it is a whole one."""
+    """Chunk of a text; number 0: the whole text."""
 
     data: bytes
     number: int
@@ -64,7 +64,7 @@ class Chunk:
 
 
 def plain_text(text: str) -> str:
-    """On one line, within `LONGEST` bytes."""
+    """Return a text on one line, within `LONGEST` bytes."""
     line = "".join(character if character.isprintable() else " " for character in text)
     data = line.encode("utf-8", errors="replace")
     if len(data) <= LONGEST:
@@ -73,11 +73,11 @@ def plain_text(text: str) -> str:
 
 
 def chunks(text: str, number: int) -> tuple[Chunk, ...]:
-    """Return a text as it is sent.
+    """Return the chunks in which a text is sent.
 
     Args:
         text: Text without the character 0.
-        number: Number that distinguishes it from other long ones, 1 to 65535.
+        number: Number that distinguishes it from other long texts, 1 to 65535.
     """
     data = text.encode("utf-8")
     if len(data) <= CHUNK:
@@ -94,7 +94,7 @@ def chunks(text: str, number: int) -> tuple[Chunk, ...]:
 
 
 def status_text(severity: Severity, chunk: Chunk) -> Make:
-    """A chunk as a message."""
+    """Return a chunk as a message."""
     return lambda codec: codec.statustext_encode(int(severity), chunk.data, chunk.number, chunk.place)
 
 
@@ -107,12 +107,12 @@ class _Waiting:
 
     @property
     def rank(self) -> tuple[bool, int]:
-        """The smaller, the sooner it is reported."""
+        """Rank of the text: smaller ranks are sent first."""
         return self.asked_by is not None, self.severity
 
 
 class StatusTexts:
-    """Texts that are to be reported, and their times."""
+    """Queue of texts to send, and the times of texts that were sent."""
 
     def __init__(self) -> None:
         self._waiting: list[_Waiting] = []
@@ -136,10 +136,10 @@ class StatusTexts:
 
         Args:
             now_s: The time.
-            severity: The graver, the sooner it is reported.
-            text: Of any length.
-            again_s: Seconds.
-            asked_by: Asker that it answers, system and component; None: it is news of the robot, which goes first.
+            severity: Severity of the text; graver texts are sent first.
+            text: Text of any length.
+            again_s: Shortest time between two equal texts, in seconds.
+            asked_by: System and component whose request it answers; None: it is news of the robot, which is sent first.
         """
         text = plain_text(text)
         sent_s = self._recent.get(text)
@@ -187,7 +187,7 @@ class StatusTexts:
         self._recent.clear()
 
     def take(self, now_s: float) -> list[Make]:
-        """Return the messages that go out now."""
+        """Return the messages to send now."""
         self._bucket.pass_time(now_s)
         found = []
         while self._bucket.has_some and (item := self._next()) is not None:

@@ -48,9 +48,9 @@ class Stream:
         now_s: Time when it begins.
 
     Attributes:
-        snapshot: The latest; None: there was none yet.
-        bad_packets: Packets that have come and were ignored.
-        held_back: Requests that a supervision layer has held back.
+        snapshot: Latest snapshot; None: there was none yet.
+        bad_packets: Number of received packets that were ignored.
+        held_back: Number of requests that a supervision layer has held back.
         schedule: Schedule of each message.
     """
 
@@ -77,7 +77,7 @@ class Stream:
         self._sent: dict[str, tuple[values.Number, float]] = {}
 
     def poll(self, snapshot: Snapshot | None, now_s: float) -> bool:
-        """See the latest snapshot; whether it is a new one."""
+        """Read the latest snapshot; return True if it is new."""
         is_new = snapshot is not None and (self.snapshot is None or snapshot.number != self.snapshot.number)
         if is_new:
             self.snapshot = snapshot
@@ -93,14 +93,14 @@ class Stream:
         return status_of(self.snapshot, is_layer=self._is_layer, is_stale=self.is_stale(now_s))
 
     def pulse(self, now_s: float) -> list[Make]:
-        """The heartbeat, when it is due; none at all when the loop has hung for long."""
+        """Return the heartbeat, if it is due; none if the loop has hung for long."""
         if now_s < self._pulse_s:
             return []
         self._pulse_s = max(self._pulse_s + HEARTBEAT_S, now_s)
         return self._heartbeat(now_s)
 
     def due(self, now_s: float) -> Iterator[Make]:
-        """Yield the messages that are to be sent now; made while they are taken, so that whoever takes may stop."""
+        """Yield the messages to send now; each is made when it is taken, so that the caller may stop early."""
         values = self._changed_values(now_s)
         # On a slow line, neither leaves the other nothing.
         yield from itertools.islice(values, VALUES_FIRST)

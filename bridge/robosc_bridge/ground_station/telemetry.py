@@ -31,7 +31,7 @@ _NO_TEMPERATURE = 32767
 
 
 def heartbeat(status: VehicleStatus) -> Make:
-    """Make the message that reports that it is there, and its status."""
+    """Make the heartbeat with the status."""
     return lambda codec: codec.heartbeat_encode(
         GROUND_ROVER, dialect.MAV_AUTOPILOT_GENERIC, status.base_mode, int(status.mode), int(status.system_status)
     )
@@ -48,11 +48,11 @@ def _millivolts(reading: DriveReading | None) -> int:
 
 
 def sys_status(snapshot: Snapshot, bad_packets: int) -> Make:
-    """Make the message that reports which parts there are, whether they work, and the battery.
+    """Make the message about the presence and health of the parts, and the battery.
 
     Args:
-        snapshot: The latest.
-        bad_packets: Packets that have come and were ignored.
+        snapshot: Latest snapshot.
+        bad_packets: Number of received packets that were ignored.
     """
     devices, reading = snapshot.devices, snapshot.reading
     present = _MOTORS | (_PROXIMITY if Device.SCANNER in devices else 0)
@@ -110,7 +110,7 @@ def attitude(reading: DriveReading, boot_ms: int) -> Make:
 
 
 def local_position(reading: DriveReading, boot_ms: int) -> Make:
-    """Place and velocity, with north where the odometry began to look."""
+    """Position and velocity; north is the heading at the begin of the odometry."""
     pose, speed_m_s = reading.pose, reading.velocity.linear_m_s
     ahead, left = math.cos(pose.heading_rad), math.sin(pose.heading_rad)
     return lambda codec: codec.local_position_ned_encode(
@@ -123,8 +123,8 @@ def obstacle_distance(scan: Scan, least_m: float, most_m: float) -> Make:
 
     Args:
         scan: A full revolution.
-        least_m: Shortest that the LiDAR measures.
-        most_m: Longest.
+        least_m: Shortest distance that the LiDAR measures.
+        most_m: Longest distance that the LiDAR measures.
     """
     least_cm, most_cm = math.ceil(least_m * 100 - 1e-6), int(most_m * 100 + 1e-6)
     distances_cm = ring_distances_cm(scan.ranges_m, least_cm, most_cm)

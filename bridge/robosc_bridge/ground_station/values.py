@@ -1,8 +1,8 @@
 """States and variables of the model's components as named values.
 
-MAVLink gives a value a name of at most 10 bytes. Where `Component` or `Component.variable` is longer, the first six
-bytes, a tilde and three characters made from the whole name stand for it: the name of a value does not depend on what
-else is in the model, but for the rare case that two names give the same.
+MAVLink gives a value a name of at most 10 bytes. If `Component` or `Component.variable` is longer, the name is its
+first six bytes, a tilde and three characters made from the whole name: so it does not depend on the rest of the model,
+except in the rare case that two names give the same short one.
 """
 
 import math
@@ -40,9 +40,9 @@ class NamedValue:
     Attributes:
         name: Name as it is sent; at most `NAME_BYTES` ASCII characters.
         meaning: `Component` for its state, `Component.variable`.
-        component: Name of it in the snapshot.
-        variable: Variable in the component; None: its state is meant.
-        words: Words whose place here is sent: states, or values of an enum; empty: a number or truth value.
+        component: Name of the component in the snapshot.
+        variable: Variable of the component; None: its state.
+        words: Words whose index is sent: states, or values of an enum; empty: the value is a number or truth value.
         is_float: True if NAMED_VALUE_FLOAT sends it, else NAMED_VALUE_INT.
     """
 
@@ -54,7 +54,7 @@ class NamedValue:
     is_float: bool = False
 
     def number(self, components: Mapping[str, Mapping[str, Any]]) -> Number | None:
-        """Its value; None: there is none now, or none that can be reported."""
+        """Return the present value; None: there is none, or it cannot be reported."""
         component = components.get(self.component)
         if component is None:
             return None
@@ -74,7 +74,7 @@ def _single(value: float) -> float:
 
 
 def named_values(model: Model) -> tuple[NamedValue, ...]:
-    """All named values of a model, in its order."""
+    """Return all named values of a model, in its order."""
     taken = {SUPERVISOR_STATE, BLOCKED}
     found: list[NamedValue] = []
     for meaning, component, variable, words, is_float in _published(model):
@@ -116,12 +116,12 @@ def _short(meaning: str, taken: set[str]) -> str:
 
 
 def supervisor_state(snapshot: Snapshot) -> int:
-    """The value of `SUPERVISOR_STATE`."""
+    """Return the value of `SUPERVISOR_STATE`."""
     return list(State).index(snapshot.state)
 
 
 def named_value(name: str, number: Number, boot_ms: int) -> Make:
-    """A named value as a message."""
+    """Return a named value as a message."""
     data = name.encode("ascii")
     if isinstance(number, float):
         return lambda codec: codec.named_value_float_encode(boot_ms, data, number)

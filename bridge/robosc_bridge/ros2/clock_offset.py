@@ -33,7 +33,7 @@ class ClockOffset:
         self._differences: deque[tuple[float, float]] = deque()
 
     def add(self, sent_s: float, received_s: float) -> None:
-        """Note one more.
+        """Add a pair of times.
 
         Args:
             sent_s: Time by the sender's clock.
@@ -47,7 +47,7 @@ class ClockOffset:
             self._differences.popleft()
 
     def local_s(self, sender_s: float) -> float:
-        """Return a time of the sender's clock by this computer's; needs one note at least."""
+        """Convert a time of the sender's clock to this computer's; needs at least one pair of times."""
         return sender_s + self._differences[0][1]
 
 

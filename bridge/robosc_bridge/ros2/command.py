@@ -84,7 +84,7 @@ def add_command(commands: Any) -> None:
 
 
 def main(argv: Sequence[str] | None = None) -> int:
-    """Run this command alone; returns the exit status."""
+    """Run only this command; returns the exit status."""
     parser = argparse.ArgumentParser(prog="robosc-bridge", description=__doc__)
     add_command(parser.add_subparsers(required=True, metavar="COMMAND"))
     arguments = parser.parse_args(argv)

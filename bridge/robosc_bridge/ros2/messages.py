@@ -141,8 +141,8 @@ def battery_state(drive: DriveState, stamp_ns: int) -> Any | None:
 def laser_scan(scan: Scan, stamp_ns: int, frames: Frames) -> Any:
     """Return a sensor_msgs/LaserScan, whose ranges are by REP 117 (ros.org/reps/rep-0117.html).
 
-    Rays of one degree have no time of their own: each is the nearest of some, and where a revolution begins is the
-    device's affair. So all are of the middle of the revolution.
+    The ranges have no times of their own: each is the nearest of several measurements in one degree, and devices begin
+    a revolution in different directions. So the stamp is the middle of the revolution.
 
     Args:
         scan: Revolution as the bridge sends it.

@@ -115,7 +115,7 @@ class BridgeNode:
             scanner: Place of its LiDAR as the bridge's configuration has it, forward and to the left; None: not there.
 
         Raises:
-            NodeError: Nobody knows it.
+            NodeError: The place of the LiDAR is not known.
         """
         if self._to_static_tf is None:
             return

@@ -33,20 +33,20 @@ class Outlet(Protocol):
         """Take the TurtleBot3 that a bridge drives; empty: another robot."""
 
     def put_drive(self, drive: DriveState, stamp_ns: int, pose_covariance: tuple[float, ...]) -> None:
-        """Another reading of the drive base."""
+        """Take another reading of the drive base."""
 
     def put_battery(self, drive: DriveState, stamp_ns: int) -> None:
-        """Another reading of the battery."""
+        """Take another reading of the battery."""
 
     def put_scan(self, scan: Scan, stamp_ns: int) -> None:
-        """Another revolution of the LiDAR."""
+        """Take another revolution of the LiDAR."""
 
     def put_diagnostics(self, reported: tuple[Entry, ...], stamp_ns: int, robot: str) -> None:
-        """Present state."""
+        """Take the present state."""
 
 
 class Relay:
-    """The relay. Its methods may be called from any thread.
+    """Relay of a bridge's readings; its methods may be called from any thread.
 
     Args:
         address: Address of the bridge, for diagnostics.
@@ -67,7 +67,7 @@ class Relay:
         self._stamps_ns: dict[str, int] = {}
 
     def connect(self, definition: Definition) -> None:
-        """A bridge answers: perhaps another one than before, or the same one after a restart."""
+        """Note that a bridge answers, which may be another one than before, or a restarted one."""
         with self._lock:
             has_place = definition.HasField("scanner_x_m") and definition.HasField("scanner_y_m")
             scanner = (definition.scanner_x_m, definition.scanner_y_m) if has_place else None
@@ -79,7 +79,7 @@ class Relay:
             self._read_s = self._turned_s = self._battery_s = -math.inf
 
     def lose(self, why: str) -> None:
-        """The bridge does not answer.
+        """Note that the bridge does not answer.
 
         Args:
             why: Reason, one sentence.
@@ -91,7 +91,7 @@ class Relay:
         """Pass on the news in a response of a bridge.
 
         Raises:
-            EarlierBridgeError: It does not send its times.
+            EarlierBridgeError: The bridge does not send the times of its readings.
         """
         with self._lock:
             if response.sent_s <= 0.0:

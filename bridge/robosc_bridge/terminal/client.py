@@ -1,4 +1,4 @@
-"""The bridge's service as a Python object: the one module of the terminal's side with generated names."""
+"""The bridge's service as a Python object: the only module of the terminal commands with generated names."""
 
 import os
 import queue
@@ -48,11 +48,11 @@ WatchResponse = pb.WatchResponse
 
 
 class RefusedError(Exception):
-    """The bridge does not do it; one sentence for a person."""
+    """The bridge refuses the request; one sentence for a person."""
 
 
 class UnreachableError(Exception):
-    """No bridge answers, or what should reach it cannot be used; one sentence for a person."""
+    """No bridge answers, or the credentials cannot be used; one sentence for a person."""
 
 
 class RequestedCommand(StrEnum):
@@ -116,7 +116,7 @@ class BridgeClient:
             self._stub.Stop(pb.StopRequest(), timeout=STOP_LIMIT_S)
 
     def request(self, command: RequestedCommand) -> None:
-        """Want something, and wait until it is done."""
+        """Give a command to the bridge, and wait until it is done."""
         with self._translated():
             response = self._stub.Command(pb.CommandRequest(command=_COMMANDS[command]), timeout=COMMAND_LIMIT_S)
         if response.refusal:
@@ -151,7 +151,7 @@ class BridgeClient:
         raise RefusedError(f"no communication of {definition.robot} is mapped to 'drive'")
 
     def watch(self, *, with_scans: bool, rate_hz: float, with_events: bool = True) -> Iterator[pb.WatchResponse]:
-        """Yield what the bridge is doing and what happens, until the bridge or the caller ends it."""
+        """Yield snapshots and events of the bridge, until the bridge or the caller ends the stream."""
         request = pb.WatchRequest(maximum_rate_hz=rate_hz, with_scans=with_scans, without_events=not with_events)
         with self._translated():
             call = self._stub.Watch(request)
@@ -161,11 +161,12 @@ class BridgeClient:
                 call.cancel()
 
     def operate(self, name: str, on_refusal: Callable[[str, str], None]) -> "Operator":
-        """Be the operator.
+        """Attach as the operator.
 
         Args:
             name: Name of the operator, for the bridge's log.
-            on_refusal: Function called from another thread with `blocked` and an identifier, or `refused` and why.
+            on_refusal: Function that is called from another thread, with `blocked` and an identifier, or with `refused`
+                and the reason.
         """
         return Operator(self._stub, name, on_refusal, self._error)
 
@@ -191,7 +192,7 @@ class BridgeClient:
 
 
 class Operator:
-    """An operator's stream to a supervision layer; its messages go out in the order in which they are given."""
+    """An operator's stream to a supervision layer; messages are sent in the order of the calls."""
 
     def __init__(
         self, stub: Any, name: str, on_refusal: Callable[[str, str], None], translate: Callable[[Any], Exception]
@@ -206,7 +207,7 @@ class Operator:
         self._thread.start()
 
     def drive(self, topic: DriveTopic, linear_m_s: float, angular_rad_s: float) -> None:
-        """Ask for a velocity.
+        """Request a velocity.
 
         Raises:
             RefusedError: The bridge has ended the stream.
@@ -224,7 +225,7 @@ class Operator:
         self._requests.put(pb.AttachRequest(keep_alive=pb.KeepAlive()))
 
     def close(self) -> None:
-        """Let what was given go out, and end the stream."""
+        """Send the waiting messages, and end the stream."""
         self._requests.put(None)
         self._thread.join(_PATIENCE_S)
         self._call.cancel()
@@ -254,12 +255,12 @@ def _value(data: dict[str, Any]) -> Value:
 
 
 def as_json(message: pb.Snapshot | pb.WatchResponse) -> dict[str, Any]:
-    """A message as JSON has it (protobuf's own mapping)."""
+    """Return a message as JSON, in protobuf's own mapping."""
     return MessageToDict(message, preserving_proto_field_name=True, always_print_fields_with_no_presence=True)
 
 
 def state_name(snapshot: pb.Snapshot) -> str:
-    """The bridge's state in a word."""
+    """Return the bridge's state in a word."""
     return pb.BridgeState.Name(snapshot.state).removeprefix("BRIDGE_STATE_").lower()
 
 
@@ -269,5 +270,5 @@ def is_fault(snapshot: pb.Snapshot) -> bool:
 
 
 def events_of(response: pb.WatchResponse) -> list[dict[str, Any]]:
-    """Entries of the event log."""
+    """Return the entries of the event log."""
     return [MessageToDict(event) for event in response.events]

@@ -15,7 +15,7 @@ _SHOWN_APART = ("time", "kind", "state", "controllable", "decision_us")
 
 
 def status_lines(snapshot: Snapshot) -> Iterator[str]:
-    """Yield what the bridge is doing: one fact a line."""
+    """Yield the status of the bridge, one fact a line."""
     yield printable(state_name(snapshot) + (f": {snapshot.problem}" if snapshot.problem else ""))
     if snapshot.age_s > STALE_S:
         yield f"  this is {snapshot.age_s:.1f} s old: the bridge's loop hangs"
@@ -63,13 +63,13 @@ def _drive_lines(drive: DriveState) -> Iterator[str]:
 
 
 class Lines:
-    """Lines that a watcher is shown: one for each event, and one where the bridge's own state changes."""
+    """Lines for a watcher: one for each event, and one for each change of the bridge's state."""
 
     def __init__(self) -> None:
         self._before: tuple[Any, ...] = ()
 
     def of(self, response: WatchResponse) -> Iterator[str]:
-        """Yield lines for what is new in a response."""
+        """Yield lines for the news in a response."""
         if response.lost_events:
             yield f"{_clock(time.time())} ! {response.lost_events} events were lost: they came too quickly"
         for entry in events_of(response):
@@ -93,7 +93,7 @@ class Lines:
 
 
 def event_line(entry: Mapping[str, Any]) -> str:
-    """An entry of the event log as a line: time, a mark for what was held back or failed, kind, what it is about."""
+    """Return a line for an entry of the event log: time, a mark if it was held back or failed, kind, subject."""
     kind = str(entry.get("kind"))
     words = [_word(entry[name]) for name in ("event", "identifier", "what") if name in entry]
     rest = {name: value for name, value in entry.items() if name not in (*_SHOWN_APART, "event", "identifier", "what")}
@@ -112,5 +112,5 @@ def _word(value: Any) -> str:
 
 
 def printable(text: str) -> str:
-    """A line without anything that a terminal would obey."""
+    """Return a line without control sequences for a terminal."""
     return "".join(sign if sign.isprintable() else "?" for sign in text)

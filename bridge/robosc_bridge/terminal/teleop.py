@@ -1,8 +1,8 @@
 """Driving by keys through a supervision layer.
 
-Nobody at the keys, no motion: a requested velocity expires soon after the last key, as a held key is repeated by its
-terminal. Signs of life are sent while keys come or the terminal answers (ECMA-48, 8.3.35: DSR 5 is answered by CSI 0
-n): a program whose terminal was cut off would else go on for its operator.
+Without keys there is no motion: a requested velocity expires soon after the last key, and the terminal repeats a held
+key. Signs of life are sent while keys come or the terminal answers (ECMA-48, 8.3.35: DSR 5 is answered by CSI 0 n), so
+that a program whose terminal was cut off does not count as an operator.
 """
 
 import os
@@ -63,14 +63,14 @@ _SIGNALS = (signal.SIGTERM, signal.SIGHUP)
 
 
 class Running(Protocol):
-    """A task that was started, and goes on beside the keys."""
+    """Task that runs beside the keys."""
 
     def is_alive(self) -> bool:
-        """Return whether it has not ended."""
+        """Return True if the task has not ended."""
 
 
 class Terminal(Protocol):
-    """Terminal in which somebody types, and the time that passes there."""
+    """Terminal that keys come from, with its clock."""
 
     def monotonic(self) -> float:
         """Return the time in seconds."""
@@ -86,7 +86,7 @@ class Terminal(Protocol):
 
 
 class RequestedVelocity:
-    """The velocity that the keys ask for.
+    """Velocity that the keys request.
 
     Attributes:
         linear_m_s: Forward.
@@ -100,16 +100,16 @@ class RequestedVelocity:
 
     @property
     def is_motion(self) -> bool:
-        """True if the robot is to move."""
+        """True if motion is requested."""
         return bool(self.linear_m_s or self.angular_rad_s)
 
     def expire(self, now_s: float) -> None:
-        """Without a key for too long no velocity is requested."""
+        """Request a standstill, if no key came for too long."""
         if now_s >= self._expiry_s:
             self.linear_m_s = self.angular_rad_s = 0.0
 
     def press(self, key: str, now_s: float) -> None:
-        """Handle a key; any but those of the help changes nothing."""
+        """Handle a key; keys that the help does not list have no effect."""
         self.expire(now_s)
         if key in _DRIVING:
             self._expiry_s = now_s + EXPIRY_S
@@ -130,7 +130,7 @@ def _stepped(value: float, step: float, most: float) -> float:
 
 
 def keys_of(text: str) -> list[str]:
-    """The keys in what a terminal sent; arrows as the letters that mean the same, its own answer as `PRESENT`."""
+    """Return the keys in the input of a terminal: arrows as the equivalent letters, its own answer as `PRESENT`."""
     found = []
     while text:
         code = next((code for code in _CODES if text.startswith(code)), None)
@@ -140,7 +140,7 @@ def keys_of(text: str) -> list[str]:
 
 
 def teleop(client: BridgeClient) -> int:
-    """Drive until `q` or the end of the terminal's input; the exit status.
+    """Drive until `q` or the end of the terminal's input; returns the exit status.
 
     Raises:
         RefusedError: The bridge does not let this caller drive.

@@ -23,7 +23,7 @@ _DATAGRAM = 65535
 
 
 def is_network_address(address: str) -> bool:
-    """Return True if an address is one of the kinds above, and no port's path."""
+    """Return True if an address is one of the kinds above, and not the path of a port."""
     return address.partition(":")[0] in SCHEMES
 
 
@@ -31,17 +31,17 @@ class NetworkLine(PolledLine, NetworkPort):
     """An open socket.
 
     Args:
-        address: Address as above. A host's name is looked up by the system, which may take its time; a number is not.
+        address: Address as above. The system looks up the name of a host, which may take long, but not an IP address.
 
     Attributes:
         path: The address.
         is_datagram: True if a read is one whole datagram.
 
     Raises:
-        LineMissingError: Nobody serves there, or there is no such host.
+        LineMissingError: No program serves there, or there is no such host.
         LineBusyError: Another program listens there.
-        LineDeniedError: This user may not.
-        LineError: It is no address, or cannot be used.
+        LineDeniedError: This user may not use the address.
+        LineError: The address is invalid, or cannot be used.
     """
 
     def __init__(self, address: str) -> None:
@@ -68,17 +68,17 @@ class NetworkLine(PolledLine, NetworkPort):
 
     @property
     def port(self) -> int:
-        """Address of its own end."""
+        """Port of its own end."""
         return int(self._socket.getsockname()[1])
 
     def read(self, limit_s: float) -> bytes:
-        """Return the data that has come, waiting for the first of it.
+        """Return the data that has come, after waiting for the first byte.
 
         Args:
             limit_s: Longest wait; 0: not at all.
 
         Returns:
-            Nothing when nothing came in time, or `wake` was called.
+            Empty if no data came in time, or `wake` was called.
 
         Raises:
             LineLostError: The connection is gone.
@@ -99,21 +99,21 @@ class NetworkLine(PolledLine, NetworkPort):
 
     @property
     def is_stranger(self) -> bool:
-        """Return whether the last datagram came from elsewhere than where writing goes; only for who listens."""
+        """Return True if the last datagram came from another peer than the chosen one; only for `udpin`."""
         return self._is_listening and self._peer is not None and self._sender != self._peer
 
     def reply(self, data: bytes) -> None:
-        """Send one datagram to where the last one came from; only for who listens. It may get lost."""
+        """Send one datagram to the sender of the last one; only for `udpin`. It may get lost."""
         if self._is_listening and self._sender is not None:
             with contextlib.suppress(OSError):
                 self._socket.sendto(data, self._sender)
 
     def answer_sender(self) -> None:
-        """From now on, what is written goes to where the last datagram came from; only for who listens."""
+        """Choose the sender of the last datagram as the peer for writing; only for `udpin`."""
         self._peer = self._sender
 
     def write(self, data: bytes, limit_s: float = 0.1) -> None:
-        """Send all of the data; while a listener has no peer, it goes nowhere.
+        """Send all of the data; without a peer, a listener drops it.
 
         Args:
             data: Data to send.

@@ -1,4 +1,4 @@
-"""Reading of a line that waits in `poll`: it costs nothing, has a limit, and ends when another thread says so."""
+"""Reading of a line with waits in `poll`: a wait costs nothing, has a limit, and can be ended by another thread."""
 
 import contextlib
 import os
@@ -52,7 +52,7 @@ class PolledLine(ABC):
                     os.write(self._waker, b"\0")
 
     def close(self) -> None:
-        """Give it back; never raises, and may be called again."""
+        """Close the line; never raises, and may be called again."""
         with self._guard:
             if not self._is_open:
                 return

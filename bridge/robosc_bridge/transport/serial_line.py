@@ -23,14 +23,14 @@ class SerialLine(PolledLine):
     """An open serial line.
 
     Args:
-        path: Of the port, best a stable name below /dev/serial/by-id or of a udev rule.
+        path: Path of the port, best a stable name below /dev/serial/by-id or of a udev rule.
         baud: Bits per second.
 
     Raises:
         LineMissingError: There is no such port.
-        LineBusyError: Another program has it.
-        LineDeniedError: This user may not open it.
-        LineError: It is no serial port, or cannot do this speed.
+        LineBusyError: Another program uses the port.
+        LineDeniedError: This user may not open the port.
+        LineError: The file is no serial port, or does not support this baud rate.
     """
 
     def __init__(self, path: str, baud: int) -> None:
@@ -47,13 +47,13 @@ class SerialLine(PolledLine):
         super().__init__(path, self._port.fileno())
 
     def read(self, limit_s: float) -> bytes:
-        """Return the bytes that have come, waiting for the first one.
+        """Return the bytes that have come, after waiting for the first one.
 
         Args:
             limit_s: Longest wait; 0: not at all.
 
         Returns:
-            At least one byte, or none when nothing came in time or `wake` was called.
+            At least one byte; empty if no byte came in time or `wake` was called.
 
         Raises:
             LineLostError: The line is gone.
@@ -99,7 +99,7 @@ class SerialLine(PolledLine):
         return bool(poll.poll(max(limit_s, 0.0) * 1000))
 
     def discard_input(self) -> None:
-        """Forget what has come and was not read.
+        """Discard bytes that have come and were not read.
 
         Raises:
             LineLostError: The line is gone.
@@ -110,10 +110,10 @@ class SerialLine(PolledLine):
             raise self._lost(error) from error
 
     def set_baud(self, baud: int) -> None:
-        """Go on at another speed.
+        """Change the baud rate.
 
         Raises:
-            LineError: The port cannot do this speed, or is gone.
+            LineError: The port does not support this baud rate, or is gone.
         """
         self._check_open()
         try:

@@ -36,7 +36,7 @@ class SystemHost(SystemClock):
         """Open a serial port.
 
         Raises:
-            LineError: It cannot be used.
+            LineError: The line cannot be used.
         """
         return SerialLine(path, baud)
 
@@ -44,7 +44,7 @@ class SystemHost(SystemClock):
         """Open a line over a network.
 
         Raises:
-            LineError: It cannot be used.
+            LineError: The line cannot be used.
         """
         return NetworkLine(address)
 
@@ -57,8 +57,8 @@ def open_line(address: str, baud: int, host: Host = SYSTEM_HOST) -> Line:
     """Open a line.
 
     Args:
-        address: Of `transport.network_line`, or a serial port's path.
-        baud: Of a serial port.
+        address: Address for `transport.network_line`, or the path of a serial port.
+        baud: Baud rate of a serial port.
         host: Host with these serial ports and this network.
 
     Raises:

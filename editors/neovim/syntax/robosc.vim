@@ -1,4 +1,4 @@
-" RoboSC: words, texts, numbers and comments. What a name stands for is told by the language server.
+" RoboSC: words, texts, numbers and comments. What a name stands for comes from the language server.
 if exists("b:current_syntax")
   finish
 endif

@@ -23,7 +23,7 @@ interface State {
   enabled: string[];
 }
 
-// Beyond these, a drawing tells nothing any more, and takes long.
+// A larger drawing is unreadable, and takes long.
 const MOST_DRAWN = 60;
 const MOST_ARROWS = 400;
 const MOST_STATES = 2000;

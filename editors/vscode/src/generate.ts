@@ -65,11 +65,11 @@ export async function generate(
   }
   const { files } = JSON.parse(ended.output) as { files: string[] };
   output.note(title, files.join("\n"));
-  void tell(output, files, where);
+  void report(output, files, where);
   return files;
 }
 
-async function tell(output: Output, files: string[], where: vscode.Uri): Promise<void> {
+async function report(output: Output, files: string[], where: vscode.Uri): Promise<void> {
   const many = files.length === 1 ? "1 file" : `${files.length} files`;
   const there = vscode.workspace.asRelativePath(where);
   const chosen = await vscode.window.showInformationMessage(`RoboSC: ${many} in ${there}`, REVEAL, SHOW);

@@ -42,7 +42,7 @@ export class LanguageServer {
         await this.begin();
       } catch (error) {
         await this.end();
-        void this.tellHow((error as Error).message);
+        void this.reportFailure((error as Error).message);
       }
     });
   }
@@ -56,7 +56,7 @@ export class LanguageServer {
   private async begin(): Promise<void> {
     const seconds = Math.min(Math.max(0, setting<number>("synthesisSeconds", 60)), MOST_SECONDS);
     const words = [...searchArguments(), "--synthesis-seconds", String(seconds)];
-    // Why it cannot be started, it tells in a sentence; of one that ends unasked, a client could tell only that.
+    // The check prints in one sentence why the server cannot start. A client only sees that a server has ended.
     const checked = await run("robosc-lsp", [...words, "--check"], undefined);
     if (checked.status !== 0) {
       this.output.note("robosc-lsp", checked.output, checked.errors);
@@ -81,7 +81,7 @@ export class LanguageServer {
         },
       },
       middleware: {
-        // What a lens tells, synthesis has found out: it leads there.
+        // A lens shows a result of synthesis, so it leads there.
         provideCodeLenses: async (document, token, next) =>
           (await next(document, token))?.map((lens) => {
             const title = lens.command?.title ?? "";
@@ -128,7 +128,7 @@ export class LanguageServer {
     }
   }
 
-  private async tellHow(why: string): Promise<void> {
+  private async reportFailure(why: string): Promise<void> {
     const chosen = await vscode.window.showErrorMessage(`RoboSC: no language server: ${why}`, HOW, SETTINGS);
     if (chosen === SETTINGS) {
       await vscode.commands.executeCommand("workbench.action.openSettings", "robosc.programs");

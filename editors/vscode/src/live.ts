@@ -26,10 +26,10 @@ export class LivePanel {
   private child: ChildProcess | undefined;
   private isClosed = false;
 
-  /** The address that is framed; undefined until the program has told it. */
+  /** The address that is framed; undefined until the program has printed it. */
   address: string | undefined;
 
-  /** Told when the panel is closed. */
+  /** Called when the panel is closed. */
   onClosed: () => void = () => undefined;
 
   constructor(
@@ -84,14 +84,14 @@ export class LivePanel {
     try {
       child = start("robosc", [...serving, ...framing, ...words, ...own], scope);
     } catch (error) {
-      this.tell((error as Error).message);
+      this.show((error as Error).message);
       return;
     }
     this.child = child;
-    let told = "";
+    let printed = "";
     let line = "";
     const note = (data: Buffer): void => {
-      told = (told + data.toString("utf8")).slice(-MOST_KEPT);
+      printed = (printed + data.toString("utf8")).slice(-MOST_KEPT);
     };
     child.stderr.on("data", note);
     child.stdout.on("data", (data: Buffer) => {
@@ -108,18 +108,18 @@ export class LivePanel {
       if (this.child === child) {
         this.child = undefined;
         this.address = undefined;
-        this.output.note(title, told);
-        this.tell(why);
+        this.output.note(title, printed);
+        this.show(why);
       }
     };
     child.on("error", (error) => ended(whyNot("robosc", error)));
-    child.on("close", (status) => ended(told.trim() || `robosc view ended with status ${status}`));
+    child.on("close", (status) => ended(printed.trim() || `robosc view ended with status ${status}`));
   }
 
   private async frame(address: string, around: string[]): Promise<void> {
     if (!(await isReached(address, around))) {
       this.end();
-      this.tell(
+      this.show(
         `This editor does not reach ${address.replace(/\?.*$/s, "")} by that address, and the live view answers to no other. ` +
           "Forward its port without a change, or start robosc view where you can open its page.",
       );
@@ -145,7 +145,7 @@ export class LivePanel {
     }
   }
 
-  private tell(why: string): void {
+  private show(why: string): void {
     if (this.isClosed) {
       return;
     }

@@ -13,7 +13,7 @@ const PAUSE_MS = 100;
  *
  * With it is saved what is open in the language: see `savedAll`.
  *
- * @returns undefined where there is none, which the user has been told.
+ * @returns undefined if there is none; the user has then seen a message.
  */
 export async function chosenModel(given: unknown): Promise<vscode.Uri | undefined> {
   const active = vscode.window.activeTextEditor?.document;
@@ -32,7 +32,7 @@ export async function chosenModel(given: unknown): Promise<vscode.Uri | undefine
 /**
  * Save everything that is open in the language, since programs read what is saved and any of it may be a library.
  *
- * @returns true if it is saved; if it is not, the user has been told.
+ * @returns true if it is saved; if not, the user has seen a message.
  */
 export async function savedAll(): Promise<boolean> {
   for (const document of vscode.workspace.textDocuments) {

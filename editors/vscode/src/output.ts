@@ -21,7 +21,7 @@ export class Output {
     this.channel.appendLine("");
   }
 
-  /** Tell that something went wrong, and where more is told. */
+  /** Show an error message, with buttons that lead to more. */
   async fail(message: string): Promise<void> {
     const chosen = await vscode.window.showErrorMessage(`RoboSC: ${message}`, SHOW, PROBLEMS);
     if (chosen === SHOW) {
@@ -36,19 +36,19 @@ export class Output {
   }
 }
 
-/** The line in which a program says why it failed: its first one, after findings or how it is used its last one. */
+/** The line in which a program says why it failed: the last one after findings or a usage text, else the first one. */
 export function reason(ended: Ended): string {
   const lines = (ended.errors.trim() || ended.output.trim()).split("\n");
-  const told = / (error|warning|note): |^usage: /.test(lines[0] ?? "") ? lines.at(-1) : lines[0];
-  return told?.replace(/^robosc: /, "").trim() || `it ended with status ${ended.status}`;
+  const line = / (error|warning|note): |^usage: /.test(lines[0] ?? "") ? lines.at(-1) : lines[0];
+  return line?.replace(/^robosc: /, "").trim() || `it ended with status ${ended.status}`;
 }
 
-/** As `reason`, of a program that answers in JSON. */
+/** The same as `reason`, for a program that answers in JSON. */
 export function reasonInJson(ended: Ended): string {
   try {
-    const told = JSON.parse(ended.output) as { error?: { message: string }; reason?: string; errors?: number };
-    const errors = told.errors === 1 ? "1 error" : `${told.errors} errors`;
-    return told.error?.message ?? (told.reason || (told.errors ? errors : reason(ended)));
+    const found = JSON.parse(ended.output) as { error?: { message: string }; reason?: string; errors?: number };
+    const errors = found.errors === 1 ? "1 error" : `${found.errors} errors`;
+    return found.error?.message ?? (found.reason || (found.errors ? errors : reason(ended)));
   } catch {
     return reason(ended);
   }

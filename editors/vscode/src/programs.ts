@@ -51,7 +51,7 @@ export function start(name: string, words: string[], scope: vscode.Uri | undefin
   const forget = (): void => void running.delete(child);
   child.on("error", forget);
   child.on("close", forget);
-  // Who is gone reads nothing, which its end tells.
+  // A program that has ended reads nothing; its end is reported by `close`.
   child.stdin.on("error", () => undefined);
   return child;
 }

@@ -56,8 +56,8 @@ async function made(title: string, model: vscode.Uri): Promise<{ ended: Ended; s
   }
 }
 
-async function offer(output: Output, model: vscode.Uri, supervisor: Uint8Array, told: string): Promise<void> {
-  const [first = "a supervisor exists"] = told.split("\n");
+async function offer(output: Output, model: vscode.Uri, supervisor: Uint8Array, summary: string): Promise<void> {
+  const [first = "a supervisor exists"] = summary.split("\n");
   const chosen = await vscode.window.showInformationMessage(`RoboSC: ${first}`, SAVE, SHOW);
   if (chosen === SHOW) {
     output.channel.show(true);

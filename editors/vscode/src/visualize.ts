@@ -97,7 +97,7 @@ async function chosenRunning(): Promise<Running | undefined> {
     if (namespace === undefined) {
       return undefined;
     }
-    const model = await modelOf("Without a model, the page cannot tell which requests are enabled", true);
+    const model = await modelOf("Without a model, the page cannot show which requests are enabled", true);
     return { source: "ros2", namespace: namespace.trim(), ...(model === undefined ? {} : { model }) };
   }
   if (chosen?.source === "log") {

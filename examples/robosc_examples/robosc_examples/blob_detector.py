@@ -33,7 +33,7 @@ class BlobDetector(Camera):
         self._blob = self.create_publisher(Point, "/blob", 10)
 
     def look(self, message: Image) -> None:
-        """Tell where the thing is in a picture."""
+        """Publish where the thing is in a picture."""
         blob = find_blob(colour_picture(message), self._colour, self._smallest)
         if blob is None:
             self.be_blind()
@@ -44,7 +44,7 @@ class BlobDetector(Camera):
             self._blob.publish(Point(x=blob.aside, y=blob.size, z=blob.confidence))
 
     def be_blind(self) -> None:
-        """Tell that the thing is not in sight."""
+        """Publish that the thing is not in sight."""
         self._blob.publish(Point())
 
 

@@ -34,7 +34,7 @@ class Camera(HelperNode):
         raise NotImplementedError
 
     def be_blind(self) -> None:
-        """Tell that nothing is in sight; called again and again."""
+        """Publish that nothing is in sight; called again and again."""
         raise NotImplementedError
 
     def stop(self) -> None:

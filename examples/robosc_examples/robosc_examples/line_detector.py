@@ -1,4 +1,4 @@
-"""Looks for a line on the floor and tells how to steer along it, or that there is none."""
+"""Detector of a line on the floor: publishes how to steer along it, or that there is none."""
 
 import sys
 from collections.abc import Sequence
@@ -39,7 +39,7 @@ class LineDetector(Camera):
         self._lost = self.create_publisher(Empty, "/line/lost", 10)
 
     def look(self, message: Image) -> None:
-        """Tell where the line is in a picture."""
+        """Publish how to steer along the line in a picture."""
         aside = find_line(grey_picture(message), self._settings)
         if aside is None:
             self.be_blind()
@@ -47,7 +47,7 @@ class LineDetector(Camera):
             self._correction.publish(Float32(data=clamped(self._gain * aside, self._limit_rad_s)))
 
     def be_blind(self) -> None:
-        """Tell that there is no line."""
+        """Publish that there is no line."""
         self._lost.publish(Empty())
 
 

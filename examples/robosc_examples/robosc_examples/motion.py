@@ -35,7 +35,7 @@ def wrapped(angle_rad: float) -> float:
 
 
 def yaw_of(x: float, y: float, z: float, w: float) -> float | None:
-    """The yaw of a quaternion of any length; None for one that tells no direction (zero, NaN, infinite)."""
+    """The yaw of a quaternion of any length; None for one without a direction (zero, NaN, infinite)."""
     norm = math.hypot(x, y, z, w)
     if not SMALLEST_NORM < norm < math.inf:
         return None

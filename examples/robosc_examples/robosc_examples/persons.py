@@ -50,11 +50,11 @@ class Scan(NamedTuple):
 
 
 def is_blind(scan: Scan) -> bool:
-    """Return True if a scan tells nothing: no beams, no sensible angles or limits, or most of it unknown."""
+    """Return True if a scan is unusable: no beams, no sensible angles or limits, or most ranges unknown."""
     sensible = all(map(math.isfinite, scan[1:])) and 0.0 <= scan.nearest_m < scan.farthest_m
     if not sensible or scan.step_rad == 0.0 or not scan.ranges:
         return True
-    # LiDARs tell free space as infinity, zero or beyond the farthest; never as NaN.
+    # LiDARs report free space as infinity, zero or beyond the farthest; never as NaN.
     return sum(map(math.isnan, scan.ranges)) * 2 > len(scan.ranges)
 
 

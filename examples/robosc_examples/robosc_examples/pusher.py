@@ -12,7 +12,7 @@ from robosc_examples.wheels import REST, Wheels
 
 
 class Pusher(Wheels):
-    """Takes metres a second on `/push`; `/pushed` tells that the push is over, whatever became of it.
+    """Takes metres a second on `/push`; `/pushed` reports that the push is over, successful or not.
 
     It ends after its distance, when `/bumper` is pressed, or after `push_timeout` seconds.
     """

@@ -1,4 +1,4 @@
-"""Turns the robot by an angle that a message asks for, by its odometry, and tells when it is done."""
+"""Rotator: turns the robot by the angle in a message, by its odometry, and reports when it is done."""
 
 import math
 import sys

@@ -1,4 +1,4 @@
-"""The reference implementation of `ControlledSystem`: it interprets a supervisor, obviously right before fast."""
+"""The reference implementation of `ControlledSystem`: it interprets a supervisor, and is simple rather than fast."""
 
 from robosc.execution.interpreter.description import describe
 from robosc.execution.interpreter.system import InterpretedSystem

@@ -8,13 +8,13 @@ from robosc.model.structure import Communication, CommunicationKind, EventKind, 
 from robosc.supervisor import Supervisor
 
 _MAXIMUM_BOUND = 2**63 - 1
-"""No run of this length ends in anybody's lifetime; a longer number is of no use."""
+"""Largest bound that is of use: no run of this length would end in a lifetime."""
 
 _WITH_RESET = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 
 
 def describe(supervisor: Supervisor) -> Description:
-    """Return what the executor must know beforehand of a supervisor's controlled system."""
+    """Return the static part of a supervisor's controlled system, which the executor needs."""
     model = supervisor.model
     return Description(
         name=model.name,
@@ -29,11 +29,11 @@ def describe(supervisor: Supervisor) -> Description:
 
 
 def silent_bound(model: Model) -> int:
-    """Silent steps in a row that a run which ends cannot exceed.
+    """Maximum number of silent steps in a row, if the run ends.
 
-    A tau changes one component's state and nothing else, so that taus alone pass through at most as many states
-    as the components that have taus can form. A service or action adds one reset or cancel at most: it
-    needs another request before the next.
+    A tau changes only the state of one component, so taus alone pass through at most as many states as the components
+    with taus can form together. A service or action adds at most one reset or cancel, because it needs another request
+    before the next.
     """
     states = [
         len(component.behaviour.states)

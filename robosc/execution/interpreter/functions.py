@@ -37,13 +37,13 @@ Data = Callable[[Path], Any]
 """Received data by path; None where it is unknown. Arrays are lists, and objects in them mappings."""
 
 Elements = tuple[Any, ...]
-"""Elements that the quantifiers around an expression look at, the innermost first."""
+"""Current elements of the quantifiers around an expression, the innermost first."""
 
 Function = Callable[[State, Data], Any]
 """The value of an expression; None where it is unknown."""
 
 Inner = Callable[[State, Data, Elements], Any]
-"""The same, of a part inside quantifiers."""
+"""The value of an expression inside quantifiers; None if it is unknown."""
 
 
 def no_data(path: Path) -> Any:
@@ -52,7 +52,7 @@ def no_data(path: Path) -> Any:
 
 
 def function_of(expression: Expression) -> Function:
-    """An expression as a function, built once so that it need not be taken apart again."""
+    """An expression as a function, so that each evaluation need not traverse the tree."""
     inner = _inner(expression)
     return lambda state, data: inner(state, data, ())
 

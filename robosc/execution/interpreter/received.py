@@ -22,13 +22,13 @@ _NO_STATE: Mapping[Any, Any] = {}
 
 
 class EnumChoice(str):
-    """A value of an enum itself, instead of what it is made of: the rules of the enum leave it alone."""
+    """A value of an enum, given directly: the rules of the enum do not apply."""
 
     __slots__ = ()
 
 
 class Reader:
-    """Converts received data of one model."""
+    """Converter of received data of one model."""
 
     def __init__(self, model: Model) -> None:
         self._properties = {item.name: {part.name: part.type for part in item.properties} for item in model.objects}
@@ -40,7 +40,7 @@ class Reader:
         Args:
             root: The declared type of the data, or None if the event carries none.
             paths: Paths to read.
-            raw: Data as it came, whatever it is.
+            raw: Data as it was received, of any type.
         """
         datum = _Datum(self, root, raw)
         found = {path: datum.value(path) for path in paths}
@@ -143,7 +143,7 @@ class _Datum:
                 return None
 
     def _in_range(self, value: int | None, low: int, high: int, path: Path) -> int | None:
-        """A number of a declared range: however far outside, it is moved to the nearest bound."""
+        """A number of a declared range; a number outside is moved to the nearest bound."""
         if value is None:
             return None
         clamped = min(max(value, low), high)
@@ -171,7 +171,7 @@ class _Datum:
 
 
 def whole_array(raw: Any) -> list[Any] | None:
-    """The elements of a received array; None where something else came."""
+    """The elements of a received array; None if the data is no array."""
     try:
         return values.array_part(raw)  # type: ignore[no-any-return]
     except Exception:

@@ -1,4 +1,4 @@
-"""A supervisor taken apart by event: who takes part, what must hold, what changes (semantics part 1)."""
+"""Rules of a supervisor, one for each event: its participants, its conditions, its updates (semantics part 1)."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass

@@ -1,4 +1,4 @@
-"""A supervisor, interpreted: plants, ranges, requirements and added conditions exactly as semantics 1 words them."""
+"""Interpreter of a supervisor: plants, ranges, requirements and added conditions exactly as in semantics part 1."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -48,7 +48,7 @@ class InterpretedSystem:
 
     Attributes:
         description: Its static part.
-        changes: Number of times that the state became another.
+        changes: Number of changes of the state.
     """
 
     def __init__(self, supervisor: Supervisor) -> None:
@@ -90,14 +90,14 @@ class InterpretedSystem:
             self._goals = GoalsOfSystem(model, supervisor.strategy, self._request_events, place_domains(model))
 
     def restart(self) -> None:
-        """Back to the initial state."""
+        """Return to the initial state."""
         self.changes += 1
         self._state = self._initial
         if self._goals is not None:
             self._goals.restart()
 
     def enabled(self, event: str) -> bool:
-        """Return True if a controllable event is allowed now (KeyError if there is no such event)."""
+        """Return True if a controllable event is allowed now; an unknown event is a KeyError."""
         rule = self._events[event]
         state = self._state
         if not all(holds(condition, state) for condition in rule.conditions):
@@ -110,22 +110,22 @@ class InterpretedSystem:
         return not is_tau(event) or successor.state != state
 
     def is_possible(self, event: str) -> bool:
-        """Return True if the plants can do an event now, whatever data comes with it (KeyError: there is none)."""
+        """Return True if the plants allow an event now, for any data; an unknown event is a KeyError."""
         rule = self._events[event]
         successor = self._successor(rule, no_data)
         return successor is not None and not (rule.is_controllable and successor.leaves_range)
 
     def snapshot(self) -> Mapping[Place, Value]:
-        """The state as a value, to come back to."""
+        """Return the state as a value that `restore` takes."""
         return self._state
 
     def restore(self, snapshot: Mapping[Place, Value]) -> None:
-        """Back to a state that `snapshot` has returned."""
+        """Return to a state that `snapshot` has returned."""
         self.changes += 1
         self._state = dict(snapshot)
 
     def enabled_requests(self) -> tuple[int, ...]:
-        """Numbers of the requests that are allowed now, among all of them in source order."""
+        """Return the numbers, in source order of all requests, of those that are allowed now."""
         return tuple(number for number, event in enumerate(self._request_events) if self.enabled(event))
 
     def enabled_silent(self) -> str | None:
@@ -134,7 +134,7 @@ class InterpretedSystem:
         return next((event for event in silent if self.enabled(event)), None)
 
     def receive(self, identifier: str, data: Any) -> tuple[tuple[str, tuple[str, ...]], ...] | None:
-        """Take all events of what came on an identifier: where updates were skipped; None if anything is unknown."""
+        """Take all events of a message; return those with skipped updates, or None if some data is unknown."""
         readings = [(event, self.read(event, data)) for _, event in self._batches[identifier]]
         if any(reading.unknown for _, reading in readings):
             return None
@@ -142,12 +142,12 @@ class InterpretedSystem:
         return tuple((event, skipped) for event, skipped in taken if skipped)
 
     def read(self, event: str, data: Any) -> Reading:
-        """Convert what came with an uncontrollable event."""
+        """Convert the data of an uncontrollable event."""
         rule = self._events[event]
         return self._reader.read(rule.received, rule.paths, data)
 
     def step(self, event: str, reading: Reading | None = None) -> tuple[str, ...] | None:
-        """Take an event: the variables whose update was skipped, or None if the state cannot accept it."""
+        """Take an event; return the variables whose update was skipped, or None if the state cannot accept it."""
         rule = self._events[event]
         if reading is None and rule.paths:
             reading = self.read(event, None)
@@ -167,7 +167,7 @@ class InterpretedSystem:
         return True, None
 
     def matches(self, communication: str, data: Any) -> Match:
-        """Tell whether a message is an incoming message, by its condition `when`."""
+        """Return whether a message is an incoming message, by its condition `when`."""
         rule = self._when.get(communication)
         if rule is None:
             return MATCHES
@@ -183,7 +183,7 @@ class InterpretedSystem:
         return tuple(holds(function, self._state) for function in self._conjuncts[communication])
 
     def location(self, communication: str) -> str:
-        """Location of a communication's plant (KeyError if there is no such service or action)."""
+        """Return the location of a service or action; an unknown name is a KeyError."""
         return str(self._state[communication_plant_name(self._model.communication(communication)), None])
 
     def observe(self) -> None:
@@ -210,7 +210,7 @@ class InterpretedSystem:
         }
 
     def signature(self) -> Any:
-        """A value that tells states apart."""
+        """Return a hashable value that differs between states."""
         return tuple(self._state.values())
 
     def _successor(self, rule: EventRule, data: Data) -> _Successor | None:

@@ -1,8 +1,8 @@
 """
 A controller for programs on asyncio: service calls and goals of the robot are coroutines.
 
-Everything happens in the thread of one event loop. A reply is what a coroutine returns, a failure
-what it raises, and a cancel ends it as asyncio ends tasks.
+Everything happens in the thread of one event loop. The value that a coroutine returns is a reply,
+an exception is a failure, and a cancel cancels the coroutine's task.
 """
 
 from __future__ import annotations
@@ -20,7 +20,7 @@ from robosc.execution.runtime.safe_stop import CANCEL_WAIT_S, describe_error
 from robosc.execution.runtime.settings import Settings
 
 WATCH_S = 0.05
-"""Longest time until it is noticed that time has passed, in seconds."""
+"""Longest time between two readings of the clock, in seconds."""
 
 EARLY_MESSAGES = 1000
 """Messages that are kept until the controller runs."""
@@ -50,7 +50,7 @@ class AsyncRobot(Protocol):
 
     def publish_default(self, identifier: str) -> None:
         """
-        Send the default message on an identifier, which stops what keeps acting there.
+        Send the default message on an identifier, which ends the effect of the last one.
 
         Must not wait.
         """
@@ -117,7 +117,7 @@ class AsyncController:
         """
         Take in a message of the robot.
 
-        Of what comes before `run` begins, the last ones are taken in then.
+        Of the messages before `run` begins, the last ones are taken in when it begins.
         """
         if self._early is not None:
             self._early.append((identifier, data))
@@ -160,7 +160,7 @@ class AsyncController:
             raise RuntimeError('; '.join(self.executor.reasons))
 
     def _start(self) -> None:
-        """Begin in the initial state, and take in what came before."""
+        """Begin in the initial state, and take in the messages that came before."""
         early, self._early = self._early, None
         if self._is_ended:
             return
@@ -186,7 +186,7 @@ class AsyncController:
         return self._is_ended or self.executor.is_faulty
 
     async def _wait(self, news: asyncio.Event, seconds: float) -> None:
-        """Until the time is over or there is news; others have their turn in any case."""
+        """Wait until the time is over or something happens; other tasks run in any case."""
         news.clear()
         waiting = [
             asyncio.ensure_future(self._sleep(max(seconds, 0.0))),
@@ -202,7 +202,7 @@ class AsyncController:
             waiting[0].result()
 
     async def _come_to_rest(self, news: asyncio.Event) -> None:
-        """Give cancelled goals their time to end; what is still under way then is left behind."""
+        """Give cancelled goals time to end, and abandon what is still running after that."""
         limit_s = self._clock.monotonic() + CANCEL_WAIT_S
         while self.executor.status is Status.STOPPING and self._clock.monotonic() < limit_s:
             await self._wait(news, WATCH_S)
@@ -210,12 +210,12 @@ class AsyncController:
         self._work.leave()
 
     def _report(self, report: Callable[[Executor], None]) -> None:
-        """Note that a coroutine of the robot has something for the executor."""
+        """Keep a report of a coroutine for the executor."""
         report(self.executor)
         self._wake()
 
     def _wake(self) -> None:
-        """Wake `run` up, where what just happened ends it."""
+        """Wake `run` up if it must end now."""
         if self._news is not None and (self._is_over() or self.executor.reasons):
             self._news.set()
 

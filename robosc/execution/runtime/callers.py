@@ -1,4 +1,4 @@
-"""Calls and goals that a supervision layer let through, and whose they are (semantics 3.7)."""
+"""Calls and goals that a supervision layer let through, with their callers (semantics 3.7)."""
 
 from __future__ import annotations
 

@@ -73,7 +73,7 @@ class Calls:
         return min((call.deadline_s for call in self._calls.values()), default=FOREVER)
 
     def clear(self) -> None:
-        """Forget all of them: their replies are unexpected from now on. Ids are not used again."""
+        """Forget all calls: their replies are unexpected from now on. Ids are not used again."""
         self._calls.clear()
 
 
@@ -120,7 +120,7 @@ class Goals:
     """
     Goals under way, by id; at most one of an action.
 
-    :param system: Tells which requirements hold.
+    :param system: The system, which decides which requirements hold.
     :param actions: Names of the actions, in source order.
     :param timeout_s: Seconds until a goal counts as failed, or None.
     """
@@ -166,7 +166,7 @@ class Goals:
         return self._goals.get(number)
 
     def close(self, number: int) -> Optional[Goal]:
-        """Take in a goal's end; return the goal, or None if there is none with that id."""
+        """Note the end of a goal; return the goal, or None if there is none with that id."""
         return self._goals.pop(number, None)
 
     def is_open(self, action: str) -> bool:
@@ -193,10 +193,9 @@ class Goals:
         """
         Return a goal to be cancelled now.
 
-        A requirement that held since its request no longer does, and cancel is allowed.
-
-        Only a change cancels: what the request itself made false never held since. Without
-        requirements, never.
+        A goal is cancelled if a requirement that held since its request holds no longer and the
+        cancel is allowed. A requirement that the request itself made false never held since, and
+        cancels nothing.
         """
         for goal in self._goals.values():
             if goal.is_running and any(goal.held):

@@ -1,4 +1,4 @@
-"""Time as the executor sees it: one seam, so that tests and simulations decide how it passes."""
+"""Time of the executor: one interface, so that tests and simulations control it."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ class Clock(Protocol):
     """Two readings of time."""
 
     def monotonic(self) -> float:
-        """Seconds since some moment; never goes back. All that waits is measured with it."""
+        """Seconds since some moment; never goes back. It measures all waiting times."""
 
     def wall(self) -> float:
-        """Seconds since 1970-01-01 UTC; stands in the event log and decides nothing."""
+        """Seconds since 1970-01-01 UTC, for the event log; no decision depends on them."""
 
 
 class SystemClock:

@@ -10,10 +10,10 @@ from robosc.execution.runtime.release import Releases
 
 class CommandTimeouts:
     """
-    Detector of release identifiers that act while the existing controller has fallen silent.
+    Detector of release identifiers that still act although the existing controller is silent.
 
     :param releases: Messages that keep acting.
-    :param timeout_s: Seconds after which it counts as silent; 0: never.
+    :param timeout_s: Seconds after which the controller counts as silent; 0: never.
     """
 
     __slots__ = ('_arrived_s', '_releases', '_timeout_s')
@@ -28,7 +28,7 @@ class CommandTimeouts:
         self._arrived_s[identifier] = now_s
 
     def silent(self, now_s: float) -> List[str]:
-        """Return identifiers that act although nothing has come there for the time."""
+        """Return identifiers that act although no message came there within the timeout."""
         return [
             item
             for item in self._releases.acting()

@@ -1,9 +1,9 @@
 """
 Choice of the enabled request that is issued: the policies of semantics 3.5.
 
-Requests are known by number, 0 up to N - 1 in source order. A decision is: `choose` among
-candidates, again without those that could not be issued, `issued` for the one that was, then
-`close`.
+Requests have the numbers 0 to N - 1, in source order. A decision calls `choose` with the
+candidates, and again without those that could not be issued; then `issued` for the request that
+was issued, and `close`.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ _NEVER = -1
 
 
 class Policy(Protocol):
-    """Decides between requests that are enabled together."""
+    """Policy that decides between requests that are enabled together."""
 
     def candidates(self, enabled: Tuple[int, ...]) -> Tuple[int, ...]:
         """Return those of the enabled requests that may be issued at this decision."""
@@ -44,11 +44,12 @@ class AnyRequest:
 
 class FairPolicy(AnyRequest):
     """
-    Newly enabled requests first, then the longest-ago issued, never-issued first, source order.
+    Newly enabled requests first, then never issued ones, then the one issued longest ago.
 
-    A request profits from being new at most once in N decisions. So of any N decisions at which a
-    request waits, N - 1 others take at most N - 1 by being new; the rest go to the longest-ago
-    issued, and none starves.
+    Ties are decided by source order. A request is preferred for being new at most once in N
+    decisions. So among any N decisions at which a request waits, the N - 1 other requests take at
+    most N - 1 for being new. All other decisions go to the request issued longest ago, so no
+    request starves.
 
     :param count: Number of requests, N.
     """
@@ -66,7 +67,7 @@ class FairPolicy(AnyRequest):
         self._new = False
 
     def choose(self, candidates: Sequence[int]) -> int:
-        """Return the first of them in the order of the class."""
+        """Return the first candidate in the order of the policy."""
         previous, issued = self._previous, self._issued
         if candidates is previous:
             # The very same tuple as at the last decision, so nothing is new.
@@ -86,7 +87,7 @@ class FairPolicy(AnyRequest):
         return best
 
     def issued(self, request: int) -> None:
-        """Remember when; and, if it was chosen for being new, that it used this up."""
+        """Remember the time, and whether the request was chosen for being new."""
         self._issued[request] = self._decision
         if self._new:
             self._favoured[request] = self._decision
@@ -120,7 +121,7 @@ class PriorityPolicy(AnyRequest):
         return self._fair.choose(candidates)
 
     def issued(self, request: int) -> None:
-        """Only what is not in the list is the fair policy's business."""
+        """Pass a request that is not in the list to the fair policy."""
         if request not in self._listed:
             self._fair.issued(request)
 

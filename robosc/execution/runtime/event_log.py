@@ -42,14 +42,14 @@ class EventLog(Protocol):
 
     @property
     def is_active(self) -> bool:
-        """Return True if entries are kept at all now; if not, nobody needs to make them."""
+        """Return True if the log keeps entries now; if not, none need be made."""
 
     @property
     def dropped(self) -> int:
         """Entries that were lost so far."""
 
     def write(self, entry: Entry) -> None:
-        """Keep an entry, whose values nobody changes any more."""
+        """Keep an entry; its values must not change any more."""
 
     def close(self) -> None:
         """Finish what was written."""

@@ -1,7 +1,7 @@
 """
 Conditions that held in some stable state and hold no longer.
 
-What releases messages and cancels goals.
+They release messages and cancel goals.
 """
 
 from __future__ import annotations
@@ -9,7 +9,7 @@ from __future__ import annotations
 from typing import Tuple
 
 Conditions = Tuple[bool, ...]
-"""Conditions in a fixed order: which of them hold."""
+"""Truth values of conditions, in a fixed order."""
 
 
 def have_fallen(held: Conditions, holds: Conditions) -> bool:

@@ -3,10 +3,10 @@ The executor of a supervision layer.
 
 It lets an existing controller's requests through or not (semantics 3.7).
 
-The existing controller, the caller, speaks to the layer instead of the robot. What it sends comes
-in through `on_request`, `on_call`, `on_goal` and `on_cancel`; what it receives goes out through a
-`LayerMiddleware`. Everything else is as in a controller, but nothing is decided here: a period
-only lets time pass.
+The existing controller, the caller, communicates with the layer instead of the robot. Its messages
+come in through `on_request`, `on_call`, `on_goal` and `on_cancel`; messages for it go out through
+a `LayerMiddleware`. Everything else is as in a controller, except that the layer issues no
+requests of its own: in a period it only checks the time.
 """
 
 from __future__ import annotations
@@ -56,7 +56,7 @@ class Layer(Runner):
     :param clock: The only source of time; the computer's if None.
     :param log: The event log; none if None.
     :raises DeploymentError: The model has actions and the supervisor was made for a controller, or
-        the model does not tell its incoming messages on one identifier apart.
+        it does not distinguish its incoming messages on one identifier.
     :raises SettingsError: A setting is wrong, or names what the model does not have.
     """
 
@@ -83,7 +83,7 @@ class Layer(Runner):
         """
         Let a message of the existing controller through unchanged, or hold it back.
 
-        :param identifier: Identifier that it is meant for.
+        :param identifier: Identifier that the message is for.
         :param message: Mapping or object with the properties, or the plain value of a basic type;
             None for no data.
         """
@@ -105,7 +105,7 @@ class Layer(Runner):
         """
         Take a service call of the existing controller.
 
-        Held back, it gets a default response at once.
+        A call that is held back gets a default response at once.
 
         :param service: Name of the service in the model.
         :param call_id: Id by which its answer is to be addressed; the executor only hands it back.
@@ -126,7 +126,7 @@ class Layer(Runner):
     @guarded
     def on_goal(self, action: str, goal_id: Any, message: Any) -> None:
         """
-        Take a goal of the existing controller: held back, it is rejected, else accepted.
+        Take a goal of the existing controller: reject it if it is held back, else accept it.
 
         :param action: Name of the action in the model.
         :param goal_id: Id of the goal on the caller's side.
@@ -149,7 +149,7 @@ class Layer(Runner):
         """
         Cancel a goal for the existing controller.
 
-        That is always forwarded, also while the robot is stopped.
+        The cancel is always forwarded, also while the robot is stopped.
 
         :param action: Name of the action in the model.
         :param goal_id: Id of the goal on the caller's side.
@@ -175,9 +175,9 @@ class Layer(Runner):
         """
         Release the last message on an identifier now.
 
-        The existing controller is known to be gone from it.
+        The existing controller is known to have stopped sending there.
 
-        :param identifier: Identifier on which it sent messages; where none of them acts, nothing
+        :param identifier: Identifier on which it sent messages; if none of them acts, nothing
             happens.
         """
         self._look_at_clock()
@@ -187,7 +187,7 @@ class Layer(Runner):
     # What comes from the robot, and time.
 
     def receive(self, identifier: str, data: Any) -> None:
-        """Take in a message of the robot: one batch; then it is passed on."""
+        """Take in a message of the robot as one batch, and pass it on."""
         super().receive(identifier, data)
         self._finish()
         if self._is_started and identifier in self._batches:
@@ -201,7 +201,7 @@ class Layer(Runner):
         """
         Time has passed.
 
-        Stale sensors, a caller that fell silent, replies that did not come, what is still owed.
+        Check for stale sensors, a silent caller, overdue replies, and messages still to be sent.
         """
         super().watch()
         self._finish()
@@ -243,7 +243,7 @@ class Layer(Runner):
                 self._notify(self._caller.end_goal, waiting.action, waiting.goal_id, end, data)
 
     def _finish(self) -> None:
-        """Tell the caller what has failed, or turned against its requirements. Never raises."""
+        """Report calls and goals that failed or violate a requirement. Never raises."""
         for call in self._callers.close_failed_calls():
             self._notify(self._caller.answer_default, call.service, call.call_id)
         for goal in self._callers.close_failed_goals():
@@ -299,7 +299,7 @@ class Layer(Runner):
         return None if is_finite(message) else _NOT_FINITE
 
     def _take(self, request: Request, message: Any) -> None:
-        """Let the request happen, with all that follows from it, before its message goes out."""
+        """Take the request and the silent steps after it, before its message goes out."""
         self._steps.take(request.event, message)
         self._steps.settle(request.name)
         # A message that goes out now may wait for time to pass: looked up as soon as the clock
@@ -308,9 +308,9 @@ class Layer(Runner):
 
     def _recognized(self, names: Sequence[str], message: Any) -> Optional[Request]:
         """
-        Return the request that a message is: the first whose condition is true (language B.13).
+        Return the request of a message: the first whose condition is true (language B.13).
 
-        :raises ExecutionError: An enum of it is unknown, and that is a fault.
+        :raises ExecutionError: An enum of the message is unknown, and that is a fault.
         """
         for name in names:
             match = self._system.matches(name, message)
@@ -338,7 +338,7 @@ class Layer(Runner):
         self._notify(self._caller.blocked, identifier)
 
     def _notify(self, method: Callable[..., None], *arguments: Any) -> None:
-        """Tell the caller something; what fails is a fault. Never raises."""
+        """Notify the caller; a failure of the call is a fault. Never raises."""
         try:
             method(*arguments)
         except Exception as error:

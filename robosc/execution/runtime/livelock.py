@@ -2,8 +2,8 @@
 Runs of silent steps that do not end (semantics 3.3).
 
 A run is deterministic: equal states are followed by equal steps. It ends if and only if no state
-comes twice, which R. P. Brent's algorithm finds with one remembered state ("An improved Monte
-Carlo factorization algorithm", BIT 20, 1980, pp. 176-184, section 7).
+occurs twice. R. P. Brent's algorithm finds a repeated state and remembers only one state ("An
+improved Monte Carlo factorization algorithm", BIT 20, 1980, pp. 176-184, section 7).
 """
 
 from __future__ import annotations
@@ -11,7 +11,7 @@ from __future__ import annotations
 from typing import Any, Callable
 
 PATIENCE = 8
-"""Steps that are not checked: almost every run is shorter."""
+"""Number of first steps that are not checked: almost every run is shorter."""
 
 
 class LivelockError(Exception):
@@ -36,9 +36,10 @@ class LivelockDetector:
 
     def check(self, signature: Callable[[], Any], event: str) -> None:
         """
-        Look at the state after one more step, taken by `event`.
+        Check the state after one more step, taken by `event`.
 
-        :param signature: Gives a value that identifies the state; a short run needs none.
+        :param signature: Function that returns a value that identifies the state; not called in
+            a short run.
         :param event: The step's event.
         :raises LivelockError: The state is one that the run was in before, or the bound is passed.
         """

@@ -1,9 +1,8 @@
 """
-Messages of a middleware, whatever its classes are.
+Messages of a middleware of any class.
 
-Their fields, and whether every number in them is one.
-
-A message may be a mapping, an object, a plain value or anything made of these.
+The functions return the fields of a message, and whether every number in it is finite. A message
+may be a mapping, an object, a plain value or anything made of these.
 """
 
 from __future__ import annotations
@@ -13,7 +12,7 @@ import numbers
 from typing import Any, Dict, Iterable, Mapping
 
 MAXIMUM_PARTS = 1000000
-"""Number of parts of a message beyond which it is not looked through: it counts as not finite."""
+"""Maximum number of parts of a message that is examined; a larger one counts as not finite."""
 
 _HARMLESS = (bool, int, str, bytes, bytearray)
 _INTEGER_FORMATS = '?cbBhHiIlLqQnN'
@@ -31,7 +30,7 @@ def is_finite(message: Any) -> bool:
     """
     Return True if there is neither a NaN nor an infinity anywhere in a message.
 
-    A message that cannot be looked through is not known to be finite, so the answer is no.
+    A message that cannot be examined counts as not finite.
     """
     try:
         return _is_finite(message)

@@ -1,12 +1,12 @@
 """
-The two borders of the executor: the controlled system below it, the middleware beside it.
+The two interfaces of the executor: to the controlled system and to the middleware.
 
 A `ControlledSystem` is the supervisor as code: `robosc.execution.interpreter` interprets a
-`Supervisor`, a target generates a class with the same methods. The `Executor` adds what semantics
-part 3 says about time: batches, silent steps, decisions, release, safe stop, log. `Middleware` is
-what it needs of ROS, a bridge or a test. The `Layer` does the same for requests of an existing
-controller: its `RobotSide` is what it needs of the robot, its `LayerMiddleware` what it needs of
-that controller.
+`Supervisor`, a target generates a class with the same methods. The `Executor` adds the behaviour
+in time of semantics part 3: batches, silent steps, decisions, release, safe stop, log. It reaches
+ROS, a bridge or a test through `Middleware`. The `Layer` does the same for requests of an existing
+controller. It reaches the robot through `RobotSide`, and that controller through
+`LayerMiddleware`.
 
 This package's modules other than `interpreter` import nothing of RoboSC but each other and run on
 Python 3.8 and later: generated packages carry copies of them.
@@ -22,7 +22,7 @@ OUTGOING = 'outgoing message'
 
 class CommunicationInfo(NamedTuple):
     """
-    Facts about a message, service or action that the executor must know.
+    Facts about a message, service or action that the executor needs.
 
     :ivar name: Its name in the model.
     :ivar component: The component that declares it.
@@ -33,8 +33,8 @@ class CommunicationInfo(NamedTuple):
     :ivar requirement_count: Number of requirements on its request.
     :ivar conjunct_count: Number of top-level conjuncts of those requirements, all counted on.
     :ivar max_age_s: Seconds after which an outgoing message is stale, if the model says so.
-    :ivar has_condition: True if an incoming message says with `when` which messages it is, in a
-        supervision layer.
+    :ivar has_condition: True if an incoming message has a condition `when`, by which a supervision
+        layer recognizes it.
     """
 
     name: str
@@ -59,7 +59,7 @@ class Description(NamedTuple):
     :ivar communications: Every communication.
     :ivar resets: Reset events of services and actions.
     :ivar taus: Tau events that can change something.
-    :ivar silent_bound: More silent steps than this in a row can only be a run that does not end.
+    :ivar silent_bound: Maximum number of silent steps in a row of a run that ends.
     :ivar has_strategy: True if the supervisor has a strategy that reaches the goals of the model.
     """
 
@@ -75,9 +75,9 @@ class Description(NamedTuple):
 
 def requesting(infos: Sequence[CommunicationInfo]) -> Tuple[CommunicationInfo, ...]:
     """
-    Return the communications that are requested, in source order.
+    Return the communications that have a request, in source order.
 
-    A request's number is its place among them.
+    The number of a request is its place among them.
     """
     return tuple(info for info in infos if info.kind != OUTGOING)
 
@@ -96,14 +96,14 @@ def batches(infos: Sequence[CommunicationInfo]) -> Dict[str, Tuple[Tuple[str, st
 
 class Reading(NamedTuple):
     """
-    Received data after conversion (enum rules, ranges), before anything changes.
+    Received data after conversion (enum rules, ranges), before the state changes.
 
-    :ivar values: One value (None: unknown) for each datum that updates on the event read, as the
-        system wants them.
-    :ivar data: The same by name (`value.front`), for the log.
-    :ivar unknown: Descriptions of what was unknown: an enum that fell to its default past an
-        unknown rule, an integer that was clamped. Empty: nothing was.
-    :ivar enum_unknown: True if an enum fell to its default although an earlier rule was unknown.
+    :ivar values: One value (None: unknown) for each datum that updates on the event read, in the
+        form that the system needs.
+    :ivar data: The same values by name (`value.front`), for the log.
+    :ivar unknown: Descriptions of unknown data: an enum that got its default because a rule was
+        unknown, an integer that was clamped. Empty: nothing was unknown.
+    :ivar enum_unknown: True if an enum got its default although an earlier rule was unknown.
     """
 
     values: Any
@@ -116,8 +116,8 @@ class Match(NamedTuple):
     """
     Result of matching an existing controller's message with an incoming message of the model.
 
-    :ivar holds: True if the condition `when` is true of it, or if there is none.
-    :ivar unknown: Descriptions of what was unknown, as in a `Reading`.
+    :ivar holds: True if the condition `when` is true for the message, or if there is none.
+    :ivar unknown: Descriptions of unknown data, as in a `Reading`.
     :ivar enum_unknown: The same as in a `Reading`.
     """
 
@@ -127,7 +127,7 @@ class Match(NamedTuple):
 
 
 MATCHES = Match(True, (), False)
-"""Any message is one that has no condition."""
+"""Result for an incoming message without a condition: every message matches."""
 
 
 class ControlledSystem(Protocol):
@@ -135,55 +135,53 @@ class ControlledSystem(Protocol):
     Plants, requirements and supervisor of one robot, with their current state.
 
     :ivar description: Its static part.
-    :ivar changes: Grows whenever the state may have become another: while it stays the same, so
-        does the state.
+    :ivar changes: Number that grows whenever the state may have changed: while the number stays
+        the same, so does the state.
     """
 
     description: Description
     changes: int
 
     def restart(self) -> None:
-        """Back to the initial state."""
+        """Return to the initial state."""
 
     def enabled(self, event: str) -> bool:
         """
         Return True if a controllable event is allowed now.
 
-        By plants, ranges, requirements and supervisor.
-
-        A tau that would change nothing in the current state is not enabled.
+        Plants, ranges, requirements and the supervisor must allow it. A tau that would change
+        nothing in the current state is not enabled.
         """
 
     def enabled_requests(self) -> Tuple[int, ...]:
         """
-        Return the requests that are allowed now.
+        Return the numbers of the requests that are allowed now.
 
-        Their numbers, from 0, among all requests in source order.
+        All requests are numbered from 0 in source order.
         """
 
     def enabled_silent(self) -> Optional[str]:
         """
-        Return the first of the description's resets, then its taus, that is allowed now.
+        Return the silent step that is allowed now, or None if none is.
 
-        None if none is.
+        Resets come before taus, each in the order of the description.
         """
 
     def receive(
         self, identifier: str, data: Any
     ) -> Optional[Tuple[Tuple[str, Tuple[str, ...]], ...]]:
         """
-        Convert what came on an identifier, and take its outgoing messages' events in source order.
+        Convert a received message, and take the events of its outgoing messages in source order.
 
-        For the common case, in which no `Reading` need be looked at. The state accepts these
-        events whatever it is.
+        This is for the common case, in which no data is unknown. Every state accepts these events.
 
-        :returns: The events at which updates were skipped, with these (mostly empty), or None if
-            something of the data is unknown; then nothing has changed, and each event is to be
-            read and taken by itself.
+        :returns: The events with skipped updates, and these updates (mostly empty); or None if
+            some data is unknown. Then nothing has changed, and the caller must read and take each
+            event by itself.
         """
 
     def read(self, event: str, data: Any) -> Reading:
-        """Convert what came with an uncontrollable event; change nothing, never raise."""
+        """Convert the data of an uncontrollable event; change nothing, never raise."""
 
     def step(self, event: str, reading: Optional[Reading] = None) -> Optional[Tuple[str, ...]]:
         """
@@ -203,16 +201,16 @@ class ControlledSystem(Protocol):
 
     def matches(self, communication: str, data: Any) -> Match:
         """
-        Tell whether a message is an incoming message, by its condition `when`.
+        Return whether a message is an incoming message, by its condition `when`.
 
         Never raises for any data.
         """
 
     def requirements(self, communication: str) -> Tuple[bool, ...]:
-        """Tell of each requirement on a communication's request whether it holds, in order."""
+        """Return for each requirement on a communication's request whether it holds, in order."""
 
     def conjuncts(self, communication: str) -> Tuple[bool, ...]:
-        """For each top-level conjunct of those requirements: whether it holds now."""
+        """Return for each top-level conjunct of those requirements whether it holds now."""
 
     def location(self, communication: str) -> str:
         """Location of a service's or action's plant."""
@@ -221,7 +219,7 @@ class ControlledSystem(Protocol):
         """Return {component: {"state": s, "variables": {v: value}}} for those with a behaviour."""
 
     def signature(self) -> Any:
-        """Return a hashable value that tells states apart."""
+        """Return a hashable value that differs between states."""
 
 
 class StrategicSystem(ControlledSystem, Protocol):
@@ -253,7 +251,7 @@ class RobotSide(Protocol):
         """Return True if a message of a request is the all-default one (its header apart)."""
 
     def publish(self, communication: str, message: Any) -> None:
-        """Send an incoming message's message."""
+        """Send the message of an incoming message."""
 
     def publish_default(self, identifier: str) -> None:
         """Send the all-default message on an identifier that several communications may share."""
@@ -269,13 +267,13 @@ class RobotSide(Protocol):
 
 
 class Middleware(RobotSide, Protocol):
-    """Middleware for a controller's executor: the robot, and messages made of the model's data."""
+    """Middleware for a controller's executor: it also makes messages from the model's data."""
 
     def prepare(self, communication: str, data: Any) -> Any:
         """
         Return the middleware's message for a request, from the model's data; None: the default.
 
-        The data is not to be changed: it stands in the log, and may come again.
+        The data must not be changed: the log keeps it, and it may be passed again.
 
         :raises DataDoesNotFit: A value does not fit its field; the request is then not issued.
         """
@@ -292,7 +290,7 @@ class LayerMiddleware(Protocol):
         """Pass on a message of the robot, unchanged, after the supervisor has seen it."""
 
     def blocked(self, identifier: str) -> None:
-        """Tell that a request on an identifier was held back."""
+        """Report that a request on an identifier was held back."""
 
     def answer(self, communication: str, call_id: Any, data: Any) -> None:
         """Pass on the service's reply to a call, unchanged."""
@@ -301,10 +299,10 @@ class LayerMiddleware(Protocol):
         """Give a default reply to a call that was held back or has failed."""
 
     def accept_goal(self, communication: str, goal_id: Any) -> None:
-        """Accept a goal, which is let through. Exactly one `end_goal` follows."""
+        """Accept a goal that is let through. Exactly one `end_goal` follows."""
 
     def reject_goal(self, communication: str, goal_id: Any) -> None:
-        """Reject a goal, which is held back."""
+        """Reject a goal that is held back."""
 
     def pass_feedback(self, communication: str, goal_id: Any, data: Any) -> None:
         """Feedback of a goal, unchanged."""

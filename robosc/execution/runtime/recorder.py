@@ -13,7 +13,7 @@ class Counters(NamedTuple):
     """
     Counts of what went wrong so far.
 
-    :ivar unknown: Enums that fell to their default past an unknown rule, received integers that
+    :ivar unknown: Enums that got their default because a rule was unknown, received integers that
         were moved into their range, updates that were skipped, requests whose data was unknown or
         did not fit.
     :ivar unexpected: Events that the state could not accept, replies that match no request.
@@ -34,7 +34,7 @@ class Recorder:
     :param system: System whose state stands in the entries of events.
     :param clock: Clock that gives the time of an entry.
     :param log: Log for the entries.
-    :ivar began_s: Reading of the clock when the handling of what came last began: decision times
+    :ivar began_s: Reading of the clock when the handling of the last message began: decision times
         count from here.
     """
 
@@ -71,7 +71,7 @@ class Recorder:
         )
 
     def event(self, event: str, is_controllable: bool, data: Any) -> None:
-        """Note that an event was taken. Worth calling only while the log is active."""
+        """Record that an event was taken; needed only while the log is active."""
         took_us = (self._clock.monotonic() - self.began_s) * 1e6
         self._write(
             {

@@ -1,4 +1,4 @@
-"""Messages that act on after they were sent, and when they must be released (semantics 3.6)."""
+"""Messages that keep acting after they were sent, and their release (semantics 3.6)."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ class _Acting:
     :ivar event: Event of that request.
     :ivar was_enabled: True if the request was enabled in the last stable state since.
     :ivar held: Values for the conjuncts of its requirements: True if one held in that state.
-    :ivar is_due: True if it is to be released: something was so and is no longer. Once due it
-        stays so until something is sent there; that is why the last stable state is enough to
-        remember.
+    :ivar is_due: True if the message is to be released, because a condition that held holds no
+        longer. It stays due until something is sent there, so it is enough to remember the last
+        stable state.
     """
 
     __slots__ = ('event', 'held', 'is_due', 'request', 'was_enabled')
@@ -38,8 +38,8 @@ class Releases:
     :param system: System that shows what is enabled and what holds.
     :param identifiers: The release identifiers.
     :param requests: Communications of each of them, in source order.
-    :param may_wait: True if a due release waits while another request there is enabled: only a
-        controller's does.
+    :param may_wait: True if a due release waits while another request there is enabled: only in a
+        controller.
     """
 
     __slots__ = ('_acting', '_events', '_may_wait', '_system', 'identifiers', 'waiting')
@@ -65,10 +65,11 @@ class Releases:
         """
         Return the identifiers to release now, in this stable state.
 
-        The caller does it and reports it to `released`.
+        The caller releases them and reports it to `released`.
 
-        :param issuing: Communication whose request brought the system here and whose message is
-            about to go out: what it makes false does not release its own earlier message.
+        :param issuing: Communication whose request led to this state and whose message is about to
+            go out: a condition that this request makes false does not release its own earlier
+            message.
         """
         if not self._acting:
             return []
@@ -124,9 +125,9 @@ class Releases:
 
     def sent_unchanged(self, request: str, identifier: str, is_default: bool) -> None:
         """
-        Do the same where the request changed nothing.
+        Note a sent message whose request changed nothing.
 
-        What was enabled still is, with all that it takes.
+        Everything that was enabled still is.
         """
         acting = self._acting.get(identifier)
         if is_default or acting is None or acting.request != request:

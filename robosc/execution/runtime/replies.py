@@ -1,4 +1,4 @@
-"""Replies to service calls and goals, also those that do not come in time (semantics 3.2)."""
+"""Replies to service calls and goals, and replies that do not come in time (semantics 3.2)."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from robosc.execution.runtime.steps import ExecutionError, Steps
 
 class Replies:
     """
-    Matches replies to requests and takes their events.
+    Matcher of replies and requests, which takes the events of replies.
 
-    Methods that take one return whether they did.
+    Methods that take an event return whether they did.
 
-    :param steps: Takes the events.
-    :param middleware: Cancels goals.
-    :param recorder: Receives what matches nothing.
+    :param steps: Steps that take the events.
+    :param middleware: Middleware that cancels goals.
+    :param recorder: Recorder of replies that match no request.
     :param calls: Service calls under way.
     :param goals: Goals under way.
     """
@@ -37,9 +37,9 @@ class Replies:
 
     def forget(self) -> None:
         """
-        Let the model start again.
+        Let the model start again without the calls and goals under way.
 
-        What is under way is nothing to it, but the end of goals is still awaited.
+        The end of goals is still awaited.
         """
         self._calls.clear()
         self._goals.leave_model()
@@ -49,7 +49,7 @@ class Replies:
         return min(self._calls.deadline_s(), self._goals.deadline_s())
 
     def expire(self, now_s: float) -> None:
-        """Fail the calls and goals that are over their time; also cancel such goals."""
+        """Fail the calls and goals that exceeded their time, and cancel such goals."""
         for number in self._calls.expired(now_s):
             service = self._calls.close(number)
             self._steps.happen('{}.error'.format(service), None, 'timeout')
@@ -64,7 +64,7 @@ class Replies:
             request_cancel(self._middleware, goal)
 
     def reply(self, request_id: int, data: Any) -> bool:
-        """Take in that a service call was answered."""
+        """Take in the reply to a service call."""
         service = self._close_call(request_id)
         if service is None:
             return False
@@ -72,7 +72,7 @@ class Replies:
         return True
 
     def call_failed(self, request_id: int, reason: str) -> bool:
-        """Take in that a service call will not be answered."""
+        """Note that a service call will not be answered."""
         service = self._close_call(request_id)
         if service is None:
             return False
@@ -88,7 +88,7 @@ class Replies:
                 request_cancel(self._middleware, goal)
 
     def feedback(self, goal_id: int, data: Any) -> bool:
-        """Take in how far a goal's server is."""
+        """Take in the feedback on a goal."""
         goal = self._find_goal(goal_id, 'feedback')
         if goal is None:
             return False
@@ -100,7 +100,7 @@ class Replies:
 
     def goal_ended(self, goal_id: int, outcome: str, data: Any) -> bool:
         """
-        Take in a goal's end, or that its server is lost.
+        Note the end of a goal, or the loss of its server.
 
         :raises ExecutionError: There is no such outcome.
         """
@@ -122,7 +122,7 @@ class Replies:
 
     def cancel_refused(self, goal_id: int, ended: bool) -> None:
         """
-        Note that a cancel was refused; that means nothing if the goal had ended.
+        Note that a cancel was refused; this has no effect if the goal had ended.
 
         :raises ExecutionError: The goal is running.
         """

@@ -70,7 +70,7 @@ def by_identifier(requests: Sequence[Request]) -> Dict[str, Tuple[str, ...]]:
 
 class Decisions:
     """
-    Part of an executor that issues requests, at most one in a decision.
+    Part of an executor that issues requests, at most one in each decision.
 
     :param system: The controlled system.
     :param middleware: Middleware that requests go to.
@@ -145,9 +145,9 @@ class Decisions:
 
     def _find_enabled(self) -> Tuple[int, ...]:
         """
-        Numbers of the requests that may be issued.
+        Return the numbers of the requests that may be issued.
 
-        Not of an action whose old goal may still be under way.
+        An action whose old goal may still be under way is left out.
         """
         enabled, goals = self._system.enabled_requests(), self._goals
         if not goals:
@@ -172,11 +172,7 @@ class Decisions:
             self._steps.release(identifier)
 
     def _issue_one_of(self, candidates: Tuple[int, ...], now_s: float) -> Optional[Request]:
-        """
-        Issue what the policy chooses, or the next if its data is unknown or does not fit.
-
-        What was issued.
-        """
+        """Issue and return the policy's choice, or the next if its data is not known or unfit."""
         policy = self.policy
         while candidates:
             chosen = policy.choose(candidates)
@@ -188,7 +184,7 @@ class Decisions:
         return None
 
     def _issue(self, request: Request, now_s: float) -> bool:
-        """Issue a request, unless its data is unknown or does not fit: whether it was."""
+        """Issue a request; return False if its data is unknown or does not fit."""
         name, event, identifier, kind, keeps_acting = request
         unchanging = self._steps.unchanging
         known = unchanging.get(name)
@@ -227,7 +223,7 @@ class Decisions:
         return True
 
     def _withhold(self, request: Request, reason: str) -> bool:
-        """Take in that a request cannot be issued: what acts on its identifier is released."""
+        """Release the message that acts on the identifier of a request that cannot be issued."""
         self._recorder.unknown(request.event, (reason,))
         if request.keeps_acting and self._releases.is_acting(request.identifier):
             self._steps.release(request.identifier)

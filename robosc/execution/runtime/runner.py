@@ -3,13 +3,13 @@ Common part of the executors of both deployments, around any `ControlledSystem`.
 
 It covers semantics part 3, points 1 to 4 and 8.
 
-An adapter drives an executor from one thread: `tick` once a period, the other methods when
-something comes. Its middleware must not call it back from within. No method raises: an exception
-of the system or of the middleware becomes a fault, and the robot comes to rest.
+An adapter calls an executor from one thread: `tick` once in a period, the other methods when a
+message or reply comes. The middleware must not call the executor back from within a call. No
+method raises an exception: one of the system or of the middleware becomes a fault, and the robot
+comes to rest.
 
-A request is always taken in this order: have its message ready, take the event, silent steps to
-the end, releases that it made due, send the message. So no request is decided on a state that lags
-behind.
+A request is always taken in this order: prepare its message, take the event, take all silent
+steps, make the releases that are due, send the message. So no request is decided on an old state.
 """
 
 from __future__ import annotations
@@ -47,10 +47,10 @@ class Status(str, Enum):
     NEW = 'new'
     """Not started."""
     WAITING = 'waiting'
-    """Requests nothing before the first message of every sensor with a maximum age."""
+    """No requests before the first message of every sensor with a maximum age."""
     RUNNING = 'running'
     STOPPING = 'stopping'
-    """At rest; the ends of cancelled goals are awaited."""
+    """At rest, but some cancelled goals have not ended yet."""
     STOPPED = 'stopped'
 
 
@@ -62,7 +62,7 @@ _Method = TypeVar('_Method', bound=Callable[..., None])
 
 
 def guarded(method: _Method) -> _Method:
-    """Return the method with each exception turned into a fault, and the rest done after it."""
+    """Return the method; each exception becomes a fault, and `_finish` follows in any case."""
 
     @wraps(method)
     def wrapper(self: Runner, *arguments: Any, **named: Any) -> None:
@@ -77,7 +77,7 @@ def guarded(method: _Method) -> _Method:
 
 class Runner:
     """
-    Runner that takes what comes from the robot, and brings the robot to rest.
+    Runner that takes messages and replies of the robot, and brings the robot to rest.
 
     :param system: Plants, requirements and supervisor with their state.
     :param robot: The robot's side of the middleware.
@@ -85,7 +85,7 @@ class Runner:
     :param settings: Settings that the deployment chose; the defaults if None.
     :param clock: The only source of time; the computer's if None.
     :param log: The event log; none if None.
-    :ivar settings: The settings in force, release identifiers spelled out.
+    :ivar settings: The settings in force, with all release identifiers.
     :raises DeploymentError: The model has actions and the supervisor was made for another
         deployment.
     :raises SettingsError: A setting is wrong, or names what the model does not have.
@@ -176,18 +176,17 @@ class Runner:
 
     @guarded
     def start(self) -> None:
-        """Begin in the initial state; what comes earlier is ignored. Idempotent."""
+        """Begin in the initial state; earlier messages are ignored. Idempotent."""
         if not self._is_started:
             self._begin()
 
     def watch(self) -> None:
         """
-        Time has passed, but no period.
+        Check the time between two decisions.
 
-        Stale sensors, replies that did not come, messages and cancels still owed.
-
-        An adapter with a long period calls this in between: none of these may wait for the next
-        decision.
+        The check finds stale sensors, overdue replies, and messages and cancels still to be sent.
+        None of these may wait for the next decision, so an adapter with a long period calls it in
+        between.
         """
         if not self._is_started:
             return
@@ -200,11 +199,11 @@ class Runner:
 
     def receive(self, identifier: str, data: Any) -> None:
         """
-        Take a message of the robot.
+        Take a message of the robot as one batch.
 
-        One batch, the events of all messages of the model that it stands for.
+        The batch has the events of all messages of the model on that identifier.
 
-        :param identifier: Identifier on which it came.
+        :param identifier: Identifier on which the message came.
         :param data: Mapping or object with the properties, or the plain value of a basic type;
             None for no data.
         """
@@ -252,7 +251,7 @@ class Runner:
 
     @guarded
     def on_feedback(self, goal_id: int, data: Any) -> None:
-        """Take in how far a goal's server is."""
+        """Take in the feedback on a goal."""
         self._look_at_clock()
         self._take_feedback(goal_id, data)
 
@@ -284,10 +283,8 @@ class Runner:
         """
         Come to rest until `restart`.
 
-        On a signal, or, if `is_fault`, on a fault that the adapter found.
-
-        Goals that are running are cancelled: the status is `stopping` until they have ended, 0.5 s
-        at most.
+        The adapter calls it on a signal, or, with `is_fault`, on a fault that it found. Running
+        goals are cancelled: the status is `stopping` until they have ended, for at most 0.5 s.
         """
         self._now_s = self._clock.monotonic()
         if is_fault:
@@ -298,9 +295,9 @@ class Runner:
     @guarded
     def restart(self) -> None:
         """
-        Begin again in the initial state, whatever happened.
+        Begin again in the initial state, also after a fault.
 
-        Goals and calls under way are the old run's.
+        Goals and calls under way belong to the old run.
         """
         self._now_s = self._clock.monotonic()
         if not self._safe_stop.reasons or self._safe_stop.unsent:
@@ -324,7 +321,7 @@ class Runner:
         self._update_may_request()
 
     def _look_at_clock(self) -> None:
-        """Take the time; whatever is over by now has its effect first."""
+        """Read the clock, and first handle all times that are over by now."""
         now = self._clock.monotonic()
         self._now_s = self._recorder.began_s = now
         if now >= self._deadline_s and self._is_started:
@@ -335,10 +332,10 @@ class Runner:
 
     def _check_time(self, now: float) -> None:
         """
-        Handle what is over by now.
+        Handle all times that are over by now. Never raises.
 
-        Never raises: after a fault, too, what comes is handled; a goal whose end were lost would
-        never have ended.
+        Messages are handled after a fault, too: if the end of a goal were lost, the goal would
+        never count as ended.
         """
         try:
             self._end_what_is_over(now)
@@ -346,7 +343,7 @@ class Runner:
             self._fail(describe_error(error))
 
     def _end_what_is_over(self, now: float) -> None:
-        """Take in replies that did not come in time, and stale sensors."""
+        """Handle replies that did not come in time, and stale sensors."""
         self._replies.expire(now)
         for name, identifier in self._sensors.stale(now):
             if _stale_key(name) not in self._safe_stop.reasons:
@@ -354,7 +351,7 @@ class Runner:
         self._deadline_s = self._next_deadline(now)
 
     def _see(self, name: str) -> None:
-        """Note that a message came: its sensor is fresh, and a stop because it was not is over."""
+        """Note a message: its sensor is fresh again, which ends a stop because of it."""
         if self._sensors.see(name, self._now_s):
             if self._safe_stop.reasons.pop(_stale_key(name), None) is not None:
                 self._recorder.note('resume', '{} is back'.format(name))
@@ -380,7 +377,7 @@ class Runner:
             self._end_batch()
 
     def _finish(self) -> None:
-        """End the handling of a message or reply, whether it went well or not. Never raise."""
+        """End the handling of a message or reply, also after a failure. Never raises."""
 
     def _update_may_request(self) -> None:
         self._may_request = (
@@ -403,7 +400,7 @@ class Runner:
 
     def _come_to_rest(self) -> None:
         """
-        Stop all requests and wheels, and cancel goals; what fails is a fault.
+        Stop all requests and wheels, and cancel goals; a failure is a fault.
 
         Never raises.
         """

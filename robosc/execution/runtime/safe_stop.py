@@ -1,7 +1,7 @@
 """
-Safe stop, whatever happens.
+Safe stop of the robot.
 
-Default messages on release identifiers, goals cancelled (semantics 3.8).
+It sends default messages on release identifiers, and cancels goals (semantics 3.8).
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def describe_error(error: BaseException) -> str:
 
 
 def request_cancel(middleware: RobotSide, goal: Goal) -> None:
-    """Ask for the cancel of a goal, once; before its acceptance it is only remembered."""
+    """Ask once for the cancel of a goal; before its acceptance the cancel is only remembered."""
     goal.is_cancel_wanted = True
     if goal.is_accepted and not goal.is_cancel_sent:
         middleware.cancel_goal(goal.action, goal.number)
@@ -34,12 +34,12 @@ def request_cancel(middleware: RobotSide, goal: Goal) -> None:
 
 class SafeStop:
     """
-    The reasons why an executor has stopped, and what it does to stop safely.
+    The reasons why an executor has stopped, and the actions of its safe stop.
 
     :param middleware: Middleware that sends default messages and cancels.
     :param releases: The release identifiers.
     :param goals: Goals under way.
-    :ivar reasons: Reasons in words, by a key; nothing may be requested while there is one.
+    :ivar reasons: Reasons in words, by a key; while there is one, no request is issued.
     :ivar awaited_until_s: Time until which the goals' ends are awaited, in seconds.
     :ivar unsent: Release identifiers whose default message could not be sent so far.
     """
@@ -66,7 +66,7 @@ class SafeStop:
 
     def retry(self) -> List[str]:
         """
-        Send the default messages and cancels that are still owed; what failed, in words.
+        Send the default messages and cancels that are still owed; return what failed.
 
         Never raises.
         """
@@ -94,5 +94,5 @@ class SafeStop:
         return failures
 
     def is_awaiting(self, now_s: float) -> bool:
-        """Return True if goals may still end within the time that they are given."""
+        """Return True if some goals have not ended and their time to end is not over."""
         return bool(self._goals) and now_s < self.awaited_until_s

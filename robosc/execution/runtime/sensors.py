@@ -30,12 +30,11 @@ class _Sensor:
 
 class Sensors:
     """
-    Tells which sensors are stale. Several messages of the model may come on one identifier.
+    Monitor of stale sensors. Several messages of the model may come on one identifier.
 
     :param messages: Name and identifier of every outgoing message, in source order, and its
         maximum age in seconds as the model has it, or None.
-    :param max_age_s: Maximum age by identifier, as the deployment has it: it stands above the
-        model.
+    :param max_age_s: Maximum age by identifier, from the deployment: it overrides the model's.
     """
 
     __slots__ = ('_sensors',)
@@ -72,11 +71,11 @@ class Sensors:
         return True
 
     def are_all_seen(self) -> bool:
-        """Return True if every one of the sensors came at least once."""
+        """Return True if every sensor has sent at least one message."""
         return all(sensor.was_seen for sensor in self._sensors.values())
 
     def unseen(self) -> Tuple[str, ...]:
-        """Return identifiers of the sensors that have not come since the start, each once."""
+        """Return identifiers of the sensors without a message since the start, each once."""
         return tuple(
             dict.fromkeys(item.identifier for item in self._sensors.values() if not item.was_seen)
         )

@@ -1,4 +1,4 @@
-"""Settings of a deployment, checked by themselves and against the model they are meant for."""
+"""Settings of a deployment, checked alone and against the model of the robot."""
 
 from __future__ import annotations
 
@@ -38,7 +38,7 @@ class Settings(NamedTuple):
     :ivar service_timeout_s: Seconds until a service call without a reply counts as failed; None:
         never.
     :ivar action_timeout_s: Seconds until a goal without a result counts as failed; None: never.
-    :ivar on_unknown: Reaction when an enum falls to its default past an unknown rule: `default`,
+    :ivar on_unknown: Reaction if an enum gets its default because a rule is unknown: `default`,
         `keep`, `fault`.
     :ivar command_timeout_s: Seconds without a message from the existing controller on a release
         identifier after which its last one is released, in a supervision layer; 0: never.
@@ -70,7 +70,7 @@ A layer decides nothing.
 
 def settings_from(given: Mapping[str, Any]) -> Settings:
     """
-    Return valid settings from named plain values; what is not given has its default.
+    Return valid settings from named plain values; missing settings have their defaults.
 
     :raises SettingsError: A name is unknown or a value is wrong.
     """
@@ -106,7 +106,7 @@ def validated(settings: Settings) -> Settings:
 
 def settings_for(settings: Settings, description: Description) -> Settings:
     """
-    Return valid settings: names known to the model, release identifiers spelled out.
+    Return valid settings for a model: all names are known, all release identifiers listed.
 
     :raises SettingsError: A value is wrong, or a name is none of the model's.
     """
@@ -138,7 +138,7 @@ def settings_for(settings: Settings, description: Description) -> Settings:
 
 def require_settings_of(settings: Settings, deployment: str) -> None:
     """
-    Do nothing if every setting that means nothing in a deployment has its default.
+    Require the default of every setting that has no effect in a deployment.
 
     :param settings: Valid settings.
     :param deployment: `controller` or `layer`.

@@ -1,10 +1,9 @@
 """
 Events of the environment, and the silent steps that follow them (semantics 3.1 and 3.3).
 
-A state is *stable* when no silent step is enabled in it. What must be judged there, releases and
-the requirements of running goals, is judged once for each stable state that is new. One that was
-left and reached again within a batch counts as new: judging a state a second time finds what the
-first time found.
+A state is *stable* if no silent step is enabled in it. Releases and the requirements of running
+goals are checked once in each new stable state. A stable state that was left and reached again
+within a batch counts as new: a second check gives the same result.
 """
 
 from __future__ import annotations
@@ -33,11 +32,11 @@ class Steps:
     :param releases: Messages that keep acting.
     :param goals: Goals under way.
     :param on_unknown: Meaning of an unknown enum: `default`, `keep` or `fault`.
-    :ivar enabled: Requests that the stable state enables, by number, once somebody worked it out,
-        else None.
+    :ivar enabled: Numbers of the requests that the stable state enables, or None before they are
+        computed.
     :ivar unchanging: Messages whose request was issued in this stable state and changed nothing:
-        their data, and whether that is the default. A request's data and its step depend on
-        nothing but the state.
+        their data, and whether it is the default. A request's data and its step depend only on
+        the state.
     """
 
     __slots__ = (
@@ -78,7 +77,7 @@ class Steps:
         self._pending: Optional[str] = None
 
     def restart(self) -> None:
-        """Back to the initial state, which may not be stable."""
+        """Return to the initial state, which may not be stable."""
         self._system.restart()
         self._stable = None
         self.enabled = None
@@ -87,13 +86,12 @@ class Steps:
 
     def happen_with_data(self, event: str, data: Any, may_keep: bool = False) -> bool:
         """
-        Convert data and take the event that it came with.
+        Convert data and take its event.
 
         :param event: An uncontrollable event.
-        :param data: Data that came.
-        :param may_keep: True if the setting `keep` applies: it does to messages.
-        :returns: True if anything counts as having come; False if the data is unknown and `keep`
-            applies.
+        :param data: Received data.
+        :param may_keep: True if the setting `keep` applies, as it does to messages.
+        :returns: True if the event was handled; False if the data is unknown and `keep` applies.
         """
         reading = self._system.read(event, data)
         if reading.unknown:
@@ -109,7 +107,7 @@ class Steps:
 
     def happen_at_once(self, identifier: str, data: Any) -> bool:
         """
-        Take all events of a message, if nothing is unknown and no log wants to know each of them.
+        Take all events of a message at once, if no data is unknown and no log is active.
 
         :returns: True if they were taken; if not, nothing has happened.
         """
@@ -153,15 +151,15 @@ class Steps:
 
     def settle(self, issuing: Optional[str] = None) -> bool:
         """
-        Silent steps to the end.
+        Take silent steps until none is enabled.
 
-        Then releases and running goals are judged, if the stable state is another one.
+        Then releases and running goals are checked, if the stable state is a new one.
 
         :param issuing: Communication whose request was just taken and whose message is about to go
             out, if any.
-        :returns: True if the stable state may be another one.
-        :raises LivelockError: They do not end.
-        :raises ExecutionError: Something was unknown, and that is a fault.
+        :returns: True if the stable state may have changed.
+        :raises LivelockError: The silent steps do not end.
+        :raises ExecutionError: Some data was unknown, and that is a fault.
         """
         has_changed = self._system.changes != self._stable
         if has_changed:
@@ -194,7 +192,7 @@ class Steps:
         cast(StrategicSystem, self._system).observe()
 
     def _run_on(self, event: Optional[str]) -> None:
-        """Silent steps after the first one, `event`, until none is enabled."""
+        """Take silent steps after the first one, `event`, until none is enabled."""
         detector = LivelockDetector(self._system.description.silent_bound)
         while event is not None:
             detector.check(self._system.signature, event)
@@ -204,7 +202,7 @@ class Steps:
         """
         Take one silent step, cancels first, then resets, then taus.
 
-        Its event, or None if there is none.
+        :returns: Its event, or None if none is enabled.
         """
         if self._goals:
             goal = self._goals.to_cancel()
@@ -220,7 +218,7 @@ class Steps:
         return silent
 
     def _skip(self, event: str, skipped: Tuple[str, ...]) -> None:
-        """Take in that updates were skipped."""
+        """Record that updates were skipped."""
         self._recorder.unknown(event, skipped)
         self._handle_unknown(event, skipped)
 

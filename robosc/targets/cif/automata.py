@@ -1,7 +1,7 @@
 """The controlled system of automata as a CIF model: plants as they are, requirements and the supervisor as supervisors.
 
-Names are absolute names of CIF, as its front end (`robosc.cif`) gives them: the event `hall.door.u_open` stands in the
-group or automaton `hall.door`. An automaton of one event of its own name is an input variable.
+Names are absolute names of CIF, as its front end (`robosc.cif`) makes them: the event `hall.door.u_open` is declared in
+the group or automaton `hall.door`. An automaton with one event of its own name is an input variable.
 """
 
 import re

@@ -1,7 +1,7 @@
-"""Expressions of a synthesis problem as CIF expressions, exactly or not at all.
+"""Expressions of a synthesis problem as CIF expressions, translated exactly or refused.
 
-CIF knows no unknown value: see `robosc.targets.code.predicates`. Functions become `if` expressions. What CIF cannot
-compute is tabulated (`robosc.targets.cif.tables`); what is too large for that is refused.
+CIF has no unknown values: see `robosc.targets.code.predicates`. Functions become `if` expressions. An expression that
+CIF cannot compute becomes a table (`robosc.targets.cif.tables`); if the table is too large, the model is refused.
 """
 
 from collections.abc import Sequence

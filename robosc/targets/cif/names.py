@@ -1,8 +1,8 @@
-"""The CIF name of everything in a synthesis problem, and the way back.
+"""The CIF names of all parts of a synthesis problem, and the mapping from CIF names to these parts.
 
-CIF has one name space for each automaton and one for the specification, and a name of an automaton hides the
-specification's. So a name is taken only if nothing else that could be meant has it: the first to ask gets it, a later
-one gets `_2`, `_3` and so on behind its own.
+CIF has one name space for each automaton and one for the specification, and a name in an automaton hides the same name
+in the specification. So each name is used only once among the names that are visible together: the first part gets it,
+and later ones get it with `_2`, `_3` and so on.
 """
 
 from collections.abc import Iterable, Iterator

@@ -1,7 +1,7 @@
-"""Integers in CIF: sums of what CIF stores, with their range and what makes them known.
+"""Integers in CIF: sums of stored values, with their ranges and the conditions under which they are known.
 
-A variable of `integer(-3..3)` is stored as 0..6, so every reading of it subtracts 3 again. Sums are kept apart into
-their terms: the constants meet in one place, and a comparison needs no negative number at all.
+A variable of `integer(-3..3)` is stored as 0..6, so every expression that reads it subtracts 3. Sums are kept as lists
+of terms, so that constants are added up, and a comparison needs no negative number.
 """
 
 from dataclasses import dataclass

@@ -104,7 +104,7 @@ class Plants:
         return [all_of(negated(guard) for guard in guards), *guards]
 
     def _alphabet_line(self, automaton: Automaton) -> Iterator[str]:
-        """The alphabet, where edges alone do not tell it."""
+        """The alphabet, if it has events that no edge has."""
         if automaton.alphabet != {edge.event for edge in automaton.edges}:
             events = [event.name for event in self._system.events if event.name in automaton.alphabet]
             yield f"  alphabet {', '.join(self._names.event_reference(name, automaton.name) for name in events)};"

@@ -1,4 +1,4 @@
-"""The supervisor automaton: one location, and a self-loop for each controllable event with what it needs."""
+"""The supervisor automaton: one location, and a self-loop with a guard for each controllable event."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field

@@ -1,4 +1,4 @@
-"""The comment table that maps CIF names back to what the model calls them."""
+"""The comment table that maps CIF names back to the names of the model."""
 
 from collections.abc import Iterator
 

@@ -1,7 +1,7 @@
-"""Expressions that CIF cannot compute with, taken apart by trying every value of what they read.
+"""Tables for expressions that CIF cannot compute, made by evaluating every combination of the values that they read.
 
-Doubles, what may exceed 32 bits and what has no counterpart in CIF are evaluated here, with the meaning that RoboSC
-gives them. What is left is a decision over the few locations, variables and data that the expression reads.
+Expressions with doubles, with results that may exceed 32 bits, or without a counterpart in CIF are evaluated here, with
+the semantics of RoboSC. The result is a decision over the few locations, variables and data that the expression reads.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -24,7 +24,7 @@ MAXIMUM_TRIED = 20 * MAXIMUM_COMBINATIONS
 """Combinations beyond which nothing more of one model is tried out."""
 
 MAXIMUM_CASES = 1_000
-"""Cases that one table may tell apart."""
+"""Cases that one table may have."""
 
 
 class TableTooLargeError(Exception):
@@ -123,7 +123,7 @@ class _Builder:
         sources: Sources that are read.
         domains: Their values.
         values: Results of all combinations, the last source changing fastest.
-        cases: Runs of values told apart so far.
+        cases: Cases so far, each a run of equal values.
     """
 
     sources: Sequence[Source]

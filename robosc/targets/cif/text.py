@@ -1,4 +1,4 @@
-"""Pieces of CIF text: names, comments, and expressions that know how tightly they bind.
+"""Pieces of CIF text: names, comments, and expressions with their precedence.
 
 CIF (Compositional Interchange Format) is the modelling language of Eclipse ESCET: D. A. van Beek, W. J. Fokkink,
 D. Hendriks, A. Hofkamp, J. Markovski, J. M. van de Mortel-Fronczak and M. A. Reniers, "CIF 3: model-based engineering

@@ -1,7 +1,7 @@
-"""Automata under their supervisor as code: what it is made of, and the statements that all languages share.
+"""Automata under their supervisor as code: its parts, and the statements that all languages share.
 
-Each event becomes a function that reads the state before it and writes the next one. Where it returns false, the event
-cannot happen, and what it wrote until then counts for nothing.
+Each event becomes a function that reads the state before the event and writes the next one. If it returns false, the
+event cannot happen, and the written values are discarded.
 """
 
 import re
@@ -255,7 +255,7 @@ class AutomataWriter(ABC):
             for edge in edges
         ]
         found: list[Statement] = []
-        # A requirement never stops what nobody controls: under its supervisor the system is in no state where it would.
+        # No requirement blocks an uncontrollable event: the supervisor avoids every state in which it would.
         if event.name not in automaton.monitors:
             possible = FALSE_CODE
             for test in tests:

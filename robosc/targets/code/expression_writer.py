@@ -1,8 +1,8 @@
-"""RoboSC expressions as code: native operations where nothing can be unknown, Kleene functions where it can.
+"""RoboSC expressions as code: native operations if no operand can be unknown, else Kleene functions.
 
-Three readings of one boolean expression: `truth` (is it true?), `falsity` (is it false?) and `value`
-(true, false or unknown). Conditions hold only when they are true (language B.4), so that most of the
-generated code needs `truth` alone and stays ordinary code even over data that may be unknown.
+A boolean expression can be written in three ways: `truth` (is it true?), `falsity` (is it false?) and `value` (true,
+false or unknown). Conditions hold only if they are true (language B.4), so most of the generated code needs only
+`truth`, and stays ordinary code even over data that may be unknown.
 
 A number that is unknown as NaN is compared natively: the comparisons of IEEE 754 are false for it, as `truth` and
 `falsity` want. Whether an integer result can leave 32 bits is decided by interval arithmetic.

@@ -1,7 +1,7 @@
 """Typed expressions of generated code: trees that know their sort, their range and how they can be unknown.
 
-A generator builds them, asks them what they read, and prints them at the end: a `Language` holds the shape of every
-operation in one programming language and puts parentheses where its operators need them.
+A generator builds expressions, asks them which variables they read, and prints them at the end. A `Language` defines
+the form of every operation in one programming language, and adds parentheses where operators need them.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
@@ -144,7 +144,7 @@ def integer(value: int) -> Code:
 
 
 def double(value: float) -> Code:
-    """A double in the fewest digits that tell it apart."""
+    """A double in the fewest digits that distinguish it from every other."""
     return literal(repr(value), Sort.DOUBLE, is_signed=copysign(1, value) < 0)
 
 

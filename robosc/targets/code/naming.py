@@ -1,4 +1,4 @@
-"""Names in generated code: distinct ones for what a model names, and the name of a generated package."""
+"""Names in generated code: distinct names for the parts of a model, and the name of a generated package."""
 
 import keyword
 import re

@@ -1,8 +1,9 @@
-"""Expressions in a language that knows no unknown value, exactly or not at all: one pass for CIF and Promela.
+"""Expressions in a language without unknown values, translated exactly or refused: one pass for CIF and Promela.
 
-A condition becomes two predicates, where it is true and where it is false, and a value comes with a predicate that
-tells where it is known (strong Kleene logic, as in `robosc.expressions.values`). What the language cannot compute,
-doubles and what may exceed 32 bits, is tabulated: tried for every value of what it reads.
+A condition becomes two predicates: one is true where the condition is true, the other where it is false. A value comes
+with a predicate that is true where the value is known (strong Kleene logic, as in `robosc.expressions.values`). An
+expression that the language cannot compute, with doubles or beyond 32 bits, becomes a table of its value for every
+combination of the values that it reads.
 """
 
 from abc import ABC, abstractmethod

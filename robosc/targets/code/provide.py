@@ -1,4 +1,4 @@
-"""Statements that choose the data of a request: of the first provide statement whose condition is true."""
+"""Statements that choose the data of a request: that of the first provide statement whose condition is true."""
 
 from collections.abc import Callable, Iterable
 

@@ -1,4 +1,4 @@
-"""Statements that read received data into local variables, and the rules that make an enum of it."""
+"""Statements that read received data into local variables, and convert it to enums by their rules."""
 
 from abc import ABC, abstractmethod
 

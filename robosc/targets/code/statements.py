@@ -1,6 +1,6 @@
-"""Statements of generated code: values that hold typed expressions, and that each language prints in its own way.
+"""Statements of generated code: values that contain typed expressions, printed for each language in its own way.
 
-A generator builds them, asks them what they read, and prints them at the end, as it does with expressions.
+A generator builds statements, asks them which variables they read, and prints them at the end, as with expressions.
 """
 
 from collections.abc import Iterator, Sequence
@@ -21,7 +21,7 @@ class Let(NamedTuple):
     Attributes:
         place: The variable.
         value: Its value.
-        type: Its type where that is not told by the sort of the value, for a language that declares types.
+        type: Its type, for a language that declares types, if the sort of the value does not determine it.
     """
 
     place: Code

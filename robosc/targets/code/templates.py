@@ -1,4 +1,4 @@
-"""Templates of generated packages: where they are, and the values that every package's templates refer to."""
+"""Templates of generated packages: their folders, and the values that the templates of every package use."""
 
 import json
 from collections.abc import Callable, Mapping

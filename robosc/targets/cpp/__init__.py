@@ -1,1 +1,1 @@
-"""Common parts of the C++ nodes, whatever their middleware: around the supervisor in C99, tables and conversions."""
+"""Common parts of the C++ nodes for every middleware: tables and conversions around the supervisor in C99."""

@@ -1,4 +1,4 @@
-"""The generated `model.hpp`: tables of one robot, its data as JSON, and between its data and messages of any class."""
+"""The generated `model.hpp`: tables of one robot, its data as JSON, and conversions between data and messages."""
 
 import json
 from collections.abc import Iterable, Iterator
@@ -135,7 +135,7 @@ class Writer:
             f"template <class Visitor>\nvoid visit_state([[maybe_unused]] const {layout.prefix}_state_t& state, "
             "[[maybe_unused]] Visitor& visitor)",
             lines,
-            comment("Tell a visitor the state of each component, and after it the value of each of its variables."),
+            comment("Pass a visitor the state of each component, and after it the value of each of its variables."),
         )
 
     def _visit_communications(self) -> list[str]:
@@ -149,7 +149,7 @@ class Writer:
             f"template <class Visitor>\nvoid visit_communications("
             f"[[maybe_unused]] const {layout.prefix}_state_t& state, [[maybe_unused]] Visitor& visitor)",
             lines,
-            comment("Tell a visitor the location of each service and action."),
+            comment("Pass a visitor the location of each service and action."),
         )
 
     def _put_taken(self) -> list[str]:
@@ -423,7 +423,7 @@ def _array(head: str, items: Iterable[str]) -> list[str]:
 
 
 def _visited_text(what: str, name: str, texts: Iterable[str], place: str) -> list[str]:
-    """Statements that tell a visitor the text with the number that stands in a place."""
+    """Statements that pass a visitor the text whose number a place holds."""
     listed = ", ".join(map(string_literal, texts))
     return [
         "{",

@@ -1,4 +1,4 @@
-"""Names of ROS that C++ cannot say."""
+"""Names of ROS that are no names in C++."""
 
 import re
 

@@ -1,4 +1,4 @@
-"""The files that every C++ package has, and what the templates of a package speak of."""
+"""The files that every C++ package has, and the values for its templates."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -222,7 +222,7 @@ def _server(unit: Unit, number: int, item: Communication, middleware: Middleware
         "type": middleware.type_name(_kind(item), item.interface),
         "asked": middleware.type_name(asked, item.interface),
         "answered": middleware.type_name(answered, item.interface),
-        "told": middleware.type_name("feedback", item.interface),
+        "reported": middleware.type_name("feedback", item.interface),
         "literal": string_literal(item.identifier),
         "enumerator": layout.communications[item.name],
         "fill": fill_name(layout, item),

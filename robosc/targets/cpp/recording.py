@@ -1,7 +1,7 @@
 """A run of the reference executor, recorded when a C++ package is generated, as the steps of the package's test.
 
-The test repeats the run on the generated supervisor in C99, with structures of the test's own in place of messages: it
-needs no middleware.
+The test repeats the run on the generated supervisor in C99. It has its own structures in place of messages, so it needs
+no middleware.
 """
 
 from collections.abc import Iterator, Sequence

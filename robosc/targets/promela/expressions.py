@@ -1,7 +1,8 @@
 """Expressions as Promela text, with three truth values and exact numbers.
 
-Promela computes with C integers and knows no unknown values: see `robosc.targets.code.predicates`. What computes with
-doubles, or could go beyond 32 bits, is listed value by value of what it reads: only values of finite types take part.
+Promela computes with C integers and has no unknown values: see `robosc.targets.code.predicates`. An expression with
+doubles, or with results that could exceed 32 bits, is listed for every combination of the values that it reads: only
+finite types take part.
 """
 
 from collections.abc import Mapping, Sequence

@@ -1,10 +1,10 @@
 """A Promela model of a controlled system, for the model checker spin (G. J. Holzmann, "The SPIN Model Checker", 2003).
 
-One process does one event after the other: an atomic step chooses an event whose guard is true, the data that comes
-with it, and for every automaton an edge; what is written is put in place in one go, so that all updates read the old
-state. The supervisor's conditions are bits that each step works out for the next one from the decision diagrams,
-since an expression has no way to share its parts. What a step needs in between is 0 again at its end: the states that
-spin stores are those of the controlled system, one for one.
+One process takes one event after the other. An atomic step chooses an event whose guard is true, its data, and an edge
+for every automaton. New values are written together at the end, so that all updates read the old state. The
+supervisor's conditions are bits that each step computes for the next one from the decision diagrams, because an
+expression cannot share its parts. Auxiliary variables are 0 again at the end of a step, so the states that spin stores
+are exactly those of the controlled system.
 """
 
 from collections.abc import Iterator, Mapping, Sequence

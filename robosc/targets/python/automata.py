@@ -1,4 +1,4 @@
-"""Automata under their supervisor as a module in Python: a method that takes an event, and what can happen."""
+"""Automata under their supervisor as a module in Python, with methods to take an event and to list possible events."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

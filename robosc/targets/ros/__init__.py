@@ -1,1 +1,1 @@
-"""Common parts of the targets for ROS 2 and ROS 1: meaning of a model there, and modules that every node carries."""
+"""Common parts of the targets for ROS 2 and ROS 1: the meaning of a model there, and modules of every node."""

@@ -39,7 +39,7 @@ def require_names_of_a_layer(found: tuple[Topic, ...], asked: tuple[Communicatio
     for topic in found:
         if _bare(topic.identifier) == BLOCKED:
             raise UnsupportedModelError(
-                f"the topic {topic.identifier} is where a supervision layer tells what it holds back"
+                f"the topic {topic.identifier} is where a supervision layer reports the requests that it holds back"
             )
         if topic.published and topic.received:
             raise UnsupportedModelError(
@@ -97,7 +97,7 @@ def _require_own_sides(identifier: str) -> None:
 
 
 def _require_one_each(what: str, named: Iterable[tuple[str, str]]) -> None:
-    """A layer cannot tell apart what comes on one name, but for messages with `when`."""
+    """Refuse two identifiers with one name: a layer could not distinguish what comes there."""
     first: dict[str, str] = {}
     for identifier, text in named:
         name = _bare(identifier)

@@ -1,4 +1,4 @@
-"""The packages of a middleware in Python, given a record of what sets it apart: ROS 1 or ROS 2."""
+"""The packages of a middleware in Python, made from a record of its differences: ROS 1 or ROS 2."""
 
 from collections.abc import Callable, Iterable
 from dataclasses import dataclass

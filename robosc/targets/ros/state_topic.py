@@ -1,4 +1,4 @@
-"""The tables behind the topic `/state`: what the model looks like, and which of its transitions an event takes."""
+"""Tables for the topic `/state`: the structure of the model, and the transitions that an event takes."""
 
 from dataclasses import dataclass
 

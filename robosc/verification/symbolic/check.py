@@ -82,7 +82,7 @@ class _Check:
         found = self._failure("safe", self._reachable & bad, "an invariant is not true")
         if found is None:
             return None
-        # The explicit meaning would tell more, but it may have too much to go through in a state of this system.
+        # The explicit semantics would give a better reason, but a state of this system may have too many successors.
         at = self._variables.states([found.state])
         for item in self._relations:
             if at & self._invariant != false and at & item.bad != false:

@@ -1,6 +1,6 @@
-"""Expressions as predicates: connectives become operations on diagrams, few values are gone through one by one.
+"""Expressions as predicates: connectives become operations on diagrams, and few values are enumerated.
 
-Of wide integers, which have too many, comparisons and updates become linear relations.
+Wide integers have too many values: their comparisons and updates become linear relations.
 """
 
 from collections.abc import Callable, Sequence

@@ -1,8 +1,8 @@
 """Integers as linear forms over single bits, by cases; a relation between two is one inequality or congruence.
 
-No number is added bit by bit here: a comparison is a weighted sum of bits held against a bound, and its diagram is made
-from the top down, what is left of the bound deciding which nodes are one. Minima, choices, quotients and remainders by
-a constant are cases, each with the form that the value has in it.
+Numbers are not added bit by bit: a comparison is a weighted sum of bits against a bound. Its diagram is built from the
+top down, and nodes with the same rest of the bound are merged. Minima, choices, quotients and remainders by a constant
+are cases, each with its own linear form.
 
 Source: I. Abio, R. Nieuwenhuis, A. Oliveras, E. Rodriguez-Carbonell and V. Mayer-Eichberger, "A new look at BDDs for
 pseudo-Boolean constraints", J. Artificial Intelligence Research 45, 2012, pp. 443-480 (section 5, for intervals of

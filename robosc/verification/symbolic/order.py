@@ -1,8 +1,8 @@
-"""An order of the places of a state in which those that belong together stand near each other.
+"""An order of the places of a state in which related places are near each other.
 
 Source: E. Cuthill and J. McKee, "Reducing the bandwidth of sparse symmetric matrices", Proc. 24th ACM National
-Conference, 1969, pp. 157-172; for synthesis it was found good by S. Lousberg, S. Thuijsman and M. Reniers, "DSM-based
-variable ordering heuristic for reduced computational effort of symbolic supervisor synthesis", WODES 2020,
+Conference, 1969, pp. 157-172; for synthesis it was found to be good by S. Lousberg, S. Thuijsman and M. Reniers,
+"DSM-based variable ordering heuristic for reduced computational effort of symbolic supervisor synthesis", WODES 2020,
 IFAC-PapersOnLine 53(4), pp. 429-436.
 """
 

@@ -35,7 +35,7 @@ class Digits:
     Attributes:
         names: In the state before an event (or in the data of its occurrence).
         values: The values, in the order of their indices.
-        known: The variable that tells whether a received datum is known at all, or None if it always is.
+        known: The variable that is true if the received datum is known, or None if it always is.
     """
 
     names: tuple[str, ...]

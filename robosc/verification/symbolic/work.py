@@ -1,4 +1,4 @@
-"""Bound on the work of a symbolic check: counted in nodes, so that it ends alike on every machine."""
+"""Bound on the work of a symbolic check: counted in nodes, so that it ends at the same point on every machine."""
 
 from collections.abc import Callable
 from typing import Any
@@ -20,7 +20,7 @@ class Work:
         limit: Nodes of all diagrams that are made, each counted each time, and values that expressions are worked
             out for.
         should_stop: Asked at each step; once true, the work ends.
-        on_progress: Told now and then where the work is, in one short line.
+        on_progress: Called now and then with one short line that says how far the work is.
     """
 
     def __init__(self, limit: int, should_stop: Callable[[], bool], on_progress: Callable[[str], None]) -> None:

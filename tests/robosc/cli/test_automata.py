@@ -266,9 +266,9 @@ def test_a_supervisor_file(model: str, tmp_path: Path, capsys: pytest.CaptureFix
     file.write_bytes(changed)
     status, out, _ = run(capsys, "verify", str(file), model)
     assert (status, out.splitlines()[0]) == (1, "tank: failed")
-    assert out.splitlines()[-1] == "wrong states: it tells of 2, and there are 3"
+    assert out.splitlines()[-1] == "wrong states: it states 2, and there are 3"
     fault = json.loads(run(capsys, "verify", str(file), model, "--json")[1])["faults"][0]
-    assert (fault["check"], fault["message"]) == ("states", "it tells of 2, and there are 3")
+    assert (fault["check"], fault["message"]) == ("states", "it states 2, and there are 3")
     Path(model).write_text(TANK.replace("level > 1", "level > 2"))
     status, _, err = run(capsys, "verify", str(file), model)
     assert (status, "one of other automata" in err) == (1, True)

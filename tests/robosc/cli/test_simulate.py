@@ -209,7 +209,7 @@ def test_commands_from_a_file(capsys: pytest.CaptureFixture[str], monkeypatch: p
         "nothing is left to be taken back",
         "taken again: scan.response",
         "seed 7",
-        "      5 events, which 'history' tells",
+        "      5 events, which 'history' lists",
         "written to run.jsonl",
         *HELP.splitlines(),
     ):
@@ -278,7 +278,7 @@ def test_a_terminal_has_a_prompt_completion_and_goes_on_after_mistakes(folder: P
             os.write(host, text)
             until(wanted)
 
-        until(b"Gate: 'help' tells the commands")
+        until(b"Gate: 'help' lists the commands")
         until(b"> ")
         type_(b"halt\n", b"'halt.request' is not allowed now")
         until(b"> ")

@@ -140,7 +140,7 @@ def test_the_robots_clock_passes_as_its_world_does() -> None:
     times = [entry.time_s for entry in found.entries]
     assert times == pytest.approx([-3.0, 0.0, 10.0, 10.0, 11.0, 11.5, 12.0, 15.0])
     assert [entry.line for entry in found.entries] == [entry.line for entry in RUN.entries]
-    with pytest.raises(PlotError, match="too short to tell the robot's time"):
+    with pytest.raises(PlotError, match="too short to give the robot's time"):
         on_robots_clock(RUN, Motion(motion.samples[:1], ()))
 
 

@@ -101,7 +101,7 @@ def test_of_long_diagrams_the_size_is_told() -> None:
     assert whole[0] == f"e0 needs {size}, to be read from [1] on:" and len(whole) > 14
     with patch.object(summary, "_NODES", 10):
         short = str(conditions)
-    assert f"e0 needs {size}; --json tells it node by node\ne1 needs one of 2, to be read from [1] on:\n[1]" in short
+    assert f"e0 needs {size}; --json lists its nodes\ne1 needs one of 2, to be read from [1] on:\n[1]" in short
     # Asked for by itself it is told whole.
     assert str(conditions["e0"]).startswith(f"{size}, to be read from [1] on:\n[1]")
 

@@ -100,7 +100,7 @@ def test_only_so_many_lines_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
     supervisor, system = made(FOLDER / "parity.rscd")
     monkeypatch.setattr("robosc.conditions.summary._NODES", 10)
     assert words(supervisor, system).splitlines()[-1] == (
-        "shut.request    a decision diagram of 11 nodes; --json tells it node by node"
+        "shut.request    a decision diagram of 11 nodes; --json lists its nodes"
     )
     diagrams = summary_json(supervisor)["diagrams"]
     assert isinstance(diagrams, dict)

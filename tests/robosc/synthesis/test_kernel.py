@@ -147,7 +147,7 @@ def test_it_tells_as_python_does_whether_one_implies_another(seed: int) -> None:
         assert found.implies(left, right) == (left & ~right == manager.false)
 
 
-def told_apart_one_by_one(manager: Manager, one: Any, other: Any, groups: list[tuple[str, ...]]) -> tuple[Any, Any]:
+def separated_one_by_one(manager: Manager, one: Any, other: Any, groups: list[tuple[str, ...]]) -> tuple[Any, Any]:
     for names in groups:
         fewer = manager.exist(names, one), manager.exist(names, other)
         if fewer[0] & fewer[1] == manager.false:
@@ -172,8 +172,8 @@ def test_places_that_do_not_tell_sets_apart_are_left_out(seed: int, engine: str)
         groups.append(tuple(names[:count]))
         names = names[count:]
     cubes = [manager.cube(dict.fromkeys(group, True)) for group in groups]
-    found = nodes.told_apart(manager, one, other, cubes)
-    assert found == told_apart_one_by_one(manager, one, other, groups)
+    found = nodes.separated(manager, one, other, cubes)
+    assert found == separated_one_by_one(manager, one, other, groups)
     away = [name for group in groups for name in group]
     assert nodes.without(manager, one, cubes) == (manager.exist(away, one) if away else one)
 
@@ -234,7 +234,7 @@ def test_the_figures_tell_of_it() -> None:
 def test_sets_that_are_told_apart_leave_nothing_behind(manager: Manager) -> None:
     manager.declare("a", "b", "c")
     a, b, c = map(manager.var, "abc")
-    found = nodes.told_apart(manager, a & b & c, ~a & b, [c, b, a])
+    found = nodes.separated(manager, a & b & c, ~a & b, [c, b, a])
     assert found == (a, ~a)
     assert nodes.without(manager, a & b, [a, c]) == b
 

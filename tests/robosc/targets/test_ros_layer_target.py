@@ -147,11 +147,11 @@ def test_a_relative_name_stays_relative_without_a_prefix() -> None:
         ),
         (
             'component C { outgoing message m with identifier: "/blocked", type: string }',
-            "the topic /blocked is where a supervision layer tells what it holds back",
+            "the topic /blocked is where a supervision layer reports the requests that it holds back",
         ),
         (
             'component C { incoming message m with identifier: "blocked", type: none }',
-            "the topic blocked is where a supervision layer tells what it holds back",
+            "the topic blocked is where a supervision layer reports the requests that it holds back",
         ),
         (
             'component C { outgoing message m with identifier: "/t", type: none'

@@ -1,4 +1,4 @@
-"""Looks for a line on the floor and tells how to steer along it, or that there is none. Needs no OpenCV."""
+"""Detector of a line on the floor, without OpenCV: publishes how to steer along it, or that there is none."""
 
 import math
 import sys
@@ -58,7 +58,7 @@ class LineDetector(Node):
             self.stop()
 
     def stop(self) -> None:
-        """Tell that there is no line."""
+        """Publish that there is no line."""
         self._lost.publish(Empty())
 
 

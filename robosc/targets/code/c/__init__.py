@@ -1,1 +1,1 @@
-"""C of a supervisor: its library and example program, which the target `c99` and packages in C++ hold."""
+"""C code of a supervisor: its library and example program, for the target `c99` and for packages in C++."""

@@ -1,4 +1,4 @@
-"""The generated `main.c` of a controller: a run with callbacks that print, and nothing that comes back."""
+"""The generated `main.c` of a controller: a run with callbacks that print, without any replies."""
 
 from robosc.model.structure import CommunicationKind
 from robosc.targets.code.c.header import head

@@ -1,7 +1,7 @@
 """RoboSC expressions in C: see `robosc.targets.code.expression_writer`.
 
-What stands for unknown (language B.4): -1 for a boolean and an enum, INT64_MIN for an integer, NaN for a double, NULL
-for a text. Integers are worked out in 64 bits, so that a result beyond 32 bits is noticed before it overflows.
+Unknown values (language B.4) are -1 for a boolean and an enum, INT64_MIN for an integer, NaN for a double, NULL for a
+text. Integers are computed in 64 bits, so that a result beyond 32 bits is detected before it overflows.
 """
 
 from dataclasses import replace

@@ -1,4 +1,4 @@
-"""The functions that generated expressions call: `robosc.expressions.values` in C; a unit gets what it calls."""
+"""The functions that generated expressions call: `robosc.expressions.values` in C. A file has only those it calls."""
 
 from collections.abc import Mapping
 

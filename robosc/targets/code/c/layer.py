@@ -1,4 +1,4 @@
-"""The functions of a supervision layer through which the caller's requests come: their heads, with their words."""
+"""Declarations, with comments, of the functions of a supervision layer that take the caller's requests."""
 
 from robosc.expressions import Type
 from robosc.model.structure import CommunicationKind
@@ -9,7 +9,7 @@ _SENT = "{prefix}_sent_t what"
 
 
 def request_parameters(layout: Layout, identifier: str) -> dict[str, tuple[str, Type]]:
-    """Parameter and type, by C type, of the data that the messages on an identifier are told apart by."""
+    """Parameter and type, by C type, of the data that distinguishes the messages on an identifier."""
     types: dict[str, Type] = {}
     for item in recognized_by_data(layout.model, identifier):
         data = request_data(item)

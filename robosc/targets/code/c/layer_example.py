@@ -1,4 +1,4 @@
-"""The generated `main.c` of a supervision layer: a caller that asks for everything, and a robot that says nothing."""
+"""The generated `main.c` of a supervision layer: a caller that makes every request, and a robot that sends nothing."""
 
 from robosc.model.structure import CommunicationKind
 from robosc.targets.code.c.example import CANCEL, main_text

@@ -1,4 +1,4 @@
-"""The functions of a supervision layer in C: what the caller asks for, and what comes back from the robot."""
+"""The functions of a supervision layer in C: for requests of the caller, and for replies of the robot."""
 
 from robosc.errors import InternalError
 from robosc.expressions.text import expression_text
@@ -34,9 +34,10 @@ def request_functions(unit: Unit) -> list[list[str]]:
 
 
 def _match_function(unit: Unit, item: Communication) -> list[str]:
-    """The function that tells by its condition whether a message is an incoming message of the model.
+    """The function that decides by the condition `when` whether a message is an incoming message of the model.
 
-    Every part that the condition reads is converted first, whether it decides or not: what is unknown is noted.
+    Every part that the condition reads is converted first, even one that does not decide, so that every unknown part
+    is noted.
     """
     layout, data = unit.layout, request_data(item)
     if item.when is None:

@@ -1,4 +1,4 @@
-"""Names of everything of a model in C, and the C types that hold it."""
+"""Names in C for all parts of a model, and their C types."""
 
 from dataclasses import dataclass, field
 
@@ -261,7 +261,7 @@ def recognized_by_data(model: Model, identifier: str) -> tuple[Communication, ..
 
 
 def request_data(item: Communication) -> Type | None:
-    """Type of the data that an incoming message is told apart by, if any."""
+    """Type of the data that an incoming message carries, which `when` reads; None without data."""
     return None if isinstance(item.request, NoneType) else item.request
 
 

@@ -1,4 +1,4 @@
-"""Generated functions that compute the data of a request, and the types that it is handed over in."""
+"""Generated functions that compute the data of a request, and the types of this data."""
 
 from dataclasses import dataclass, field
 

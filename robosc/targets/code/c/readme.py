@@ -1,4 +1,4 @@
-"""The generated README: what there is, how to build it, what it needs."""
+"""The generated README: its files, how to build them, and what they need."""
 
 from robosc.model.structure import CommunicationKind, EventKind
 from robosc.targets.code.c.header import batch, receive_head, reply_head

@@ -1,4 +1,4 @@
-"""The generated C file: tables, the functions of the model, the engine, and the functions through which data comes."""
+"""The generated C file: tables, the functions of the model, the engine, and the functions that take received data."""
 
 from collections.abc import Iterable, Sequence
 from functools import partial

@@ -1,6 +1,6 @@
 """Generated functions that take an event: move and update, all at once.
 
-All updates of a step read the state before it: a copy, of which a compiler keeps what is needed.
+All updates of a step read a copy of the state before it; a compiler keeps only the needed part.
 """
 
 from collections.abc import Sequence

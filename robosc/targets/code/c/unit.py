@@ -1,4 +1,4 @@
-"""Things that all parts of one generated C file share, and the reading of expressions in it."""
+"""Common parts of one generated C file, and the reading of expressions in it."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

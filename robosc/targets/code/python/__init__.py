@@ -1,1 +1,1 @@
-"""Python of a supervisor: its module, which the target `python` and packages in Python hold."""
+"""Python code of a supervisor: its module, for the target `python` and for packages in Python."""

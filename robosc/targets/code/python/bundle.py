@@ -1,4 +1,4 @@
-"""Several modules as the text of one: generated Python is a single file, whatever it runs on."""
+"""Several modules joined to the text of one: generated Python is a single file."""
 
 import ast
 from collections.abc import Iterator, Sequence

@@ -1,9 +1,9 @@
-"""Generated code that follows what changes, so that nothing is asked twice whose answer cannot have changed.
+"""Generated code that tracks changes, so that a condition is evaluated again only if its value may have changed.
 
 Every request and every silent step has a bit, requests first. A bit of `_stale` is set when a step writes another value
-to an attribute that decides whether that event is allowed. Only such events are asked again: a request by
-`enabled_requests`, which then remembers the answer; a silent step by `enabled_silent`, which clears the bit when
-it is not allowed.
+to an attribute that decides whether that event is allowed. Only the conditions of such events are evaluated again: of a
+request by `enabled_requests`, which then remembers the result; of a silent step by `enabled_silent`, which clears the
+bit if the step is not allowed.
 """
 
 from collections.abc import Mapping, Sequence

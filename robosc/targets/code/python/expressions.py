@@ -1,4 +1,4 @@
-"""RoboSC expressions in Python: see `robosc.targets.code.expression_writer`, and for what functions do, `values`.
+"""RoboSC expressions in Python: see `robosc.targets.code.expression_writer`, and `values` for the functions.
 
 Unknown is None, except that an unknown *number* read from received data is NaN: every function of `values` takes NaN as
 unknown, too.

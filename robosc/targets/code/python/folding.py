@@ -1,7 +1,7 @@
-"""Lines of generated Python, broken where they are longer than ament_flake8 allows.
+"""Lines of generated Python, broken if they are longer than ament_flake8 allows.
 
-Statements are broken at brackets and operators, comments at words. What cannot be broken, such as a long name of the
-model, is marked: `# noqa: E501`.
+Statements are broken at brackets and operators, comments between words. A line that cannot be broken, such as one with
+a long name of the model, is marked: `# noqa: E501`.
 """
 
 import ast
@@ -113,7 +113,7 @@ def _read(text: str, lines: Sequence[str]) -> Iterator[tokenize.TokenInfo]:
 
 
 def _broken(line: str, tokens: Sequence[_Token], is_inside: bool) -> Iterator[str]:
-    """A line as several; `is_inside` tells that it stands between brackets."""
+    """A line as several; `is_inside` is true if it stands between brackets."""
     if len(line) <= WIDTH or line.endswith(_MARK):
         yield line
         return

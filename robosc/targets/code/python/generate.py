@@ -246,7 +246,7 @@ def _signature(writer: Writer) -> list[str]:
     attributes = [*writer.layout.locations.values(), *(name for name, _ in writer.layout.variables.values())]
     return [
         "def signature(self):",
-        '    """Return a hashable value that tells states apart."""',
+        '    """Return a hashable value that differs between states."""',
         "    return (",
         *(f"        self.{attribute}," for attribute in attributes),
         "    )",
@@ -290,7 +290,7 @@ def provide(self, communication):
     return self._provide[communication]()
 
 def matches(self, communication, data):
-    """Tell whether a message is an incoming message, by its condition `when`."""
+    """Return whether a message is an incoming message, by its condition `when`."""
     return self._matches[communication](data) if communication in self._matches else MATCHES
 
 def requirements(self, communication):

@@ -21,8 +21,8 @@ As a controller, in a program on asyncio:
     await controller.run()
 
 What `robot` must offer is the protocol `AsyncRobot`: a function that publishes, and coroutines for
-services and actions. Tell `controller.receive(identifier, message)` what the robot sends, and call
-`controller.stop(why)` to end.
+services and actions. Pass each message of the robot to `controller.receive(identifier, message)`,
+and call `controller.stop(why)` to end.
 
 In any other program:
 

@@ -1,7 +1,7 @@
 """Generated methods that read the data of an event and take it: move and update, all at once.
 
-All updates of a step read the state before it. The generated code writes attributes one after the
-other, so whatever is read after it may have been written is first copied to a local variable.
+All updates of a step read the state before it. The generated code writes attributes one after the other, so an
+attribute that is read after it may have been written is first copied to a local variable.
 """
 
 from collections.abc import Iterator, Sequence

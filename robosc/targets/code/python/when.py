@@ -1,4 +1,4 @@
-"""Generated methods that say which incoming message a message is, in a supervision layer (language B.13)."""
+"""Generated methods that decide which incoming message a message is, in a supervision layer (language B.13)."""
 
 from robosc.errors import InternalError
 from robosc.expressions.text import expression_text
@@ -24,7 +24,7 @@ def matches_method(writer: Writer, communication: Communication) -> list[str]:
         reader.read(path)
     name, words = (
         writer.layout.methods["matches", communication.name],
-        f"Tell whether a message is {communication.name}.",
+        f"Return whether a message is {communication.name}.",
     )
     holds = Return(call("Match", reader.scope.truth(condition), *reader.noted))
     body = [*reader.take(), Comment(f"when: {expression_text(condition)}"), holds]

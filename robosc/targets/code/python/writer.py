@@ -1,4 +1,4 @@
-"""Things that all parts of the Python generator share: the names, the scope of expressions, the conditions."""
+"""Common parts of the Python generator: the names, the scope of expressions, the conditions."""
 
 from dataclasses import dataclass, field
 

@@ -68,7 +68,7 @@ private:
     std::deque<Report> waiting_;
 };
 
-/* Tells when a server is lost, asked again and again. */
+/* Presence of a server, asked again and again: it decides when the server is lost. */
 class Presence {
 public:
     bool is_lost(bool is_ready, std::uint64_t now)
@@ -115,11 +115,11 @@ public:
     virtual bool has_time() { return true; }
     /* Return the time by which it should have gone back since this was last asked. */
     virtual std::uint64_t take_jump_us() { return 0; }
-    /* Time, on the steady clock, after which it is to be asked again. */
+    /* Longest time, on the steady clock, until the next watch. */
     virtual std::uint64_t longest_wait_us() const { return WATCH_US; }
 
-    virtual void tell_state(const StateReport& report) = 0;
-    virtual void tell_health(const Health& health) = 0;
+    virtual void publish_state(const StateReport& report) = 0;
+    virtual void publish_health(const Health& health) = 0;
     virtual void info(const std::string& text) = 0;
     virtual void warn(const std::string& text) = 0;
     virtual void error(const std::string& text) = 0;
@@ -190,7 +190,7 @@ public:
         /* What was heard of calls and goals came earlier. */
         advance();
         take_in(take);
-        tell_reasons();
+        report_reasons();
     }
 
     /* Do whatever is due: reports of calls and goals, decisions, time that has passed. */
@@ -210,7 +210,7 @@ public:
         }
         if (now >= next_diagnosis_us_) {
             next_diagnosis_us_ = next_after(next_diagnosis_us_, DIAGNOSTICS_US, now);
-            tell_health();
+            publish_health();
             last_ = robot_.counters;
             last_dropped_ = log_.dropped();
         }
@@ -245,8 +245,8 @@ public:
         begin();
         robot_stop(&robot_, now(), is_fault);
         cancel_abandoned();
-        told_ = reasons_;
-        tell_health();
+        reported_ = reasons_;
+        publish_health();
     }
 
     /* Bring the robot to rest until `start`; what comes meanwhile is held, as before the first one. */
@@ -262,12 +262,12 @@ public:
         return robot_status(&robot_, now()) == ROBOT_STATUS_STOPPING || middleware_.has_abandoned();
     }
 
-    /* Tell the engine what became of calls and goals. */
+    /* Report the results of calls and goals to the engine. */
     void advance()
     {
         for (const Take& report : reports_.take()) {
             take_in(report);
-            tell_reasons();
+            report_reasons();
         }
     }
 
@@ -313,7 +313,7 @@ private:
     void take_in(const Take& take)
     {
         begin();
-        /* A message is data of somebody else: whatever goes wrong with it stops the robot, not the process. */
+        /* A message is foreign data: a failure with it stops the robot, not the process. */
         try {
             take(&robot_, began_us_, notes_);
         } catch (const std::exception& failure) {
@@ -349,8 +349,8 @@ private:
         before_ = robot_.state;
         take_held();
         is_active_ = true;
-        told_status_ = ROBOT_STATUS_NEW;
-        tell_reasons();
+        reported_status_ = ROBOT_STATUS_NEW;
+        report_reasons();
     }
 
     /* Take in what came early: nothing is decided before the last of it, and ages count from when it came. */
@@ -384,9 +384,9 @@ private:
         if (decides) {
             decision_us_ = static_cast<double>(now_us() - began_steady_us_);
         }
-        tell_reasons();
+        report_reasons();
         if (parameters_.publish_state) {
-            guarded("no state", [this] { middleware_.tell_state(state_report()); });
+            guarded("no state", [this] { middleware_.publish_state(state_report()); });
         }
     }
 
@@ -398,21 +398,21 @@ private:
         middleware_.check_servers(now());
         begin();
         robot_watch(&robot_, began_us_);
-        tell_reasons();
+        report_reasons();
     }
 
-    /* Say why the robot is stopped, and when it no longer is; on the console a fault is reported at the end. */
-    void tell_reasons()
+    /* Report why the robot is stopped, and when it no longer is; the console shows a fault only at the end. */
+    void report_reasons()
     {
-        tell_status();
-        if (reasons_ == told_) {
+        report_status();
+        if (reasons_ == reported_) {
             return;
         }
-        told_ = reasons_;
+        reported_ = reasons_;
         if (!reasons_.empty()) {
             cancel_abandoned();
         }
-        tell_health();
+        publish_health();
         if (fault() != nullptr && parameters_.ends_by_fault) {
             return;
         }
@@ -423,11 +423,11 @@ private:
         }
     }
 
-    /* Say what it waits for, and when it no longer does. */
-    void tell_status()
+    /* Log what the robot waits for, and when it begins to run. */
+    void report_status()
     {
         const robot_status_t status = robot_status(&robot_, now());
-        if (status == told_status_) {
+        if (status == reported_status_) {
             return;
         }
         if (status == ROBOT_STATUS_WAITING) {
@@ -440,10 +440,10 @@ private:
                 }
             }
             middleware_.info("waiting for the first message of " + joined(unseen));
-        } else if (status == ROBOT_STATUS_RUNNING && told_status_ <= ROBOT_STATUS_WAITING) {
+        } else if (status == ROBOT_STATUS_RUNNING && reported_status_ <= ROBOT_STATUS_WAITING) {
             middleware_.info("running");
         }
-        told_status_ = status;
+        reported_status_ = status;
     }
 
     /* The engine knows nothing any more of goals that were reported lost, but they may be running. */
@@ -493,9 +493,9 @@ private:
 
     /* Health. */
 
-    void tell_health()
+    void publish_health()
     {
-        guarded("no diagnostics", [this] { middleware_.tell_health(health()); });
+        guarded("no diagnostics", [this] { middleware_.publish_health(health()); });
     }
 
     const char* status_text() const
@@ -751,7 +751,7 @@ private:
     std::uint64_t last_dropped_ = 0;
     std::vector<int> transitions_;
     Reasons reasons_;
-    Reasons told_;
+    Reasons reported_;
     std::string reason_;
     std::string failure_;
     Texts missing_;
@@ -761,7 +761,7 @@ private:
     std::uint64_t start_by_us_ = 0;
     std::uint64_t began_us_ = 0;
     std::uint64_t began_steady_us_ = 0;
-    robot_status_t told_status_ = ROBOT_STATUS_NEW;
+    robot_status_t reported_status_ = ROBOT_STATUS_NEW;
     bool is_active_ = false;
     std::uint64_t period_us_ = 1;
     std::uint64_t next_tick_us_ = 0;

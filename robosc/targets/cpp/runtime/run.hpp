@@ -53,7 +53,7 @@ int run(Controller& controller, const Spin& spin, const IsOver& is_over, const D
             spin(controller.idle_us());
             controller.run_due();
         }
-        /* Once more after a fault: whoever missed the first zero gets this one. */
+        /* After a fault the zero is sent again, for a receiver that missed the first one. */
         controller.stop(controller.fault() != nullptr ? "fault" : signal_name() != nullptr ? signal_name() : "shutdown");
     } catch (const std::exception& failure) {
         controller.stop(failure.what(), true);

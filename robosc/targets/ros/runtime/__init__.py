@@ -1,1 +1,1 @@
-"""Modules that generated ROS packages carry copies of; none of them imports ROS."""
+"""Modules that are copied into generated ROS packages; none of them imports ROS."""

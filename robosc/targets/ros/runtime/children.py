@@ -1,7 +1,7 @@
 """
 A supervision layer and the controller behind it as child processes.
 
-They end together, and with their parent.
+Each ends when the other or their parent ends.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """

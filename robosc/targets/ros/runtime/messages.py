@@ -1,10 +1,10 @@
 """
-Between the model's data and ROS messages.
+Conversion between the model's data and ROS messages.
 
 Every field is checked at start-up, every value before it is sent.
 
-ROS messages check nothing themselves: a number too large is wrapped, a None becomes garbage. So
-each field that is sent gets a conversion of its own, chosen from the message's own list of fields.
+ROS messages do not check their values: a number that is too large is wrapped, and None becomes
+garbage. So each field that is sent gets a conversion of its own, by the message's list of fields.
 
 A *shape* is what the model says about a datum: `boolean`, `integer`, `double` or `string`; a dict
 of shapes by property; a list with the shape of an array's elements; or None for no data.

@@ -1,5 +1,5 @@
 """
-Outcomes of service calls and goals, on their way to the executor; goals that were reported lost.
+Outcomes of service calls and goals for the executor, and goals that were reported lost.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """

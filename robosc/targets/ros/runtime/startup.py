@@ -1,10 +1,10 @@
 """
 Messages that come before the executor starts.
 
-Held, not lost, and taken in before the first decision.
+They are held, and taken in before the first decision.
 
-A node waits for its servers before its executor starts, and an executor ignores what comes before
-that. A stop button that is pressed meanwhile must not be forgotten.
+A node waits for its servers before its executor starts, and an executor ignores earlier messages.
+But a stop button that is pressed meanwhile must not be forgotten.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """

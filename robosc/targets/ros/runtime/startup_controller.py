@@ -1,5 +1,5 @@
 """
-A controller that takes in what came before its start.
+A controller that takes in messages from before its start.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """

@@ -1,10 +1,10 @@
 """
 Goals through actionlib's `ActionClient`: nothing waits, and every end is reported to the executor.
 
-actionlib calls back in the threads of rospy; what it says goes through the inbox to the executor's
-thread, where everything here runs. A server of actionlib says in its status messages what became
-of each goal; there is no answer to a cancel. One that is ignored is noticed by status messages
-that go on without it.
+actionlib calls back in the threads of rospy. Its reports go through the inbox to the executor's
+thread, where everything here runs. A server of actionlib reports the state of each goal in its
+status messages, and does not answer a cancel. If it ignores a cancel, its later status messages
+show this.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -170,7 +170,7 @@ class ActionGoals:
             abandoned.handle.cancel()
 
     def _abandon(self, goal_id: int) -> None:
-        """Tell that a goal is lost; it may be running, or on its way, and it is not forgotten."""
+        """Report a goal as lost, and keep it: it may be running, or on its way to the server."""
         self._abandoned[goal_id] = AbandonedGoal(self._goals[goal_id].handle)
         self._end(goal_id, 'lost')
 

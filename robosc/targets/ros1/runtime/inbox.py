@@ -1,10 +1,10 @@
 """
-Inbox for what the threads of rospy hand to the one thread of the executor.
+Inbox between the threads of rospy and the one thread of the executor.
 
-In order of arrival, and bounded.
+It is bounded, and keeps the order of arrival.
 
-rospy calls back in a thread of its own for each connection. Nothing of the executor runs there: a
-callback puts what is to be done here, and the node's loop takes and does it.
+rospy calls back in a thread of its own for each connection. The executor does not run there: a
+callback puts a function into the inbox, and the node's loop takes and calls it.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """

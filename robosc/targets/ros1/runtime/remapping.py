@@ -1,5 +1,5 @@
 """
-Remapping on ROS 1 for a program that has to call things otherwise.
+Remapping of names on ROS 1, for a program that needs other names.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """

@@ -1,15 +1,14 @@
 """
-Services and actions that the existing controller asks a supervision layer for.
+Services and actions of a supervision layer, which the existing controller requests.
 
-Answers and ends come later.
+Their replies and results come later.
 
-The servers are rospy's and actionlib's, which call in threads of their own; every call and goal
-goes through the inbox to the executor's thread. A call of ROS 1 is a handler that returns its
-reply: it waits there, in its own thread, until the executor's thread has the answer. That one
-waits for nothing.
+The servers are those of rospy and actionlib, which call in threads of their own; every call and
+goal goes through the inbox to the executor's thread. A service call of ROS 1 is a handler that
+returns its reply: it waits in its own thread until the executor's thread has the reply. The
+executor's thread never waits.
 
-Once the layer takes its leave, nobody takes anything out of the inbox any more: what comes then is
-answered at once.
+When the layer ends, the inbox is no longer read: later calls are answered at once.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -183,7 +182,7 @@ class ServedAction:
         self._try_to('rejection', self._forgotten(number).set_rejected)
 
     def feedback(self, number: int, data: Any) -> None:
-        """Tell how far a goal is."""
+        """Publish feedback on a goal."""
         handle = self._goals[number]
         self._try_to('feedback', lambda: handle.publish_feedback(data))
 

@@ -1,10 +1,10 @@
 """
 Service calls in threads of their own.
 
-A call of ROS 1 waits for its reply, and the executor must not.
+A call of ROS 1 waits for its reply, but the executor must not wait.
 
-Each call has a connection and a thread; both end with it. Of calls that never end, only so many
-are kept. What became of a call goes through the inbox to the executor's thread.
+Each call has a connection and a thread, which end with it. The number of calls that never end is
+bounded. The result of a call goes through the inbox to the executor's thread.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """

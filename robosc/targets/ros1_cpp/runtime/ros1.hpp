@@ -275,14 +275,14 @@ inline void take_over_shutdown(const std::shared_ptr<Shared>& shared)
 /* Wait for the master; false if a signal came first. */
 inline bool found_master()
 {
-    bool has_told = false;
+    bool is_reported = false;
     while (!ros::master::check()) {
         if (signal_name() != nullptr) {
             return false;
         }
-        if (!has_told) {
+        if (!is_reported) {
             ROS_WARN("waiting for the master at %s", ros::master::getURI().c_str());
-            has_told = true;
+            is_reported = true;
         }
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
@@ -297,7 +297,7 @@ inline bool found_master()
     std::_Exit(status);
 }
 
-/* End roscpp; a call that nobody answers is not waited for. */
+/* End roscpp, without waiting for unanswered calls. */
 inline void end_ros(const Shared& shared, int status)
 {
     ros::shutdown();

@@ -145,7 +145,7 @@ private:
         return found;
     }
 
-    /* Tell that a goal is lost; it may be running, or on its way, and it is not forgotten. */
+    /* Report a goal as lost, and keep it: it may be running, or on its way to the server. */
     void abandon(std::uint32_t id)
     {
         abandoned_.emplace(id, goals_.at(id).handle);

@@ -66,7 +66,7 @@ private:
         return ended_.wait_for(lock, MASTER_PERIOD, [this] { return is_over_; });
     }
 
-    /* One that was started anew knows nobody. roscpp's own call would wait for a master that hangs. */
+    /* A restarted master does not know the node. roscpp's own call would wait for a master that hangs. */
     bool is_known() const
     {
         XmlRpc::XmlRpcValue request;

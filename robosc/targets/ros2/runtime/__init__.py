@@ -1,5 +1,5 @@
 """
-Modules that generated ROS 2 packages carry copies of, beside those of all ROS packages.
+Modules that are copied into generated ROS 2 packages, in addition to those of all ROS packages.
 
 None of them imports ROS.
 """

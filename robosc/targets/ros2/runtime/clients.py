@@ -1,12 +1,12 @@
 """
 Service calls and goals through clients of ROS 2.
 
-Nothing waits, and every end is reported to the executor.
+No call waits, and every end is reported to the executor.
 
-The clients are handed in; what they must do is what rclpy's `Client` and `ActionClient` do.
-Everything runs in the node's one thread. What comes back is kept in `Reports` until the node's
-loop hands it on: the executor must not be called from within itself, as it would be where a server
-is missing at the moment of a request.
+The clients are parameters with the interface of rclpy's `Client` and `ActionClient`. Everything
+runs in the node's one thread. Replies are kept in `Reports` until the node's loop passes them on,
+because the executor must not be called from within itself. This would happen if a server is
+missing at the moment of a request.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -205,7 +205,7 @@ class ActionGoals:
             self._cancel_abandoned(goal_id)
 
     def _abandon(self, goal_id: int) -> None:
-        """Tell that a goal is lost; an accepted one may be running, and is not forgotten."""
+        """Report a goal as lost, and keep it if it was accepted: it may still be running."""
         handle = self._goals[goal_id].handle
         if handle is not None:
             self._abandoned[goal_id] = AbandonedGoal(handle)

@@ -1,10 +1,10 @@
 """
-Test for all-default messages, whatever the fields of a message are.
+Test whether all fields of a message have their defaults.
 
-Its header does not count (semantics 3.6).
+The header does not count (semantics 3.6).
 
-Messages are compared field by field: rclpy's own comparison of fixed-size arrays is not to be
-relied on.
+Messages are compared field by field, because rclpy's own comparison of fixed-size arrays is not
+reliable.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """

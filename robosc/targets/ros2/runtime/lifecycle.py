@@ -1,5 +1,5 @@
 """
-The check of the parameter that says who starts a node: it itself, or whoever manages it.
+Check of the parameter that says who starts a node: the node itself, or its lifecycle manager.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """

@@ -1,5 +1,5 @@
 """
-Simulated time as the executor's clock: it stands while the simulation does, and never goes back.
+Simulated time as the executor's clock: it stops with the simulation, and never goes back.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """

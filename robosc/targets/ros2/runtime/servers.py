@@ -1,15 +1,14 @@
 """
-Services and actions that the existing controller asks a supervision layer for.
+Services and actions of a supervision layer, which the existing controller requests.
 
-Answers and ends come later.
+Their replies and results come later.
 
-The servers are handed in; what they must do is what rclpy's `Service`, `ActionServer` and
-`ServerGoalHandle` do. Everything runs in the node's one thread, and nothing in it waits: a
-coroutine that awaits an answer would be resumed by rclpy's executor again and again, without a
-pause, until the answer is there.
+The servers are parameters with the interface of rclpy's `Service`, `ActionServer` and
+`ServerGoalHandle`. Everything runs in the node's one thread, and nothing there waits: rclpy's
+executor would resume a waiting coroutine again and again, without a pause, until the reply comes.
 
-A caller that is gone, so that it cannot be notified, is worth a warning and no fault: the
-robot is not to stop for it.
+A caller that is gone cannot be notified. This is a warning and no fault, because the robot must
+not stop for it.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """
@@ -213,7 +212,7 @@ class ServedAction:
         self._goals[number] = _Goal()
 
     def feedback(self, number: int, data: Any) -> None:
-        """Tell how far a goal is."""
+        """Publish feedback on a goal."""
         goal = self._goals.get(number)
         if goal is None or goal.handle is None:
             return

@@ -1,5 +1,5 @@
 """
-The parameter that says in which form a node publishes its state.
+Parameter for the form in which a node publishes its state.
 
 A copy of this module stands in generated packages, which run on Python 3.8 and later.
 """

@@ -148,8 +148,8 @@ public:
     using MakeHost = std::function<std::unique_ptr<Host>(
         rclcpp_lifecycle::LifecycleNode&, const rclcpp::CallbackGroup::SharedPtr&, const Parameters&)>;
 
-    /* `make` makes what the node does; `about` says in a line what it is; `is_program` tells that a fault ends the process unless others manage the node.
-       Throws ParameterError where the node starts itself and cannot. */
+    /* `make` makes the host; `about` describes the node in one line; `is_program` is true if a fault ends the process,
+       unless others manage the node. Throws ParameterError if the node starts itself and a parameter is wrong. */
     ManagedNode(const rclcpp::NodeOptions& options, const std::vector<Declaration>& declarations, MakeHost make,
         const char* about, bool is_program)
         : LifecycleNode(model::PACKAGE, options)

@@ -33,7 +33,7 @@ static void end_for_caller(robot_t *r, int action, robot_end_t end, const void *
 }
 #endif
 
-/* Tell the caller what has failed, or has turned against its requirements; the oldest first. */
+/* Report to the caller the calls and goals that failed or violate a requirement; the oldest first. */
 static void finish(robot_t *r)
 {
 #if ROBOT_SERVICE_COUNT > 0

@@ -38,7 +38,7 @@ static int take_request(robot_t *r, int request)
 }
 
 #if ROBOT_WHEN_COUNT > 0
-/* Judge whether a message may be told apart by its data, although something in it is unknown. */
+/* Decide whether the condition of a message may be evaluated although some of its data is unknown. */
 static int judge_notes(robot_t *r, robot_event_t event, const notes_t *notes)
 {
     if (notes->is_unknown) {

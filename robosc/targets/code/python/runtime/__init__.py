@@ -1,1 +1,1 @@
-"""Modules that generated packages carry copies of, beside those of `robosc.execution.runtime`."""
+"""Modules that are copied into generated packages, beside those of `robosc.execution.runtime`."""

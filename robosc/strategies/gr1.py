@@ -3,9 +3,14 @@
 The winning positions are three nested fixed points: the greatest set from which each goal in turn can be reached and
 left again, by a least set that grows towards the goal, by greatest sets in which some assumption fails for ever.
 
+All three only shrink from one round of the outermost to the next: each greatest set begins from what it was in the
+round before, and within what may still win.
+
 Sources: N. Piterman, A. Pnueli and Y. Sa'ar, "Synthesis of reactive(1) designs", VMCAI 2006, LNCS 3855, pp. 364-380;
 R. Bloem, B. Jobstmann, N. Piterman, A. Pnueli and Y. Sa'ar, "Synthesis of reactive(1) designs", Journal of Computer
-and System Sciences 78(3), 2012, pp. 911-938.
+and System Sciences 78(3), 2012, pp. 911-938; A. Browne, E. M. Clarke, S. Jha, D. E. Long and W. Marrero, "An improved
+algorithm for the evaluation of fixpoint expressions", Theoretical Computer Science 178(1-2), 1997, pp. 237-255
+(beginning from earlier results).
 """
 
 from collections.abc import Callable, Sequence
@@ -88,7 +93,8 @@ def solve(
     while unchanged < len(goals):
         check_stop()
         reached = goals[number] & arena.turn(winning)
-        approaches[number] = tuple(_approach(arena, reached, failing, false, check_stop))
+        search = _Search(arena, failing, winning, false, check_stop)
+        approaches[number] = tuple(search.approach(reached, approaches[number]))
         found = approaches[number][-1].positions if approaches[number] else false
         unchanged = unchanged + 1 if found == winning else 0
         winning = found
@@ -99,38 +105,70 @@ def solve(
     return Solution(winning, tuple(approaches), rounds)
 
 
-def _approach(
-    arena: Arena, reached: Any, failing: Sequence[Any], false: Any, check_stop: Callable[[], object]
-) -> list[Approach]:
-    """Return the steps towards a goal; the positions of the last one are all from which it is approached.
+@dataclass(frozen=True, slots=True)
+class _Search:
+    """Search for the positions from which a goal is approached.
 
-    Args:
+    Attributes:
         arena: The game.
-        reached: Positions in which the goal is true, and the controller's turn leads to where it goes on winning.
         failing: For each assumption, the positions in which it is not true.
+        winning: Positions outside of which no position is looked for.
         false: The predicate that is true nowhere.
         check_stop: Function called before each step.
     """
-    found: list[Approach] = []
-    nearer = false
-    while True:
-        progress = reached | arena.turn(nearer)
-        waiting = tuple(_waiting(arena, progress, item, check_stop) for item in failing)
-        positions = nearer
-        for item in waiting:
-            positions = positions | item
-        if positions == nearer:
-            return found
-        found.append(Approach(positions, nearer, waiting))
-        nearer = positions
 
+    arena: Arena
+    failing: Sequence[Any]
+    winning: Any
+    false: Any
+    check_stop: Callable[[], object]
 
-def _waiting(arena: Arena, progress: Any, failing: Any, check_stop: Callable[[], object]) -> Any:
-    """Return the largest set in which each turn makes progress, or stays in the set while an assumption fails."""
-    staying = arena.positions
-    while True:
-        check_stop()
-        narrowed = staying & arena.surroundings(staying) & (progress | (failing & arena.turn(staying)))
-        if narrowed == staying:
-            return staying
-        staying = narrowed
+    def approach(self, reached: Any, before: Sequence[Approach]) -> list[Approach]:
+        """Return the steps towards a goal; the positions of the last one are all from which it is approached.
+
+        Args:
+            reached: Positions in which the goal is true, and the controller's turn leads to where it goes on winning.
+            before: Steps found while more positions counted as winning; or none.
+        """
+        found: list[Approach] = []
+        nearer, last = self.false, None
+        while True:
+            progress = reached | self.arena.turn(nearer)
+            # All of a step follows from where it makes progress.
+            if progress == last:
+                return found
+            bounds = (
+                [item & self.winning for item in before[len(found)].waiting]
+                if len(found) < len(before)
+                else [self.winning] * len(self.failing)
+            )
+            waiting = tuple(
+                self._waiting(progress, item, bound) for item, bound in zip(self.failing, bounds, strict=True)
+            )
+            positions = nearer
+            for item in waiting:
+                positions = positions | item
+            if positions == nearer:
+                return found
+            found.append(Approach(positions, nearer, waiting))
+            nearer, last = positions, progress
+
+    def _waiting(self, progress: Any, failing: Any, bound: Any) -> Any:
+        """Return the largest set in which each turn makes progress, or stays in the set while an assumption fails.
+
+        Args:
+            progress: Positions in which the turn can make progress.
+            failing: Positions in which the assumption is not true.
+            bound: Positions that the set is part of.
+        """
+        staying = bound
+        while True:
+            self.check_stop()
+            narrowed = staying & self.arena.surroundings(staying)
+            # An assumption that never fails is nothing to stay for.
+            narrowed = narrowed & (
+                progress if failing == self.false else progress | (failing & self.arena.turn(staying))
+            )
+            if narrowed == staying:
+                return staying
+            staying = narrowed

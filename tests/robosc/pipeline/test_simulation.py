@@ -7,6 +7,8 @@ import pytest
 
 import robosc
 from robosc.automata import to_automata
+from robosc.automata.state import subjects
+from robosc.controller_properties import StrategyRun
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.expressions import (
     ArrayType,
@@ -21,6 +23,7 @@ from robosc.expressions import (
 from robosc.model.structure import EventKind, Model, is_tau
 from support.effort import seeds
 from support.models import EXAMPLES
+from support.random_goals import strategic_controller
 from support.random_supervisors import random_data, random_supervisor
 
 STEPS = 40
@@ -245,3 +248,58 @@ def _navigation() -> robosc.Supervisor:
     made = robosc.synthesize(EXAMPLES / "navigation" / "navigation.rscd").supervisor
     assert made is not None
     return made
+
+
+@pytest.mark.random
+@pytest.mark.parametrize("seed", seeds(40))
+def test_what_the_strategy_chooses_in_a_random_run_is_what_its_check_says(seed: int) -> None:
+    core = next(found for number in range(seed * 100, seed * 100 + 400) if (found := strategic_controller(number)))
+    dice, run, met = Random(f"strategy {seed}"), robosc.simulate(core), 0
+    assert core.strategy is not None and run.has_strategy
+    twin = StrategyRun(core.executable, core.strategy)
+    system = core.executable.executed_automata
+    # Messages have one location, which the interpreter does not keep.
+    places = [
+        ((item.automaton, item.variable), system.automaton(item.automaton).locations[0]) for item in subjects(system)
+    ]
+    memory, mode, kept = twin.memory, 0, [(run.reached, run.chosen)]
+    for number in range(30):
+        state: tuple[Any, ...] = tuple(run._system._state.get(place, only) for place, only in places)
+        if run._system.is_stable():
+            memory = twin.observed(state, memory)
+            chosen, mode = twin.decided(state, memory, mode)
+            assert (run.chosen, run.reached) == (chosen, twin.goals(state, memory))
+            met += 1
+        else:
+            assert run.chosen is None
+        kept[number:] = [(run.reached, run.chosen)]
+        taken = run.walk(1, dice.randrange(1000), strategy=dice.random() < 0.5)
+        if not taken:
+            break
+        # Taken back and again, the memory of goals comes along.
+        run.undo()
+        assert (run.reached, run.chosen) == kept[number]
+        run.redo()
+    assert met
+    while run.undo():
+        assert (run.reached, run.chosen) == kept[len(run)]
+    run.restart()
+    assert (run.reached, run.chosen) == kept[0]
+
+
+def test_a_walk_that_follows_the_strategy_requests_what_it_chooses_alone() -> None:
+    core = next(found for number in range(700) if (found := strategic_controller(number)))
+    run = robosc.simulate(core)
+    for _ in range(60):
+        chosen, stable = run.chosen, run._system.is_stable()
+        for step in run.walk(1, len(run), strategy=True):
+            if stable and step.is_controllable:
+                assert step.event == chosen
+
+
+def test_a_strategy_that_is_not_there_is_not_followed(run: robosc.Run) -> None:
+    assert (run.has_strategy, run.chosen, run.reached) == (False, None, ())
+    for walk in (run.walk, run.walk_until_finding):
+        with pytest.raises(robosc.NoStrategyError, match="the supervisor of R has no strategy"):
+            walk(3, strategy=True)
+    assert len(run) == 0

@@ -22,6 +22,7 @@ from robosc.expressions import (
 )
 from robosc.model.structure import EventKind, Model, is_tau
 from support.effort import seeds
+from support.lift import LIFT
 from support.models import EXAMPLES
 from support.random_goals import strategic_controller
 from support.random_supervisors import random_data, random_supervisor
@@ -288,13 +289,20 @@ def test_what_the_strategy_chooses_in_a_random_run_is_what_its_check_says(seed: 
 
 
 def test_a_walk_that_follows_the_strategy_requests_what_it_chooses_alone() -> None:
-    core = next(found for number in range(700) if (found := strategic_controller(number)))
-    run = robosc.simulate(core)
-    for _ in range(60):
-        chosen, stable = run.chosen, run._system.is_stable()
-        for step in run.walk(1, len(run), strategy=True):
-            if stable and step.is_controllable:
-                assert step.event == chosen
+    # Nothing is in the way of waving, and no goal needs it.
+    waving = LIFT.replace(
+        "    component Base {\n", "    component Base {\n        incoming message wave with type: none\n"
+    )
+    run = robosc.simulate(robosc.synthesize(robosc.load(text=waving)).supervisor)  # type: ignore[arg-type]  # it is there
+    assert set(run.enabled) == {"call.request", "wave.request"}
+    run.walk(40, 1, strategy=True)
+    assert [step.event for step in run.history if step.is_controllable] == ["call.request", "enter.request"]
+    assert len(run) == 40 and "wave.request" in run.enabled
+    run.restart()
+    assert run.walk_until_finding(40, 1, {robosc.WalkFindingKind.BLOCKED}, strategy=True) is None
+    assert "wave.request" not in {step.event for step in run.history}
+    run.walk(40, 1)
+    assert "wave.request" in {step.event for step in run.history}
 
 
 def test_a_strategy_that_is_not_there_is_not_followed(run: robosc.Run) -> None:
@@ -303,3 +311,19 @@ def test_a_strategy_that_is_not_there_is_not_followed(run: robosc.Run) -> None:
         with pytest.raises(robosc.NoStrategyError, match="the supervisor of R has no strategy"):
             walk(3, strategy=True)
     assert len(run) == 0
+
+
+def test_what_was_taken_back_is_not_remembered_of_goals() -> None:
+    run = robosc.simulate(robosc.synthesize(robosc.load(text=LIFT)).supervisor)  # type: ignore[arg-type]  # there is one
+    for event in ("call", "arrived", "enter"):
+        run.step(run.event_called(event))
+    assert (run.history[-1].reached, run.reached, run.chosen) == ((1,), (True,), None)
+    run.undo()
+    # What comes instead finds the goal as it was before.
+    assert run.step("arrived.response").chosen == "enter.request"
+    assert run.reached == (False,)
+    run.undo()
+    assert run.step("enter.request").reached == (1,)
+    run.restart()
+    assert run.step("arrived.response").chosen == "call.request"
+    assert run.reached == (False,)

@@ -24,7 +24,7 @@ class Place:
     """A truth value that is remembered.
 
     Attributes:
-        name: Its name, unique in the memory.
+        name: Its name, unique in the memory: words that say that it is true, with `is` or `was` in them.
         update: Its value after a stable state, as a condition over that state and the memory before.
     """
 
@@ -57,18 +57,20 @@ def judgement(item: Goal | Assumption, name: str) -> Judgement:
 
     Args:
         item: The goal or assumption.
-        name: Name of the place of the memory, should it need one.
+        name: Its name, such as `goal 1`.
     """
     condition = holds(item.condition)
     if item.form is GoalForm.ALWAYS_EVENTUALLY:
         return Judgement(condition)
-    read = VariableRead(MEMORY, name)
     if item.form is GoalForm.ONCE:
-        place = Place(name, Binary("or", read, condition))
+        name = f"{name} was reached"
+        place = Place(name, Binary("or", VariableRead(MEMORY, name), condition))
         return Judgement(place.read, place)
+    name = f"{name} is owed"
     trigger = TRUE if item.trigger is None else holds(item.trigger)
-    waiting = Binary("and", Binary("or", read, trigger), Unary("not", condition))
-    return Judgement(Unary("not", read), Place(name, waiting))
+    waiting = Binary("and", Binary("or", VariableRead(MEMORY, name), trigger), Unary("not", condition))
+    place = Place(name, waiting)
+    return Judgement(Unary("not", place.read), place)
 
 
 def holds(condition: Expression) -> Expression:
@@ -114,7 +116,7 @@ def own_cancels(executable: "ExecutableSystem") -> Iterator[Cancel]:
         running = StateTest(event.moves.plant, location)
         conditions = tuple(holds(item.condition) for item in requirements)
         places = tuple(
-            _held(f"{event.communication.name} requirement {number}", running, condition)
+            _held(f"requirement {number} of {event.communication.name} was met", running, condition)
             for number, condition in enumerate(conditions, start=1)
         )
         yield Cancel(event.name, running, places, conditions)

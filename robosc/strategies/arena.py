@@ -38,6 +38,7 @@ class ControllerArena:
 
     Attributes:
         positions: Stable states that the controlled system can reach, with any memory.
+        observed: Those whose memory can be that of the controller at its turn: to observe them again changes nothing.
     """
 
     def __init__(
@@ -68,6 +69,10 @@ class ControllerArena:
         reachable = self._reachable()
         self._silent = tuple(self._silent_steps(executable, cancels, encoder, reachable))
         self.positions = reachable & ~encoding.any_of(first for first, _ in self._silent)
+        self.observed = self.positions
+        for place in places:
+            before, after = encoder.holds(place.read), encoder.holds(place.update)
+            self.observed = self.observed & ((before & after) | (~before & ~after))
         self._batches = tuple(
             tuple(self._steps[event] for event in batch if self._steps[event].plant & reachable != self._manager.false)
             for batch in executable.batches

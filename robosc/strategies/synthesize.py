@@ -193,10 +193,10 @@ class StrategySynthesis:
                 if found != self._manager.false:
                     chosen[event] = chosen.get(event, self._manager.false) | found
                     decided = decided | found
-        care = solution.winning & ~self.goals[number]
+        care = solution.winning & self.arena.observed & ~self.goals[number]
         choices: list[Choice] = []
         for event in self.arena.requests:
-            if event in chosen:
+            if event in chosen and chosen[event] & care != self._manager.false:
                 condition = simplifier.condition(chosen[event], care)
                 if condition is None:
                     condition = extract(self._encoding, self._manager.true)

@@ -177,8 +177,9 @@ class Supervisor(msgspec.Struct, frozen=True, dict=True, omit_defaults=True):
         return next((item.condition for item in self.added if item.event == event), None)
 
     def __repr__(self) -> str:
-        certificate = self.certificate
+        certificate, modes = self.certificate, () if self.strategy is None else self.strategy.modes
+        strategy = f", a strategy for {len(modes)} goal{'s' if len(modes) != 1 else ''}" if modes else ""
         return (
             f"<supervisor of {self.model.name}: {self.deployment}, {certificate.states} states, "
-            f"conditions added to {len(self.added)} event{'s' if len(self.added) != 1 else ''}>"
+            f"conditions added to {len(self.added)} event{'s' if len(self.added) != 1 else ''}{strategy}>"
         )

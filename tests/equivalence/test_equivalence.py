@@ -127,7 +127,7 @@ def test_random_robots_in_c(tmp_path_factory: pytest.TempPathFactory, seed: int)
 
 def _strategic(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
     """Yield random robots whose strategies choose requests, with a run of each under its strategy."""
-    for seed in range(first, first + 500):
+    for seed in range(first, first + 1_500):
         supervisor = strategic_controller(seed)
         if supervisor is not None and supervisor.strategy and any(supervisor.strategy.modes):
             yield supervisor, random_scenario(supervisor, seed, 80)
@@ -145,7 +145,7 @@ def test_strategies_in_python() -> None:
 @needs_gcc
 def test_strategies_in_c(tmp_path: Path) -> None:
     requests = 0
-    for number, (supervisor, scenario) in enumerate(islice(_strategic(500), 6)):
+    for number, (supervisor, scenario) in enumerate(islice(_strategic(1_500), 6)):
         expected = observe(supervisor, scenario)
         # Some with sanitizers, which take the compiler three times as long.
         options = () if number % 4 == 0 else ("-O0",)

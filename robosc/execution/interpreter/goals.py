@@ -1,6 +1,6 @@
 """Goals and assumptions, as an executor keeps account of them, and the strategy that reaches them."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Protocol
 
 from robosc.execution.interpreter.functions import Function, Place, State, diagram_function, function_of, holds
@@ -23,11 +23,14 @@ class _Item:
 
     Args:
         item: As it is written.
+        subject: Its name, such as `goal 1`.
+
+    Attributes:
         name: Name by which strategies know what is kept of it.
     """
 
-    def __init__(self, item: Goal | Assumption, name: str) -> None:
-        self.name = name
+    def __init__(self, item: Goal | Assumption, subject: str) -> None:
+        self.name = f"{subject} {'was reached' if item.form is GoalForm.ONCE else 'is owed'}"
         self._form = item.form
         self._condition = function_of(item.condition)
         self._trigger = None if item.trigger is None else function_of(item.trigger)
@@ -59,6 +62,10 @@ class _Held:
     def after(self, before: bool, state: State) -> bool:
         return state[self._plant, None] == "executing" and (before or holds(self._condition, state))
 
+    def has_fallen(self, kept: bool, state: State) -> bool:
+        """Return True if it held in a stable state and does not hold any more, while its goal runs."""
+        return kept and state[self._plant, None] == "executing" and not holds(self._condition, state)
+
 
 class GoalsOfSystem:
     """Account of the goals of one system.
@@ -74,13 +81,18 @@ class GoalsOfSystem:
         self, model: Model, strategy: Strategy, requests: Sequence[str], domains: dict[Place, Sequence[Value]]
     ) -> None:
         self._kept: dict[str, _Kept] = {}
+        # Requirements of actions, each with the cancel that its fall brings about and its name in the memory.
+        self._held: list[tuple[str, str, _Held]] = []
         for communication in model.communications:
             if communication.kind is CommunicationKind.ACTION:
                 for number, item in enumerate(model.requirements_on(communication.name), start=1):
                     held = _Held(f"action {communication.name}", function_of(item.condition))
-                    self._kept[f"{communication.name} requirement {number}"] = held
+                    name = f"requirement {number} of {communication.name} was met"
+                    self._held.append((f"{communication.name}.cancel", name, held))
+                    self._kept[name] = held
         for number, assumption in enumerate(model.assumptions, start=1):
-            self._kept[f"assumption {number}"] = _Item(assumption, f"assumption {number}")
+            owed = _Item(assumption, f"assumption {number}")
+            self._kept[owed.name] = owed
         self._goals = [_Item(goal, f"goal {number}") for number, goal in enumerate(model.goals, start=1)]
         self._kept |= {item.name: item for item in self._goals}
         places: dict[Place, Sequence[Value]] = dict(domains)
@@ -99,6 +111,16 @@ class GoalsOfSystem:
     def observe(self, state: State) -> None:
         """Take in a stable state."""
         self._memory = {name: kept.after(self._memory[name], state) for name, kept in self._kept.items()}
+
+    def due_cancels(self, state: State) -> Iterator[str]:
+        """Yield the cancels that an executor would issue by itself now, if they are allowed."""
+        for event, name, held in self._held:
+            if held.has_fallen(self._memory[name], state):
+                yield event
+
+    def are_true(self, state: State) -> tuple[bool, ...]:
+        """Return for each goal True if it counts as come true in a stable state that was taken in."""
+        return tuple(goal.is_true(self._memory[goal.name], state) for goal in self._goals)
 
     def choose(self, state: State) -> int | None:
         """Return the number of the request that the strategy chooses in a stable state, None to wait."""

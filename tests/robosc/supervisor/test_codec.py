@@ -14,7 +14,7 @@ from robosc.certification import make_supervisor
 from robosc.errors import InvalidSupervisorError, UnsupportedModelError
 from robosc.expressions import TRUE, Binary, Constant, StateTest, Unary, VariableRead
 from robosc.model.structure import Assumption, Deployment, Goal, GoalForm, Requirement, RequirementForm
-from robosc.supervisor import Supervisor
+from robosc.supervisor import Strategy, Supervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES, MAXIMUM_EXPRESSION_DEPTH, decode, encode
 from support.damaged_json import change_value
 from support.effort import examples
@@ -54,7 +54,10 @@ def with_goals() -> Supervisor:
     )
     assumptions = (Assumption(GoalForm.ALWAYS_EVENTUALLY, few), Assumption(GoalForm.LEADS_TO, idle, few, True))
     return msgspec.structs.replace(
-        made, model=msgspec.structs.replace(made.model, goals=goals, assumptions=assumptions)
+        made,
+        model=msgspec.structs.replace(made.model, goals=goals, assumptions=assumptions),
+        certificate=msgspec.structs.replace(made.certificate, goals="not checked"),
+        strategy=Strategy(((),) * len(goals)),
     )
 
 

@@ -338,7 +338,7 @@ def _state(layout: Layout) -> list[str]:
             body.append(f"uint8_t {layout.locations[communication_plant_name(item)]}; /* {item.kind} {item.name} */")
     if layout.supervisor.strategy is not None:
         places = layout.executable.obligations.places
-        body += [f"bool {layout.variables[MEMORY, place.name][0]}; /* memory of {place.name} */" for place in places]
+        body += [f"bool {layout.variables[MEMORY, place.name][0]}; /* {place.name} */" for place in places]
         goals = len(layout.supervisor.strategy.modes)
         body.append(f"{width(goals)} {layout.mode}; /* goal that is approached, of {goals} */")
     return [

@@ -236,7 +236,7 @@ def _name_state(layout: Layout) -> None:
                 layout.location_names[plant, location] = name(f"{layout.upper}_AT_{item.name}_{location}")
     if layout.supervisor.strategy is not None:
         for place in layout.executable.obligations.places:
-            member = members.name(f"kept_{place.name.replace(' ', '_')}")
+            member = members.name(place.name.replace(" ", "_"))
             layout.variables[MEMORY, place.name] = (member, BooleanType())
         layout.mode = members.name("mode")
 

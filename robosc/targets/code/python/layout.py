@@ -85,7 +85,7 @@ def make_layout(supervisor: Supervisor) -> Layout:
 
 def _memory_names(supervisor: Supervisor, members: PythonNamer) -> dict[str, str]:
     places = () if supervisor.strategy is None else supervisor.executable.obligations.places
-    return {place.name: members.name(f"kept_{place.name.replace(' ', '_')}") for place in places}
+    return {place.name: members.name(place.name.replace(" ", "_")) for place in places}
 
 
 def _method_names(supervisor: Supervisor, members: PythonNamer) -> dict[tuple[str, str], str]:

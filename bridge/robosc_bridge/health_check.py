@@ -10,6 +10,7 @@ from robosc_api.health import Condition, ask_alive, ask_health, local_address
 from robosc_api.security import SecurityError
 from robosc_bridge.configuration import ConfigurationError, load
 from robosc_bridge.configuration.structure import Remote
+from robosc_bridge.terminal.commands import run_alone
 
 NAME = "health"
 """Name of the command."""
@@ -36,11 +37,7 @@ def add_command(commands: Any) -> None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run this command alone; returns the exit status."""
-    parser = argparse.ArgumentParser(prog="robosc-bridge", description=__doc__)
-    add_command(parser.add_subparsers(required=True, metavar="COMMAND"))
-    arguments = parser.parse_args(argv)
-    status: int = arguments.run(arguments)
-    return status
+    return run_alone(add_command, __doc__, argv)
 
 
 def _run(arguments: argparse.Namespace) -> int:

@@ -105,6 +105,7 @@ class RunningBridge:
         raise not_replayed()
 
 
+# Apart from `robosc_bridge.remote.loop_call`: calls wait until the page looks again, and not until the loop has a turn.
 class _Caller:
     """Lets another thread wake the event loop, once however often it calls."""
 

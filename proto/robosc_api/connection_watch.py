@@ -7,8 +7,12 @@ and no requests. The kernel counts the bytes of each connection (`tcpi_bytes_rec
 the handlers know which connections requests come from. A connection beyond that is ended by `shutdown`, upon which gRPC
 frees what it held.
 
+Calls of admitted callers that end without a request, because gRPC refuses one that is too large or because a quota is
+used up, bring bytes as well. They differ from calls that are reset in that they are answered: the bytes that a
+connection has been sent (`tcpi_bytes_acked`) show how many of them were.
+
 `Ledger` decides, without sockets and time; `ConnectionWatch` counts, in a thread of its own, and closes. Calls pay for
-one entry in a set. Without the kernel's counts (outside of Linux), connections are only kept by gRPC's own limits.
+two entries in tables. Without the kernel's counts (outside of Linux), connections are only kept by gRPC's own limits.
 """
 
 import contextlib
@@ -23,11 +27,11 @@ import sys
 import threading
 import time
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections.abc import AsyncIterator, Callable, Iterator, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from types import TracebackType
-from typing import Any, Self
+from typing import Any, NamedTuple, Self
 from urllib.parse import unquote
 
 from robosc_api.layers import Layer, behaviour_of, with_behaviour
@@ -39,9 +43,15 @@ _MEMORY = Path("/proc/self/statm")
 _HEALTH = "/grpc.health."
 
 _TCP_INFO = getattr(socket, "TCP_INFO", None)
-_BYTES_RECEIVED = struct.Struct("=Q")
-_BYTES_RECEIVED_AT = 128
-"""Offset of `tcpi_bytes_received` in `struct tcp_info` of the kernel (since Linux 4.1)."""
+_BYTE_COUNTS = struct.Struct("=QQ")
+_BYTE_COUNTS_AT = 120
+"""Offset of `tcpi_bytes_acked` and `tcpi_bytes_received` in `struct tcp_info` of the kernel (since Linux 4.1)."""
+
+_ANSWER_BYTES = 50
+"""Fewer bytes than any answer to a call takes: its status, in a frame of headers; one without a message takes 85."""
+
+_REFUSED_BYTES = 96 * 2**10
+"""Bytes that a call may bring whose request is refused: a window of HTTP/2, and headers."""
 
 LOOK_S = 0.05
 """Shortest time between two looks, in seconds."""
@@ -52,8 +62,8 @@ ALERT_LOOK_S = 0.01
 _TRIM_S = 1.0
 """Time between two returns of freed memory to the system, in seconds: the allocator keeps what a flood has taken."""
 
-_SHARE = 0.02
-"""Share of a core that looking may take; more connections are looked at less often, unless memory grows."""
+SHARE = 0.02
+"""Share of a core that looking takes at most; more connections are looked at less often, unless memory grows."""
 
 _GROWTH_BYTES = 16 * 2**20
 """Growth of this process's memory that causes a look at once."""
@@ -67,6 +77,18 @@ type Peer = tuple[str, int]
 """Address and port of the other end of a connection."""
 
 
+class Traffic(NamedTuple):
+    """Bytes that a connection has received and sent since it was made.
+
+    Attributes:
+        received: Bytes that the other end has sent.
+        acknowledged: Bytes of this end that have arrived there.
+    """
+
+    received: int
+    acknowledged: int = 0
+
+
 @dataclass(frozen=True, slots=True, kw_only=True)
 class ConnectionLimits:
     """Limits on what a connection may cost.
@@ -76,6 +98,7 @@ class ConnectionLimits:
         request_bytes: Bytes that one request may have, with its headers.
         unasked_bytes: Bytes that all connections together may have received since their last requests.
         slack_bytes: Bytes that a connection may receive besides requests.
+        resets: Calls since its last request that a connection may end before they have a request or an answer.
         slack_bytes_a_s: Rate at which received bytes are forgotten: pings of a long watch are no flood.
         first_request_s: Time for the first request of a connection, in seconds.
         suspicion_s: Time for which a flood makes other connections of its host suspect, in seconds: those without a
@@ -86,9 +109,25 @@ class ConnectionLimits:
     request_bytes: int = 4 * 2**20
     unasked_bytes: int = 96 * 2**20
     slack_bytes: int = 256 * 2**10
+    resets: int = 2000
     slack_bytes_a_s: float = 4096.0
     first_request_s: float = 30.0
     suspicion_s: float = 60.0
+
+
+@dataclass(frozen=True, slots=True)
+class CallsSince[P]:
+    """Calls of admitted callers since the last look, by connection.
+
+    Attributes:
+        asked: Connections on which requests have arrived.
+        ended: Number of calls that have ended, or were refused.
+        open: Number of open calls.
+    """
+
+    asked: frozenset[P] = frozenset()
+    ended: Mapping[P, int] = field(default_factory=dict)
+    open: Mapping[P, int] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -100,12 +139,34 @@ class _Account:
         explained: Bytes that its requests and the passing of time explain.
         asked_s: Time of its last request; None: there was none.
         unasked: Bytes beyond the explained ones.
+        owed: Calls that have ended without a request since the last one, and were sent no answer so far.
+        acknowledged: Bytes of the server that had arrived at the last look.
     """
 
     since_s: float
     explained: float
     asked_s: float | None = None
     unasked: float = 0.0
+    owed: int = 0
+    acknowledged: int = 0
+
+    def explain(self, traffic: Traffic, ended: int, forgotten: float) -> None:
+        """Explain what has arrived without a request.
+
+        Args:
+            traffic: Bytes since the connection was made.
+            ended: Calls that have ended since the last look.
+            forgotten: Bytes that the time since the last look explains.
+        """
+        self.owed += ended
+        # Another connection may have got the same port meanwhile, and have been sent less.
+        answered = min(self.owed, max(traffic.acknowledged - self.acknowledged, 0) // _ANSWER_BYTES)
+        self.owed -= answered
+        if answered and not self.owed:
+            # A server that answers every call has taken all that came with them.
+            self.explained = traffic.received
+        else:
+            self.explained = min(self.explained + forgotten + answered * _REFUSED_BYTES, traffic.received)
 
 
 class Ledger:
@@ -121,33 +182,31 @@ class Ledger:
         self._suspect_until_s: dict[str, float] = {}
         self._last_s: float | None = None
 
-    def look(
-        self, received: Mapping[Peer, int], asked: Iterable[Peer], open_calls: Mapping[Peer, int], now_s: float
-    ) -> dict[Peer, str]:
+    def look(self, traffic: Mapping[Peer, Traffic], calls: CallsSince[Peer], now_s: float) -> dict[Peer, str]:
         """Return the connections to close, with the reason.
 
         Args:
-            received: Bytes that each connection has received since it was made.
-            asked: Connections on which requests have arrived since the last look.
-            open_calls: Number of open calls of each connection.
+            traffic: Bytes of each connection since it was made.
+            calls: Calls since the last look.
             now_s: Current time, in seconds of a monotonic clock.
         """
         accounts = self._accounts
         forgotten = 0.0 if self._last_s is None else (now_s - self._last_s) * self._limits.slack_bytes_a_s
         self._last_s = now_s
-        for gone in accounts.keys() - received.keys():
+        for gone in accounts.keys() - traffic.keys():
             del accounts[gone]
-        asking = set(asked)
-        for peer, total in received.items():
+        open_calls = calls.open
+        for peer, bytes_of_peer in traffic.items():
             account = accounts.get(peer)
             is_new = account is None
             if account is None:
                 account = accounts[peer] = _Account(now_s, 0.0)
-            if peer in asking:
-                account.asked_s, account.explained = now_s, total
-            elif not is_new:
-                account.explained = min(account.explained + forgotten, total)
-            account.unasked = total - account.explained
+            if peer in calls.asked:
+                account.asked_s, account.explained, account.owed = now_s, bytes_of_peer.received, 0
+            else:
+                account.explain(bytes_of_peer, calls.ended.get(peer, 0), 0.0 if is_new else forgotten)
+            account.unasked = bytes_of_peer.received - account.explained
+            account.acknowledged = bytes_of_peer.acknowledged
         closed = self._flooding(open_calls, now_s) | self._silent(open_calls, now_s)
         closed |= self._unused(open_calls, closed)
         for peer in closed:
@@ -167,6 +226,10 @@ class Ledger:
         total = 0.0
         for peer, account in self._accounts.items():
             total += account.unasked
+            if account.owed > limits.resets:
+                closed[peer] = "its calls are reset before their requests"
+                total -= account.unasked
+                continue
             if account.unasked <= limits.slack_bytes:
                 continue
             # One request may be on its way before its call has begun.
@@ -228,41 +291,92 @@ class Arrivals(Layer):
     """Layer that notes from which connections requests arrive.
 
     It stands inside the guard and the wait for requests, so that only requests of admitted callers count; it is never
-    the outermost layer. Health checks need no token, and explain nothing; their open watches count as calls.
+    the outermost layer. Of a stream, each request counts, and not its beginning. Health checks need no token, and
+    explain nothing; their open watches count as calls.
     """
 
     def __init__(self) -> None:
         super().__init__()
         self._arrived: set[str] = set()
+        self._ended: Counter[str] = Counter()
         self._open: dict[str, int] = {}
 
     def wrap(self, inner: Any, method: str) -> Any:
         """Return a handler that notes the connection of each request."""
+        if is_health_check(method):
+            return inner
         behaviour = behaviour_of(inner)
 
         def noted(request: Any, context: Any) -> Any:
             self._arrived.add(context.peer())
             return behaviour(request, context)
 
-        return inner if method.startswith(_HEALTH) else with_behaviour(inner, noted)
+        def noted_each(requests: Any, context: Any) -> Any:
+            return behaviour(self._each(requests, context.peer()), context)
+
+        return with_behaviour(inner, noted_each if inner.request_streaming else noted)
+
+    async def _each(self, requests: AsyncIterator[Any], peer: str) -> AsyncIterator[Any]:
+        async for request in requests:
+            self._arrived.add(peer)
+            yield request
 
     def begun(self, peer: str) -> None:
-        """Note that a call has begun on a connection, in gRPC's words for its other end."""
+        """Note that a call of an admitted caller has begun on a connection, in gRPC's words for its other end."""
         self._open[peer] = self._open.get(peer, 0) + 1
 
-    def ended(self, peer: str) -> None:
-        """Note that a call has ended on a connection."""
+    def ended(self, peer: str, *, is_check: bool = False) -> None:
+        """Note that a call has ended on a connection.
+
+        Args:
+            peer: The other end of the connection, in gRPC's words.
+            is_check: True for a health check.
+        """
+        if not is_check:
+            self._ended[peer] += 1
         left = self._open[peer] - 1
         if left > 0:
             self._open[peer] = left
         else:
             del self._open[peer]
 
-    def take(self) -> tuple[frozenset[str], dict[str, int]]:
-        """Return the connections with requests since the last time, and the open calls; from another thread."""
+    def refused(self, peer: str) -> None:
+        """Note that a call of an admitted caller, and no health check, was refused without its request."""
+        self._ended[peer] += 1
+
+    def take(self) -> CallsSince[str]:
+        """Return the calls since the last time; from another thread."""
         arrived, self._arrived = self._arrived, set()
+        ended, self._ended = self._ended, Counter()
         # Copies are made without another thread in between.
-        return frozenset(arrived), dict(self._open)
+        return CallsSince(frozenset(arrived), dict(ended), dict(self._open))
+
+
+class CallsByConnection(Layer):
+    """Layer that notes the open calls of each connection.
+
+    It stands inside the guard and outside of all waits; it is never the outermost layer. A service with a limit on open
+    calls notes them itself.
+
+    Args:
+        arrivals: Layer that is told.
+    """
+
+    def __init__(self, arrivals: Arrivals) -> None:
+        super().__init__()
+        self._arrivals = arrivals
+
+    def wrap(self, inner: Any, method: str) -> Any:
+        """Return a handler that notes its calls."""
+        behaviour, arrivals, is_check = behaviour_of(inner), self._arrivals, is_health_check(method)
+
+        def noted(request: Any, context: Any) -> Any:
+            peer = context.peer()
+            arrivals.begun(peer)
+            context.add_done_callback(lambda _: arrivals.ended(peer, is_check=is_check))
+            return behaviour(request, context)
+
+        return with_behaviour(inner, noted)
 
 
 class ConnectionWatch:
@@ -272,15 +386,27 @@ class ConnectionWatch:
         port: Port on which the server listens.
         limits: Limits of connections.
         arrivals: Layer of the server.
+        share: Share of a core that looking takes at most.
+        returns_memory: True to return the memory that floods have taken to the system at once. Meanwhile, threads of
+            this process that need memory may have to wait.
         clock: Seconds of a monotonic clock.
     """
 
     def __init__(
-        self, port: int, limits: ConnectionLimits, arrivals: Arrivals, clock: Callable[[], float] = time.monotonic
+        self,
+        port: int,
+        limits: ConnectionLimits,
+        arrivals: Arrivals,
+        *,
+        share: float = SHARE,
+        returns_memory: bool = True,
+        clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._ledger = Ledger(limits)
         self._sockets = _Sockets(port)
         self._arrivals = arrivals
+        self._share = share
+        self._returns_memory = returns_memory
         self._clock = clock
         self._warned_s = float("-inf")
         self._unreported: Counter[str] = Counter()
@@ -292,7 +418,7 @@ class ConnectionWatch:
         if can_watch():
             self._thread.start()
         else:
-            _log.warning("connections are not watched on this system: put a proxy in front of the server")
+            _log.warning("connections are not watched on this system: put a proxy in front of the service")
         return self
 
     def __exit__(
@@ -304,15 +430,10 @@ class ConnectionWatch:
 
     def look(self) -> None:
         """Look at all connections once, and close those beyond the limits."""
-        arrived, open_calls = self._arrivals.take()
-        received = self._sockets.received()
+        calls = _by_peer(self._arrivals.take())
+        traffic = self._sockets.traffic()
         now_s = self._clock()
-        closed = self._ledger.look(
-            received,
-            (peer for peer in map(peer_of, arrived) if peer is not None),
-            {peer: count for text, count in open_calls.items() if (peer := peer_of(text)) is not None},
-            now_s,
-        )
+        closed = self._ledger.look(traffic, calls, now_s)
         for peer, reason in closed.items():
             if self._sockets.close(peer):
                 self.closed[reason] += 1
@@ -331,7 +452,7 @@ class ConnectionWatch:
             if now_s < due_s and taken < memory + _GROWTH_BYTES:
                 continue
             memory = taken
-            if self._ledger.is_alert and now_s >= trimmed_s + _TRIM_S:
+            if self._returns_memory and self._ledger.is_alert and now_s >= trimmed_s + _TRIM_S:
                 trimmed_s = now_s
                 _return_freed_memory()
             used_s = time.thread_time()
@@ -340,7 +461,7 @@ class ConnectionWatch:
             except Exception:
                 # A watch that ends would leave the server open without a word.
                 _log.exception("watching the connections failed")
-            due_s = now_s + (time.thread_time() - used_s) / _SHARE
+            due_s = now_s + (time.thread_time() - used_s) / self._share
 
 
 class _Sockets:
@@ -352,9 +473,9 @@ class _Sockets:
         self._known: dict[int, tuple[int, Peer | None]] = {}
         self._by_peer: dict[Peer, int] = {}
 
-    def received(self) -> dict[Peer, int]:
-        """Return the bytes that each connection has received."""
-        found: dict[Peer, int] = {}
+    def traffic(self) -> dict[Peer, Traffic]:
+        """Return the bytes of each connection."""
+        found: dict[Peer, Traffic] = {}
         known: dict[int, tuple[int, Peer | None]] = {}
         by_peer: dict[Peer, int] = {}
         for descriptor in _descriptors():
@@ -365,7 +486,7 @@ class _Sockets:
                 peer = before[1] if before is not None and before[0] == inode else self._peer(descriptor)
                 known[descriptor] = inode, peer
                 if peer is not None:
-                    found[peer] = _bytes_received(descriptor)
+                    found[peer] = _traffic(descriptor)
                     by_peer[peer] = descriptor
         self._known, self._by_peer = known, by_peer
         return found
@@ -400,13 +521,18 @@ class _Sockets:
                 return None  # It listens, or has gone.
 
 
+def is_health_check(method: str) -> bool:
+    """Return True if a method (`/package.Service/Method`) is one of health checks, which need no token."""
+    return method.startswith(_HEALTH)
+
+
 def can_watch() -> bool:
     """Return True if the kernel counts the bytes of connections and shows this process's descriptors."""
     if _TCP_INFO is None or not _DESCRIPTORS.is_dir():
         return False
     with socket.socket() as probe:
         try:
-            _bytes_received(probe.fileno())
+            _traffic(probe.fileno())
         except (OSError, struct.error):
             return False
     return True
@@ -419,6 +545,16 @@ def peer_of(text: str) -> Peer | None:
     if kind not in ("ipv4", "ipv6") or not port.isdecimal():
         return None
     return _normal(host.strip("[]"), int(port))
+
+
+def _by_peer(calls: CallsSince[str]) -> CallsSince[Peer]:
+    """Return calls by the other end of their connection, without those over other lines than TCP."""
+    peers = {text: peer_of(text) for text in {*calls.asked, *calls.ended, *calls.open}}
+    ended, opened = (
+        {peer: count for text, count in counts.items() if (peer := peers[text]) is not None}
+        for counts in (calls.ended, calls.open)
+    )
+    return CallsSince(frozenset(peer for text in calls.asked if (peer := peers[text]) is not None), ended, opened)
 
 
 def _normal(host: str, port: int) -> Peer:
@@ -444,16 +580,16 @@ def _borrowed(descriptor: int) -> Iterator[socket.socket]:
         line.detach()
 
 
-def _bytes_received(descriptor: int) -> int:
-    """Return the bytes that a TCP connection has received; raises OSError if it is none."""
+def _traffic(descriptor: int) -> Traffic:
+    """Return the bytes of a TCP connection; raises OSError if it is none."""
     line = socket.socket(socket.AF_INET, socket.SOCK_STREAM, 0, fileno=descriptor)
     try:
         assert _TCP_INFO is not None  # noqa: S101  # `can_watch` has looked
-        info = line.getsockopt(socket.IPPROTO_TCP, _TCP_INFO, _BYTES_RECEIVED_AT + _BYTES_RECEIVED.size)
+        info = line.getsockopt(socket.IPPROTO_TCP, _TCP_INFO, _BYTE_COUNTS_AT + _BYTE_COUNTS.size)
     finally:
         line.detach()
-    received: int = _BYTES_RECEIVED.unpack_from(info, _BYTES_RECEIVED_AT)[0]
-    return received
+    acknowledged, received = _BYTE_COUNTS.unpack_from(info, _BYTE_COUNTS_AT)
+    return Traffic(received, acknowledged)
 
 
 def _return_freed_memory() -> None:

@@ -25,6 +25,7 @@ class Stop(Exception):
     """A syntax error, already reported, behind which nothing would be read right."""
 
 
+# Not that of `robosc.language`, which remembers what could stand where, and goes on behind faults in another way.
 class Cursor:
     """Cursor that reads tokens one after the other.
 

@@ -5,9 +5,9 @@ No branch of it can try a stretch of text twice (possessive quantifiers), so its
 
 import re
 from enum import IntEnum
-from typing import NamedTuple
 
 from robosc.cif.reserved_words import KEYWORDS
+from robosc.language.tokens import Tokens, tokens_of
 
 _ID = r"\$?[A-Za-z_][A-Za-z0-9_]*+"
 _WHOLE = r"(?:0|[1-9][0-9]*+)"
@@ -41,38 +41,9 @@ class Kind(IntEnum):
     """A reserved word."""
 
 
-class Tokens(NamedTuple):
-    """The tokens of a text, column by column; the last ones are of kind `END` and empty.
-
-    Attributes:
-        texts: Text of each as written.
-        kinds: Kind of each.
-        starts: Offset of each in the text.
-    """
-
-    texts: list[str]
-    kinds: list[int]
-    starts: list[int]
-
-
-_NAME, _WORD, _END = int(Kind.NAME), int(Kind.WORD), int(Kind.END)
+_WORD, _END = int(Kind.WORD), int(Kind.END)
 
 
 def tokenize(text: str) -> Tokens:
     """The tokens of a text; never fails."""
-    texts: list[str] = []
-    kinds: list[int] = []
-    starts: list[int] = []
-    for match in _TOKEN.finditer(text):
-        kind = match.lastindex or 0
-        if kind == _END:
-            break
-        token = match[kind]
-        texts.append(token)
-        starts.append(match.start(kind))
-        kinds.append(_WORD if kind == _NAME and token in KEYWORDS else kind)
-    # Several ends: who looks a token or two ahead need not ask whether there is one.
-    texts += [""] * 3
-    kinds += [_END] * 3
-    starts += [len(text)] * 3
-    return Tokens(texts, kinds, starts)
+    return tokens_of(text, _TOKEN, KEYWORDS, word=_WORD, end=_END)

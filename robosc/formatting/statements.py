@@ -339,6 +339,7 @@ class _Walker(_Expressions):
         requirements = (item for item in tree.items if isinstance(item, syntax.Requirement | syntax.Invariant))
         self._are_invariants = (isinstance(item, syntax.Invariant) for item in requirements)
         self._aims = (item for item in tree.items if isinstance(item, syntax.Goal | syntax.Assumption))
+        # The words are those of the parser, whose table has what reads a statement; here is what lays it out.
         self._items: Mapping[str, Callable[[int], None]] = {
             "component": self._component,
             "datatype": self._data_type,

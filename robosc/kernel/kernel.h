@@ -27,4 +27,7 @@ PyObject *space_meeting(PyObject *module, PyObject *arguments);
 PyObject *space_shortest_path(PyObject *module, PyObject *arguments);
 PyObject *space_nodes(PyObject *module, PyObject *arguments);
 
+/* Objects that live as long as their process: objects.c */
+PyObject *objects_keep(PyObject *module, PyObject *arguments);
+
 #endif

@@ -21,6 +21,7 @@ static PyMethodDef FUNCTIONS[] = {
     {"space_meeting", space_meeting, METH_VARARGS, "Return the classes with which a node meets a cube, and the steps."},
     {"space_shortest_path", space_shortest_path, METH_VARARGS, "Return the shortest path to true, and the steps it took."},
     {"space_nodes", space_nodes, METH_VARARGS, "Return the nodes from a number on."},
+    {"keep", objects_keep, METH_VARARGS, "Make objects immortal, and all that they refer to; return the number."},
     {NULL, NULL, 0, NULL},
 };
 

@@ -6,6 +6,7 @@ in the text, whatever that is.
 
 import re
 from bisect import bisect_right
+from collections.abc import Collection
 from enum import IntEnum
 from typing import NamedTuple
 
@@ -114,21 +115,33 @@ def tokenize_broken(text: str) -> Tokens:
 
 
 def _tokens(text: str, pattern: re.Pattern[str]) -> Tokens:
+    return tokens_of(text, pattern, RESERVED_WORDS, word=_WORD, end=_END)
+
+
+def tokens_of(text: str, pattern: re.Pattern[str], words: Collection[str], *, word: int, end: int) -> Tokens:
+    """The tokens that a pattern finds, each kind in the group of its number, in a text of this language or another.
+
+    Args:
+        text: The text.
+        pattern: Pattern of a token with the blanks before it; the first group is of names.
+        words: Names that are reserved words.
+        word: Kind of these.
+        end: Kind of the end of the text.
+    """
     texts: list[str] = []
     kinds: list[int] = []
     starts: list[int] = []
-    words = RESERVED_WORDS
     for match in pattern.finditer(text):
         kind = match.lastindex or 0
-        if kind == _END:
+        if kind == end:
             break
         token = match[kind]
         texts.append(token)
         starts.append(match.start(kind))
-        kinds.append(_WORD if kind == 1 and token in words else kind)
+        kinds.append(word if kind == 1 and token in words else kind)
     # Several ends: who looks a token or two ahead need not ask whether there is one.
     texts += [""] * _ENDS
-    kinds += [_END] * _ENDS
+    kinds += [end] * _ENDS
     starts += [len(text)] * _ENDS
     return Tokens(texts, kinds, starts)
 

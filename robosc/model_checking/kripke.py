@@ -5,19 +5,18 @@ state of a Kripke structure needs one: its runs stay there for ever. Spin does t
 stutter.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import starmap
 from typing import Any
 
-from robosc.automata.state import subjects
 from robosc.automata.structure import System
 from robosc.expressions import Value
 from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.synthesis.closure import closure_under
 from robosc.synthesis.encoding import Bits, Encoding
 from robosc.synthesis.fixed_point import initial_states
-from robosc.synthesis.nodes import cofactors, is_constant
+from robosc.synthesis.runs import decoded, one_of
 from robosc.synthesis.step import Step
 from robosc.synthesis.transitions import Steps, transition_of
 from robosc.synthesis.workspace import Workspace
@@ -146,31 +145,11 @@ class KripkeStructure:
 
     def one(self, states: Any) -> Any:
         """One of some states, as a predicate: the one whose bits read as the lowest number, whatever the engine."""
-        return self.encoding.all_of(
-            self.manager.var(name) if value else ~self.manager.var(name)
-            for name, value in reversed(self._assignment(states).items())
-        )
+        return one_of(self.encoding, states)[0]
 
     def values(self, state: Any) -> tuple[Value, ...]:
         """The state that is alone in a predicate, as a tuple in the order of `subjects`."""
-        assignment = self._assignment(state)
-        return tuple(_value(self.encoding.subjects[item], assignment) for item in subjects(self.encoding.system))
-
-    def _assignment(self, states: Any) -> dict[str, bool]:
-        values = dict.fromkeys(self.encoding.state_names, False)
-        node = states
-        while not is_constant(self.manager, node):
-            low, high = cofactors(node)
-            values[node.var] = low == self.manager.false
-            node = high if values[node.var] else low
-        return values
-
-
-def _value(bits: Bits, assignment: Mapping[str, bool]) -> Value:
-    index = 0
-    for name in bits.names:
-        index = 2 * index + assignment[name]
-    return bits.domain[index]
+        return decoded(self.encoding, state)
 
 
 def diagram_predicate(encoding: Encoding, diagram: DecisionDiagram) -> Any:

@@ -74,6 +74,27 @@ def write_whole(path: Path, content: bytes) -> None:
         raise FileAccessError(f"cannot write {path}: {error.strerror or error}") from error
 
 
+class SupervisorFile:
+    """Mixin of supervisors that have a file of their own."""
+
+    __slots__ = ()
+
+    def encode(self) -> bytes:
+        """Return the content of the supervisor's file; raises UnsupportedModelError as `write`."""
+        raise NotImplementedError
+
+    def write(self, file: FileName) -> Path:
+        """Write the supervisor's file (`.rsup`), whole or not at all, and return its path.
+
+        Raises:
+            FileAccessError: The file cannot be written.
+            UnsupportedModelError: The file would become too large, or an expression is nested too deeply.
+        """
+        path = given_path(file)
+        write_whole(path, self.encode())
+        return path
+
+
 def _umask() -> int:
     """The permissions that this process removes from new files; the mask can only be read by setting it."""
     mask = os.umask(0o077)

@@ -13,7 +13,7 @@ from robosc.certification.supervisor_file import StateInWords
 from robosc.execution.runtime.event_log import json_line
 from robosc.model.structure import Deployment
 from robosc.pipeline.received_data import NO_DATA
-from robosc.pipeline.steps import Step
+from robosc.pipeline.steps import Step, SteppedRun
 from robosc.supervisor import Supervisor
 
 _WIDTH = 112
@@ -36,7 +36,7 @@ class ModelOfTest:
     interface_paths: tuple[Path, ...] = ()
 
 
-class ReplayableRun(Protocol):
+class ReplayableRun(SteppedRun, Protocol):
     """Run of a robot that a test repeats."""
 
     @property
@@ -46,14 +46,6 @@ class ReplayableRun(Protocol):
     @property
     def initial(self) -> StateInWords:
         """The initial state."""
-
-    @property
-    def state(self) -> StateInWords:
-        """The current state."""
-
-    @property
-    def enabled(self) -> tuple[str, ...]:
-        """Controllable events that are allowed now."""
 
     @property
     def history(self) -> tuple[Step, ...]:

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Protocol
 
 from robosc.certification.supervisor_file import StateInWords
 from robosc.pipeline.received_data import NO_DATA
@@ -39,6 +39,18 @@ class Step:
 
     def __str__(self) -> str:
         return f"{self.event}: {self.state}"
+
+
+class SteppedRun(Protocol):
+    """Run that is led step by step."""
+
+    @property
+    def state(self) -> StateInWords:
+        """The current state."""
+
+    @property
+    def enabled(self) -> tuple[str, ...]:
+        """Controllable events that are allowed now."""
 
 
 def event_text(step: Step) -> str:

@@ -2,7 +2,6 @@
 
 import os
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Self
 
 from robosc.automata import System
@@ -10,7 +9,7 @@ from robosc.conditions.summary import summary_json, summary_text
 from robosc.errors import Diagnostic
 from robosc.model.structure import Deployment, Model
 from robosc.pipeline.conditions import Conditions, conditions_of
-from robosc.pipeline.files import FileName, given_path, read_bounded, write_whole
+from robosc.pipeline.files import FileName, SupervisorFile, given_path, read_bounded
 from robosc.pipeline.findings import Findings
 from robosc.pipeline.goals import Goals, goals_of
 from robosc.pipeline.results import Summary
@@ -20,7 +19,7 @@ from robosc.supervisor.codec import MAXIMUM_BYTES, decode, encode
 from robosc.tables import html_table
 
 
-class Supervisor(CoreSupervisor, frozen=True, dict=True):
+class Supervisor(CoreSupervisor, SupervisorFile, frozen=True, dict=True):
     """A synthesized supervisor.
 
     Attributes:
@@ -48,17 +47,6 @@ class Supervisor(CoreSupervisor, frozen=True, dict=True):
             InvalidSupervisorError: The file holds no supervisor.
         """
         return cls.of(decode(read_bounded(given_path(file), MAXIMUM_BYTES)))
-
-    def write(self, file: FileName) -> Path:
-        """Write the supervisor's file (`.rsup`), whole or not at all, and return its path.
-
-        Raises:
-            FileAccessError: The file cannot be written.
-            UnsupportedModelError: The file would become too large, or an expression is nested too deeply.
-        """
-        path = given_path(file)
-        write_whole(path, self.encode())
-        return path
 
     def encode(self) -> bytes:
         """Return the content of the supervisor's file; raises UnsupportedModelError as `write`."""

@@ -4,7 +4,6 @@ from collections.abc import Callable, Iterator, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import cached_property
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import msgspec
@@ -17,7 +16,7 @@ from robosc.certification import Progress
 from robosc.conditions.rendering import Formulas
 from robosc.errors import InvalidSupervisorError, InvalidSystemError, NodeLimitError, UnsupportedModelError
 from robosc.pipeline.conditions import Condition, Conditions, condition_of, conditions_of
-from robosc.pipeline.files import FileName, given_path, read_bounded, write_whole
+from robosc.pipeline.files import FileName, SupervisorFile, given_path, read_bounded
 from robosc.pipeline.findings import Findings
 from robosc.pipeline.options import SynthesisOptions
 from robosc.pipeline.results import NoSupervisor, Outcome, SynthesisStatus, Verification, VerificationStatus
@@ -64,7 +63,7 @@ class SupervisedModule:
 
 
 @dataclass(frozen=True, repr=False)
-class SystemSupervisor:
+class SystemSupervisor(SupervisorFile):
     """Supervisor of automata.
 
     Attributes:
@@ -123,19 +122,8 @@ class SystemSupervisor:
         """
         return decode_system(read_bounded(given_path(file), MAXIMUM_BYTES))
 
-    def write(self, file: FileName) -> Path:
-        """Write the supervisor's file (`.rsup`) with the automata, whole or not at all, and return its path.
-
-        Raises:
-            FileAccessError: The file cannot be written.
-            UnsupportedModelError: The file would become too large, or an expression is nested too deeply.
-        """
-        path = given_path(file)
-        write_whole(path, self.encode())
-        return path
-
     def encode(self) -> bytes:
-        """Return the content of the supervisor's file; raises UnsupportedModelError as `write`."""
+        """Return the content of the supervisor's file, with the automata; raises UnsupportedModelError as `write`."""
         content = encode_document(_Document(FORMAT, FORMAT_VERSION, self))
         try:
             decode_system(content)

@@ -7,8 +7,7 @@ from enum import StrEnum
 from random import Random
 from typing import Protocol
 
-from robosc.certification.supervisor_file import StateInWords
-from robosc.pipeline.steps import Step
+from robosc.pipeline.steps import Step, SteppedRun
 
 
 class WalkFindingKind(StrEnum):
@@ -50,20 +49,12 @@ class WalkFinding:
         return f"{self.kind}{place} after {self.steps} step{'s' if self.steps != 1 else ''}: {'; '.join(self.why)}"
 
 
-class WalkedRun(Protocol):
+class WalkedRun(SteppedRun, Protocol):
     """Run as the walker that leads it sees it."""
-
-    @property
-    def state(self) -> StateInWords:
-        """The current state."""
 
     @property
     def is_marked(self) -> bool:
         """True if the state counts as completed."""
-
-    @property
-    def enabled(self) -> tuple[str, ...]:
-        """Controllable events that are allowed now."""
 
     @property
     def possible(self) -> tuple[str, ...]:

@@ -5,35 +5,15 @@ from functools import cached_property
 from typing import Any
 
 from robosc.synthesis.closure import closure_under
-from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
-from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, initial_states, safe_states
-from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.fixed_point import FixedPoint, Problem, SolvedProblem, allowed, initial_states, safe_states
 from robosc.synthesis.questions import Cause, NeverEnabled
 from robosc.synthesis.step import Step
 from robosc.synthesis.transitions import Steps
 
 
-class Causes:
-    """Finder of causes; what they are judged by is worked out once it is needed.
-
-    Args:
-        encoding: The variables.
-        monitor: Monitor of the waiting caller.
-        problem: Problem that was solved.
-        good: Its good states.
-        reachable: States of the controlled system.
-    """
-
-    def __init__(
-        self, encoding: Encoding, monitor: ProgressMonitor, problem: Problem, good: Any, reachable: Any
-    ) -> None:
-        self._encoding = encoding
-        self._false = encoding.manager.false
-        self._monitor = monitor
-        self._problem = problem
-        self._good = good
-        self._reachable = reachable
+class Causes(SolvedProblem):
+    """Finder of causes; what they are judged by is worked out once it is needed."""
 
     def of(self, steps: Steps) -> NeverEnabled:
         """Return the cause why an event of the problem can never happen in the controlled system."""
@@ -43,14 +23,14 @@ class Causes:
         enabled = steps.plant & self._under_conditions
         if self._is_nowhere(enabled & steps.condition):
             return NeverEnabled(event, Cause.REQUIREMENT, is_reached=not self._is_nowhere(enabled))
-        enabled = self._reachable & steps.plant & steps.condition
+        enabled = self.reachable & steps.plant & steps.condition
         is_reached = not self._is_nowhere(enabled)
         if not self._is_possible_without_invariants(steps):
             return NeverEnabled(event, Cause.SUPERVISOR, is_reached)
         return NeverEnabled(event, Cause.INVARIANT, is_reached, self._broken(steps.image(enabled)))
 
     def _is_nowhere(self, states: Any) -> bool:
-        return bool(states == self._false)
+        return bool(states == self.encoding.manager.false)
 
     @cached_property
     def _by_plants(self) -> Any:
@@ -66,12 +46,12 @@ class Causes:
         def onwards(steps: Steps) -> Step:
             return Step(steps.forwards(possible(steps)), steps.names)
 
-        steps = map(onwards, self._problem.steps)
-        closure = closure_under(self._encoding, steps, self._encoding.manager.true, self._monitor)
-        return closure.of(initial_states(self._encoding), "reachability")
+        steps = map(onwards, self.problem.steps)
+        closure = closure_under(self.encoding, steps, self.encoding.manager.true, self.monitor)
+        return closure.of(initial_states(self.encoding), "reachability")
 
     def _is_possible_without_invariants(self, steps: Steps) -> bool:
-        if not self._encoding.system.invariants:
+        if not self.encoding.system.invariants:
             return False
         good, reachable = self._without_invariants
         return not self._is_nowhere(reachable & steps.plant & allowed(steps, good))
@@ -79,13 +59,13 @@ class Causes:
     @cached_property
     def _without_invariants(self) -> tuple[Any, Any]:
         """Good states, and states of the controlled system, if nothing had to hold always."""
-        fixed_point = FixedPoint(self._encoding, self._monitor)
-        problem = Problem(self._problem.steps, safe_states(self._encoding, ()))
-        good = fixed_point.solution(problem, known=self._good).states
+        fixed_point = FixedPoint(self.encoding, self.monitor)
+        problem = Problem(self.problem.steps, safe_states(self.encoding, ()))
+        good = fixed_point.solution(problem, known=self.good).states
         return good, fixed_point.reachable_states(problem, good)
 
     def _broken(self, states: Any) -> tuple[int, ...]:
         """The invariants that some of the states break."""
-        holds = ExpressionEncoder(self._encoding).holds
-        invariants = enumerate(self._encoding.system.invariants)
+        holds = ExpressionEncoder(self.encoding).holds
+        invariants = enumerate(self.encoding.system.invariants)
         return tuple(place for place, item in invariants if not self._is_nowhere(states & ~holds(item)))

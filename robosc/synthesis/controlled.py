@@ -1,15 +1,14 @@
 """Answers to questions about the controlled system, computed on predicates instead of single states."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from robosc.errors import InternalError
 from robosc.expressions import Expression
 from robosc.synthesis.causes import Causes
-from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
-from robosc.synthesis.fixed_point import FixedPoint, Problem, allowed, initial_states, safe_states
-from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.fixed_point import FixedPoint, Problem, SolvedProblem, allowed, initial_states, safe_states
 from robosc.synthesis.questions import Answers, EnabledTogether, NeverEnabled, Questions, Restriction, Unprompted
 from robosc.synthesis.runs import ShortestRuns, SystemRun
 from robosc.synthesis.transitions import Steps
@@ -21,29 +20,15 @@ MAXIMUM_EFFORT = 300_000
 """Nodes of the searches for loops together, counted once for each event: a third of a second with the faster engine."""
 
 
-class ControlledSystem:
-    """The system under its supervisor.
+@dataclass(eq=False)
+class ControlledSystem(SolvedProblem):
+    """The system under its supervisor."""
 
-    Args:
-        encoding: The variables.
-        monitor: Monitor of the waiting caller.
-        problem: Problem that was solved.
-        good: Its good states.
-        reachable: States of the controlled system.
-    """
-
-    def __init__(
-        self, encoding: Encoding, monitor: ProgressMonitor, problem: Problem, good: Any, reachable: Any
-    ) -> None:
-        self._encoding = encoding
-        self._manager = encoding.manager
-        self._monitor = monitor
-        self._problem = problem
-        self._good = good
-        self._reachable = reachable
-        self._encoder = ExpressionEncoder(encoding)
-        self._steps = {steps.event.name: steps for steps in problem.steps}
-        self._causes = Causes(encoding, monitor, problem, good, reachable)
+    def __post_init__(self) -> None:
+        self._manager = self.encoding.manager
+        self._encoder = ExpressionEncoder(self.encoding)
+        self._steps = {steps.event.name: steps for steps in self.problem.steps}
+        self._causes = Causes(self.encoding, self.monitor, self.problem, self.good, self.reachable)
         self._known: dict[str, Any] = {}
         self._effort = 0
 
@@ -66,9 +51,9 @@ class ControlledSystem:
         """The states of the controlled system in which an event can happen."""
         found = self._known.get(event)
         if found is None:
-            self._monitor.check_stop()
+            self.monitor.check_stop()
             steps = self._steps[event]
-            found = self._known[event] = self._reachable & steps.plant & allowed(steps, self._good)
+            found = self._known[event] = self.reachable & steps.plant & allowed(steps, self.good)
         return found
 
     def _never(self, events: Iterable[str]) -> Iterator[NeverEnabled]:
@@ -78,8 +63,8 @@ class ControlledSystem:
 
     def _unreached(self, locations: Iterable[tuple[str, str]]) -> Iterator[tuple[str, str]]:
         for automaton, location in locations:
-            self._monitor.check_stop()
-            if self._reachable & self._encoding.in_location(automaton, location) == self._manager.false:
+            self.monitor.check_stop()
+            if self.reachable & self.encoding.in_location(automaton, location) == self._manager.false:
                 yield automaton, location
 
     # Restrictions
@@ -105,22 +90,22 @@ class ControlledSystem:
     def _restricts(self, restriction: Restriction) -> bool:
         """Return True if, in a controlled system state, the plant enables an event and a condition is not true."""
         condition, broken = None, self._manager.false
-        conditions = self._encoding.system.conditions
+        conditions = self.encoding.system.conditions
         for item in (*(conditions[place] for place in restriction.conditions), *restriction.watched):
             # What one requirement brings is mostly one condition on many events.
             if item.condition is not condition:
-                condition, broken = item.condition, self._reachable & ~self._holds(item.condition)
+                condition, broken = item.condition, self.reachable & ~self._holds(item.condition)
             if broken & self._steps[item.event].plant != self._manager.false:
                 return True
         return False
 
     def _holds(self, condition: Expression) -> Any:
-        self._monitor.check_stop()
+        self.monitor.check_stop()
         return self._encoder.holds(condition)
 
     def _supervisor_disables(self) -> bool:
         return any(
-            self._reachable & steps.plant & steps.condition & ~self._possible(name) != self._manager.false
+            self.reachable & steps.plant & steps.condition & ~self._possible(name) != self._manager.false
             for name, steps in self._steps.items()
             if steps.event.is_controllable
         )
@@ -142,29 +127,29 @@ class ControlledSystem:
     def _is_the_same_without(self, restrictions: Sequence[Restriction]) -> bool:
         """Return True if the controlled system of the problem without some restrictions allows nothing more."""
         problem = self._without(restrictions)
-        good = FixedPoint(self._encoding, self._monitor).solution(problem, known=self._good)
+        good = FixedPoint(self.encoding, self.monitor).solution(problem, known=self.good)
         return all(
-            self._reachable & steps.plant & allowed(steps, good.states) == self._possible(steps.event.name)
+            self.reachable & steps.plant & allowed(steps, good.states) == self._possible(steps.event.name)
             for steps in problem.steps
         )
 
     def _without(self, restrictions: Sequence[Restriction]) -> Problem:
         """The problem without some restrictions; what they are watched for stays as it is."""
-        system = self._encoding.system
+        system = self.encoding.system
         dropped = {place for item in restrictions for place in item.conditions}
         touched = {system.conditions[place].event for place in dropped}
         left = [item for place, item in enumerate(system.conditions) if place not in dropped]
 
         def under_what_is_left(steps: Steps) -> Steps:
             conditions = [item.condition for item in left if item.event == steps.event.name]
-            return steps.under(self._encoding.all_of(self._holds(condition) for condition in conditions))
+            return steps.under(self.encoding.all_of(self._holds(condition) for condition in conditions))
 
         steps = tuple(
-            under_what_is_left(steps) if steps.event.name in touched else steps for steps in self._problem.steps
+            under_what_is_left(steps) if steps.event.name in touched else steps for steps in self.problem.steps
         )
         dropped = {place for item in restrictions for place in item.invariants}
         invariants = [item for place, item in enumerate(system.invariants) if place not in dropped]
-        return Problem(steps, safe_states(self._encoding, invariants) if dropped else self._problem.safe)
+        return Problem(steps, safe_states(self.encoding, invariants) if dropped else self.problem.safe)
 
     # Prompts
 
@@ -183,8 +168,8 @@ class ControlledSystem:
         if not events:
             return
         executed = self._executed(silent)
-        inside = [steps for steps in self._problem.steps if steps.event.name not in prompts]
-        runs = self._runs_from(self._start, self._problem.steps, executed)
+        inside = [steps for steps in self.problem.steps if steps.event.name not in prompts]
+        runs = self._runs_from(self._start, self.problem.steps, executed)
         reported: set[str] = set()
         for event in events:
             steps = self._steps[event]
@@ -198,9 +183,9 @@ class ControlledSystem:
 
     def _executed(self, silent: Sequence[str]) -> dict[str, Any]:
         """Return for each event the states in which an executor may take it: silent events go first."""
-        possible = {name: self._reachable & allowed(steps, self._good) for name, steps in self._steps.items()}
+        possible = {name: self.reachable & allowed(steps, self.good) for name, steps in self._steps.items()}
         first = {name: self._possible(name) & self._steps[name].moving() for name in silent}
-        stable = ~self._encoding.any_of(first.values())
+        stable = ~self.encoding.any_of(first.values())
         return {name: first[name] if name in first else states & stable for name, states in possible.items()}
 
     def _again(self, steps: Steps, inside: Sequence[Steps], executed: Mapping[str, Any]) -> Any:
@@ -219,7 +204,7 @@ class ControlledSystem:
                 if self._effort > MAXIMUM_EFFORT:
                     return self._manager.false
                 for other in inside:
-                    self._monitor.check_stop()
+                    self.monitor.check_stop()
                     leading = leading | (executed[other.event.name] & other.some(leading))
             narrowed = found & steps.some(leading)
         return found
@@ -240,7 +225,7 @@ class ControlledSystem:
         """
         further: SystemRun | None = run
         while further is not None:
-            state = self._encoding.state(further.states[-1])
+            state = self.encoding.state(further.states[-1])
             runs = self._runs_from(steps.image(state), inside, executed)
             back = runs.run_to(state)
             if back is not None:
@@ -254,17 +239,17 @@ class ControlledSystem:
         pairs = list(self._pairs(groups))
         if not pairs:
             return ()
-        possible = {name: self._reachable & allowed(steps, self._good) for name, steps in self._steps.items()}
-        runs = self._runs_from(self._start, self._problem.steps, possible)
+        possible = {name: self.reachable & allowed(steps, self.good) for name, steps in self._steps.items()}
+        runs = self._runs_from(self._start, self.problem.steps, possible)
         return tuple(EnabledTogether(first, second, runs.trace_to(states)) for first, second, states in pairs)
 
     @property
     def _start(self) -> Any:
         """The initial states in which the supervisor lets the system begin."""
-        return initial_states(self._encoding) & self._good
+        return initial_states(self.encoding) & self.good
 
     def _runs_from(self, start: Any, events: Sequence[Steps], possible: Mapping[str, Any]) -> ShortestRuns:
-        return ShortestRuns(self._encoding, self._monitor, events, possible, start)
+        return ShortestRuns(self.encoding, self.monitor, events, possible, start)
 
     def _pairs(self, groups: Iterable[Sequence[str]]) -> Iterator[tuple[str, str, Any]]:
         """Rivals that are possible together, and where: the first `MAXIMUM_TOGETHER` of them."""

@@ -73,6 +73,25 @@ def marked_states(encoding: Encoding) -> Any:
     return encoding.marked_locations() & ExpressionEncoder(encoding).holds(encoding.system.marker)
 
 
+@dataclass(eq=False)
+class SolvedProblem:
+    """Problem with its solution, which is asked about.
+
+    Attributes:
+        encoding: The variables.
+        monitor: Monitor of the waiting caller.
+        problem: Problem that was solved.
+        good: Its good states.
+        reachable: States of the controlled system.
+    """
+
+    encoding: Encoding
+    monitor: ProgressMonitor
+    problem: Problem
+    good: Any
+    reachable: Any
+
+
 class FixedPoint:
     """Computation of good states and controlled systems.
 

@@ -159,6 +159,7 @@ def _nonblocking_states(graph: _Graph, good: set[int]) -> set[int]:
             for target in step.targets:
                 if target in good:
                     predecessors[target].append(number)
+    # Written out in each part that walks backwards: verification shares nothing with what it checks.
     reached = graph.marked & good
     found, frontier = set(reached), list(reached)
     while frontier:

@@ -49,7 +49,8 @@ from robosc_server.tasks.describe import server_limits, targets_response, versio
 from robosc_server.tasks.requests import QUICK_BYTES, RequestLimits, accept_request
 from robosc_server.tasks.task import Result, TaskKind, own_key
 from robosc_server.workers import Workers, WorkersError
-from robosc_server.workers.factory import check_cluster, open_workers
+from robosc_server.workers.cluster_check import check_cluster
+from robosc_server.workers.factory import open_workers
 
 _RULE = Rule(frozenset({Scope.SYNTHESIZE}))
 

@@ -98,13 +98,20 @@ class SynthesisService:
             methods[name] = grpc.unary_unary_rpc_method_handler(_fixed_answer(message, answer))
         return grpc.method_handlers_generic_handler(SERVICE_NAME, methods)
 
+    def _accepted(self, kind: TaskKind, request: bytes, context: Context) -> tuple[Task, str]:
+        """The task of a request, under the key of its caller, and that caller.
+
+        Raises:
+            RefusedError: There is none.
+        """
+        task, caller = self._requests.accept(kind, request), self._identify(context)
+        return replace(task, key=self._keys(task.key, caller)), caller
+
     def _unary(self, kind: TaskKind) -> Any:
         async def answer(request: bytes, context: Context) -> bytes:
-            task, caller = self._requests.accept(kind, request), self._identify(context)
-            key = self._keys(task.key, caller)
-            result = self._provider.cached(key, caller)
+            task, caller = self._accepted(kind, request, context)
+            result = self._provider.cached(task.key, caller)
             if result is None:
-                task = replace(task, key=key)
                 result = await self._provider.result(task, caller, _drop)
             self._sender.reserve(context, result.messages)
             return result.messages[0]
@@ -113,11 +120,9 @@ class SynthesisService:
 
     def _stream(self, kind: TaskKind) -> Any:
         async def answer(request: bytes, context: Context) -> bytes:
-            task, caller = self._requests.accept(kind, request), self._identify(context)
-            key = self._keys(task.key, caller)
-            result = self._provider.cached(key, caller)
+            task, caller = self._accepted(kind, request, context)
+            result = self._provider.cached(task.key, caller)
             if result is None:
-                task = replace(task, key=key)
                 async with _ProgressWriter(context) as progress:
                     result = await self._provider.result(task, caller, progress.report)
                     # Reserved now, since a caller that does not read its progress delays the result.

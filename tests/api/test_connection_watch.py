@@ -1,18 +1,29 @@
 """Tests of the watch over connections: its decisions on numbers, and a real server that is flooded."""
 
 import asyncio
-import socket
-from collections.abc import AsyncIterator
+from collections.abc import AsyncIterator, Sequence
 from contextlib import asynccontextmanager
 from typing import Any
 
 import grpc
 import pytest
 
-from robosc_api.connection_watch import Arrivals, ConnectionLimits, ConnectionWatch, Ledger, can_watch, peer_of
-from robosc_api.layers import Layers
+from robosc_api.connection_watch import (
+    Arrivals,
+    CallsByConnection,
+    CallsSince,
+    ConnectionLimits,
+    ConnectionWatch,
+    Ledger,
+    Peer,
+    Traffic,
+    can_watch,
+    peer_of,
+)
+from robosc_api.layers import Layer, Layers, behaviour_of, with_behaviour
 from robosc_api.request_timeouts import RequestTimeouts
-from support.small_server import call, small_server
+from support.floods import MOST_BYTES, endless_headers, resets
+from support.small_server import SERVICE, call, small_server
 from support.waiting import PATIENCE_S
 
 LIMITS = ConnectionLimits(
@@ -29,58 +40,72 @@ A, B, C = ("10.0.0.1", 1), ("10.0.0.2", 1), ("10.0.0.2", 2)
 needs_counts = pytest.mark.skipif(not can_watch(), reason="the kernel of this system does not count bytes")
 
 
+def look(
+    ledger: Ledger,
+    received: dict[Peer, int],
+    asked: Sequence[Peer],
+    open_calls: dict[Peer, int],
+    now_s: float,
+    ended: dict[Peer, int] | None = None,
+    acknowledged: dict[Peer, int] | None = None,
+) -> dict[Peer, str]:
+    """The connections that a ledger closes, without answers if nothing else is said."""
+    traffic = {peer: Traffic(count, (acknowledged or {}).get(peer, 0)) for peer, count in received.items()}
+    return ledger.look(traffic, CallsSince(frozenset(asked), ended or {}, open_calls), now_s)
+
+
 def test_a_connection_may_receive_one_request_and_the_slack() -> None:
     ledger = Ledger(LIMITS)
-    assert ledger.look({A: 1100}, (), {}, 0.0) == {}
-    assert list(ledger.look({A: 1101}, (), {}, 0.0)) == [A]
+    assert look(ledger, {A: 1100}, (), {}, 0.0) == {}
+    assert list(look(ledger, {A: 1101}, (), {}, 0.0)) == [A]
 
 
 def test_a_request_explains_what_came_before() -> None:
     ledger = Ledger(LIMITS)
-    assert ledger.look({A: 900}, (), {}, 0.0) == {}
-    assert ledger.look({A: 90_000}, [A], {}, 1.0) == {}
-    assert ledger.look({A: 91_100}, (), {}, 1.0) == {}
-    assert list(ledger.look({A: 91_101}, (), {}, 1.0)) == [A]
+    assert look(ledger, {A: 900}, (), {}, 0.0) == {}
+    assert look(ledger, {A: 90_000}, [A], {}, 1.0) == {}
+    assert look(ledger, {A: 91_100}, (), {}, 1.0) == {}
+    assert list(look(ledger, {A: 91_101}, (), {}, 1.0)) == [A]
 
 
 def test_each_open_call_may_have_a_request_on_its_way() -> None:
     ledger = Ledger(LIMITS)
-    assert ledger.look({A: 2100}, (), {A: 1}, 0.0) == {}
-    assert list(ledger.look({A: 2101}, (), {A: 1}, 0.0)) == [A]
+    assert look(ledger, {A: 2100}, (), {A: 1}, 0.0) == {}
+    assert list(look(ledger, {A: 2101}, (), {A: 1}, 0.0)) == [A]
 
 
 def test_pings_of_a_long_watch_are_forgotten() -> None:
     ledger = Ledger(LIMITS)
     for second in range(1000):
-        assert ledger.look({A: second * 10}, (), {A: 1}, float(second)) == {}
+        assert look(ledger, {A: second * 10}, (), {A: 1}, float(second)) == {}
 
 
 def test_after_a_flood_other_new_connections_of_its_host_get_the_slack_alone() -> None:
     ledger = Ledger(LIMITS)
-    assert list(ledger.look({B: 5000}, (), {}, 0.0)) == [B]
+    assert list(look(ledger, {B: 5000}, (), {}, 0.0)) == [B]
     assert ledger.is_alert
-    assert list(ledger.look({A: 1000, C: 101}, (), {}, 1.0)) == [C]
+    assert list(look(ledger, {A: 1000, C: 101}, (), {}, 1.0)) == [C]
     # One with a request is judged as before, and so is the host after a while.
-    assert ledger.look({A: 1000, C: 50}, [C], {}, 2.0) == {}
-    assert ledger.look({A: 1000, C: 1050}, (), {}, 2.0) == {}
+    assert look(ledger, {A: 1000, C: 50}, [C], {}, 2.0) == {}
+    assert look(ledger, {A: 1000, C: 1050}, (), {}, 2.0) == {}
     # The second flood has renewed the suspicion.
-    assert ledger.look({}, (), {}, 61.5) == {}
+    assert look(ledger, {}, (), {}, 61.5) == {}
     assert not ledger.is_alert
-    assert ledger.look({B: 1000}, (), {}, 62.0) == {}
+    assert look(ledger, {B: 1000}, (), {}, 62.0) == {}
 
 
 def test_connections_together_are_bounded_and_the_worst_goes_first() -> None:
     ledger = Ledger(LIMITS)
     received = {("10.0.0.3", port): 1000 for port in range(3)} | {A: 1050}
-    assert next(iter(ledger.look(received, (), {}, 0.0))) == A
-    assert len(ledger.look({("10.0.0.4", port): 100 for port in range(6)}, (), {}, 0.0)) == 0
+    assert next(iter(look(ledger, received, (), {}, 0.0))) == A
+    assert len(look(ledger, {("10.0.0.4", port): 100 for port in range(6)}, (), {}, 0.0)) == 0
 
 
 def test_a_connection_without_a_request_is_closed_in_time_unless_a_call_is_open() -> None:
     ledger = Ledger(LIMITS)
-    assert ledger.look({A: 50, B: 50, C: 50}, [B], {C: 1}, 0.0) == {}
-    assert ledger.look({A: 50, B: 50, C: 50}, (), {C: 1}, 29.9) == {}
-    assert ledger.look({A: 50, B: 50, C: 50}, (), {C: 1}, 30.0) == {A: "no request arrives on it"}
+    assert look(ledger, {A: 50, B: 50, C: 50}, [B], {C: 1}, 0.0) == {}
+    assert look(ledger, {A: 50, B: 50, C: 50}, (), {C: 1}, 29.9) == {}
+    assert look(ledger, {A: 50, B: 50, C: 50}, (), {C: 1}, 30.0) == {A: "no request arrives on it"}
 
 
 def test_too_many_connections_cost_the_host_with_the_most_those_that_are_not_used() -> None:
@@ -88,10 +113,56 @@ def test_too_many_connections_cost_the_host_with_the_most_those_that_are_not_use
     many = [("10.0.0.9", port) for port in range(7)]
     received = dict.fromkeys([A, *many], 10)
     # Six may stay: the first of the many has an open call, the second had a request.
-    ledger.look({A: 10, many[0]: 10, many[1]: 10}, [many[1]], {many[0]: 1}, 0.0)
-    closed = ledger.look(received, (), {many[0]: 1}, 1.0)
+    look(ledger, {A: 10, many[0]: 10, many[1]: 10}, [many[1]], {many[0]: 1}, 0.0)
+    closed = look(ledger, received, (), {many[0]: 1}, 1.0)
     assert len(closed) == 2
     assert set(closed) <= set(many[2:])
+
+
+KIB = 2**10
+REFUSED = 64 * KIB
+"""Bytes that arrive of a request that is refused for its size, as measured."""
+
+ANSWER = 85
+"""Bytes of the refusal, as measured."""
+
+
+def test_requests_that_are_refused_with_an_answer_are_no_flood() -> None:
+    ledger = Ledger(ConnectionLimits(request_bytes=100 * KIB, slack_bytes=KIB))
+    for count in range(1, 1000):
+        received = {A: count * REFUSED}
+        # The answer arrives a look after the request, as on a slow line.
+        assert look(ledger, received, (), {}, 0.0, {A: 1}, {A: (count - 1) * ANSWER}) == {}
+        assert look(ledger, received, (), {}, 0.0, {}, {A: count * ANSWER}) == {}
+
+
+def test_calls_that_are_reset_and_not_answered_stay_a_flood() -> None:
+    ledger = Ledger(LIMITS)
+    assert look(ledger, {A: 500}, (), {}, 0.0, {A: 3}) == {}
+    assert list(look(ledger, {A: 1101}, (), {}, 0.0, {A: 7})) == [A]
+
+
+def test_calls_that_are_reset_by_the_thousand_are_a_flood_however_few_bytes_they_take() -> None:
+    ledger = Ledger(ConnectionLimits(resets=1000))
+    assert look(ledger, {A: 500, B: 500}, (), {A: 900}, 0.0, {A: 600, B: 600}) == {}
+    # A request shows that the connection is used; answers, that the server has ended the calls.
+    assert look(ledger, {A: 900, B: 900}, [B], {A: 900}, 1.0, {A: 400, B: 600}) == {}
+    assert look(ledger, {A: 900, B: 900, C: 900}, (), {}, 1.0, {B: 1000, C: 5000}, {C: 5000 * ANSWER}) == {}
+    closed = look(ledger, {A: 901, B: 901, C: 901}, (), {A: 900}, 1.0, {A: 1}, {C: 5000 * ANSWER})
+    assert closed == {A: "its calls are reset before their requests"}
+
+
+def test_some_answers_explain_as_much_as_their_calls_can_bring() -> None:
+    ledger = Ledger(LIMITS)
+    # Ten have ended, two of them with an answer.
+    assert look(ledger, {A: 2 * 96 * KIB + 1100}, (), {}, 0.0, {A: 10}, {A: 2 * 50}) == {}
+    assert list(look(ledger, {A: 2 * 96 * KIB + 1101}, (), {}, 0.0, {}, {A: 2 * 50})) == [A]
+
+
+def test_what_is_sent_explains_nothing_without_calls() -> None:
+    ledger = Ledger(LIMITS)
+    # Pings, for example, are answered as well.
+    assert list(look(ledger, {A: 1101}, (), {}, 0.0, {}, {A: 1101})) == [A]
 
 
 @pytest.mark.parametrize(
@@ -108,28 +179,37 @@ def test_the_other_end_in_the_words_of_grpc(text: str, expected: Any) -> None:
     assert peer_of(text) == expected
 
 
-PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
-CONTINUATION = bytes([0, 0x40, 0, 9, 0, 0, 0, 0, 1]) + b"v" * 0x4000
-# Header `x` with a value of 2 GB, of a stream whose header block does not end.
-HEADERS = bytes([0, 0, 9, 1, 0, 0, 0, 0, 1]) + b"\x00\x01x\x7f\x80\xff\xff\xff\x07"
-MOST_BYTES = 256 * 2**20
+LARGEST_BYTES = 128 * KIB
 
 
 async def answer(request: bytes, context: Any) -> bytes:
     return request
 
 
+class Outermost(Layer):
+    """Layer whose handlers are coroutines, which gRPC recognizes."""
+
+    def wrap(self, inner: Any, method: str) -> Any:
+        behaviour = behaviour_of(inner)
+
+        async def awaited(request: Any, context: Any) -> Any:
+            return await behaviour(request, context)
+
+        return with_behaviour(inner, awaited)
+
+
 @asynccontextmanager
-async def watched_server(arrivals: Arrivals) -> AsyncIterator[tuple[grpc.aio.Channel, int]]:
-    """A server with the layer, a channel to it, and its port."""
+async def watched_server(arrivals: Arrivals, *outer: Layer) -> AsyncIterator[tuple[grpc.aio.Channel, int]]:
+    """A server with the layer, a channel to it, and its port; other layers are outside of the wait for requests."""
     ports: list[int] = []
 
     def listen(server: grpc.aio.Server) -> None:
         ports.append(server.add_insecure_port("127.0.0.1:0"))
 
-    layers = Layers(RequestTimeouts(PATIENCE_S), arrivals)
+    layers = Layers(*outer, RequestTimeouts(PATIENCE_S), arrivals)
+    options = [("grpc.max_receive_message_length", LARGEST_BYTES), ("grpc.http2.bdp_probe", 0)]
     async with (
-        small_server(interceptors=[layers], unary=answer, setup=listen),
+        small_server(interceptors=[layers], unary=answer, setup=listen, options=options),
         grpc.aio.insecure_channel(f"127.0.0.1:{ports[0]}") as channel,
     ):
         yield channel, ports[0]
@@ -142,7 +222,7 @@ def test_an_endless_header_block_is_cut_off_and_other_callers_are_answered() -> 
         async with watched_server(arrivals) as (channel, port):
             assert (await call(channel, b"before")).answer == b"before"
             watch = ConnectionWatch(port, ConnectionLimits(request_bytes=2**20), arrivals)
-            sent = await asyncio.to_thread(_flood, port, watch)
+            sent = await asyncio.to_thread(endless_headers, port, watch.look)
             assert sent < MOST_BYTES
             # Until gRPC has noticed, it may be counted again.
             assert sum(watch.closed.values()) >= 1
@@ -151,19 +231,66 @@ def test_an_endless_header_block_is_cut_off_and_other_callers_are_answered() -> 
     asyncio.run(flooded())
 
 
-def _flood(port: int, watch: ConnectionWatch) -> int:
-    """Send an endless header block until it is cut off; return the bytes that were sent."""
-    sent = 0
-    with socket.create_connection(("127.0.0.1", port)) as line:
-        line.sendall(PREFACE + HEADERS)
-        try:
-            while sent < MOST_BYTES:
-                line.sendall(CONTINUATION * 16)
-                sent += 16 * len(CONTINUATION)
-                watch.look()
-        except OSError:
-            pass
-    return sent
+@needs_counts
+def test_requests_that_are_too_large_are_refused_each_and_their_connection_stays() -> None:
+    async def refused() -> None:
+        arrivals = Arrivals()
+        async with watched_server(arrivals, Outermost(), CallsByConnection(arrivals)) as (channel, port):
+            limits = ConnectionLimits(request_bytes=LARGEST_BYTES, slack_bytes=KIB)
+            watch = ConnectionWatch(port, limits, arrivals)
+            for _ in range(8):
+                ended = await call(channel, bytes(4 * LARGEST_BYTES))
+                assert ended.code is grpc.StatusCode.RESOURCE_EXHAUSTED
+                await asyncio.to_thread(watch.look)
+            assert not watch.closed
+
+    asyncio.run(refused())
+
+
+@needs_counts
+def test_calls_that_are_reset_at_once_are_cut_off() -> None:
+    async def flooded() -> None:
+        arrivals = Arrivals()
+        async with watched_server(arrivals, Outermost(), CallsByConnection(arrivals)) as (_, port):
+            watch = ConnectionWatch(port, ConnectionLimits(resets=500), arrivals)
+            with watch:
+                assert await asyncio.to_thread(resets, port, f"/{SERVICE}/Unary", lambda: None) < MOST_BYTES
+            assert sum(watch.closed.values()) >= 1
+
+    asyncio.run(flooded())
+
+
+@needs_counts
+def test_each_request_of_a_stream_counts_and_not_its_beginning() -> None:
+    async def counted() -> None:
+        arrivals, told = Arrivals(), asyncio.Queue[str]()
+
+        async def stream(requests: AsyncIterator[bytes], context: Any) -> AsyncIterator[bytes]:
+            async for request in requests:
+                yield request
+
+        handler: Any = grpc.stream_stream_rpc_method_handler(stream)
+        noted = arrivals.wrap(handler, "/test.Service/Stream").stream_stream
+
+        class Context:
+            """Context of a call of one connection."""
+
+            def peer(self) -> str:
+                return "ipv4:10.0.0.1:1"
+
+        async def requests() -> AsyncIterator[bytes]:
+            while request := await told.get():
+                yield request.encode()
+
+        responses = noted(requests(), Context())
+        assert arrivals.take().asked == frozenset()
+        for word in ("one", "two"):
+            told.put_nowait(word)
+            assert await anext(responses) == word.encode()
+            assert arrivals.take().asked == {"ipv4:10.0.0.1:1"}
+            assert arrivals.take().asked == frozenset()
+
+    asyncio.run(counted())
 
 
 @needs_counts
@@ -172,13 +299,13 @@ def test_open_calls_keep_their_connection() -> None:
         arrivals = Arrivals()
         async with watched_server(arrivals) as (channel, port):
             await call(channel)
-            (peer,) = arrivals.take()[0]
+            (peer,) = arrivals.take().asked
             watch = ConnectionWatch(port, ConnectionLimits(connections=1), arrivals)
             arrivals.begun(peer)
             watch.look()
             assert not watch.closed
             arrivals.ended(peer)
-            assert arrivals.take() == (frozenset(), {})
+            assert arrivals.take() == CallsSince(ended={peer: 1})
             await asyncio.to_thread(watch.look)
             assert watch.closed
             # A call that is sent before its channel has seen the end fails; later ones get a new connection.

@@ -3,8 +3,8 @@
 Usage: run.py [NAME...]                       (all of them without an argument)
        run.py cif DIR [--against FILE]    (a folder of CIF models: see cif.py)
 
-Names: cold-start, conditions, editor, execution, gr1, language, synthesis; of the service: service-load, isolation; of
-the bridge: decoders, drive-bases, live-view, live-view-pixels, loop-period, maze, reaction,
+Names: cold-start, conditions, editor, execution, gr1, language, synthesis; of the service: service-load, isolation,
+task-cpu; of the bridge: decoders, drive-bases, live-view, live-view-pixels, loop-period, maze, reaction,
 endurance, shipped, twin.
 """
 
@@ -34,7 +34,7 @@ import execution
 import gr1
 import language
 import synthesis
-from service import isolation, load
+from service import isolation, load, task_cpu
 
 TABLES: dict[str, Callable[[], str]] = {
     "cold-start": cold_start.table,
@@ -55,6 +55,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "service-load": load.table,
     "shipped": shipped.table,
     "synthesis": synthesis.table,
+    "task-cpu": task_cpu.table,
     "twin": twin.table,
 }
 

@@ -47,7 +47,7 @@ def test_the_corpus_covers_what_it_is_for() -> None:
         assert word in text, word
 
 
-def test_differences_tell_what_and_where() -> None:
+def test_differences_say_what_and_where() -> None:
     run: list[dict[str, list[str]]] = [{"log": []}]
     was = {"findings": ["a", "b"], "controller": {"states": 3, "initial": {"A": True}}, "run": run}
     now = {"findings": ["b", "c"], "controller": {"states": 4, "initial": {"A": 1}}, "run": [*run, {"log": ["x"]}]}

@@ -34,7 +34,7 @@ def test_networkx_comes_only_with_the_program(program: str) -> None:
     assert done.returncode == 0, done.stderr
 
 
-def test_what_is_not_there_is_told() -> None:
+def test_what_is_not_there_is_reported() -> None:
     before = sys.modules.get("networkx")
     with pytest.raises(ImportError):
         load_dd("no_such_engine")

@@ -32,7 +32,7 @@ PROMISES = {
 
 
 @pytest.mark.parametrize("model", MODELS)
-def test_it_is_told_in_the_list(model: str) -> None:
+def test_it_is_reported_in_the_list(model: str) -> None:
     assert f"]({model})" in (EXAMPLES / "README.md").read_text(encoding="utf-8")
 
 

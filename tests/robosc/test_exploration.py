@@ -92,7 +92,7 @@ def test_beyond_the_limit_there_is_one_clear_error() -> None:
     assert isinstance(caught.value, RoboscError)
 
 
-def test_it_stops_when_told() -> None:
+def test_it_stops_on_request() -> None:
     with pytest.raises(SynthesisCancelled):
         explore(to_automata(ROBOT, Deployment.CONTROLLER), {}, ROBOT, should_stop=lambda: True)
 

@@ -278,17 +278,22 @@ def test_the_whole_graph_of_an_action_with_a_requirement() -> None:
     }
 
 
-@pytest.mark.parametrize("requirement", ["requirement go needs Door.open", "requirement !Door.open disables {go}"])
-def test_cancel_is_allowed_where_the_requirement_does_not_hold(requirement: str) -> None:
-    graph = _graph(HOUSE + requirement)
-    assert _where(graph, "go.request") == _places("open", "idle")
-    assert _where(graph, "go.cancel") == _places("closed", "executing")
-
-
-def test_cancel_of_disables_is_allowed_where_it_forbids() -> None:
-    graph = _graph(HOUSE + "requirement Door.open disables go")
-    assert _where(graph, "go.request") == _places("closed", "idle")
-    assert _where(graph, "go.cancel") == _places("open", "executing")
+@pytest.mark.parametrize(
+    ("requirement", "deployment", "requested", "cancelled"),
+    [
+        pytest.param("requirement go needs Door.open", CONTROLLER, "open", "closed", id="needs"),
+        pytest.param("requirement !Door.open disables {go}", CONTROLLER, "open", "closed", id="disables-negation"),
+        pytest.param("requirement Door.open disables go", CONTROLLER, "closed", "open", id="disables"),
+        pytest.param("", CONTROLLER, "open closed", "open closed", id="no-requirement"),
+        pytest.param("requirement go needs Door.open", LAYER, "open", "open closed", id="layer"),
+    ],
+)
+def test_cancel_is_allowed_where_the_requirement_does_not_hold(
+    requirement: str, deployment: Deployment, requested: str, cancelled: str
+) -> None:
+    graph = _graph(HOUSE + requirement, deployment)
+    assert _where(graph, "go.request") == _places(requested, "idle")
+    assert _where(graph, "go.cancel") == _places(cancelled, "executing")
 
 
 def test_cancel_of_several_is_allowed_where_one_of_them_does_not_hold() -> None:
@@ -296,10 +301,6 @@ def test_cancel_of_several_is_allowed_where_one_of_them_does_not_hold() -> None:
     assert _where(graph, "go.request") == _places("open", "idle", "off")
     everywhere, kept = _places("open closed", "executing"), _places("open", "executing", "off")
     assert _where(graph, "go.cancel") == everywhere - kept
-
-
-def test_cancel_without_requirements_is_free() -> None:
-    assert _where(_graph(HOUSE), "go.cancel") == _places("open closed", "executing")
 
 
 def test_cancel_of_unknown_requirements_is_allowed() -> None:
@@ -316,12 +317,6 @@ def test_cancel_of_unknown_requirements_is_allowed() -> None:
     """)
     assert _where(graph, "go.request") == {"c 1 idle"}
     assert _where(graph, "go.cancel") == {"c 0 executing"}
-
-
-def test_in_a_layer_cancel_can_always_happen() -> None:
-    graph = _graph(HOUSE + "requirement go needs Door.open", LAYER)
-    assert _where(graph, "go.request") == _places("open", "idle")
-    assert _where(graph, "go.cancel") == _places("open closed", "executing")
 
 
 def test_in_a_layer_a_cancel_that_leads_into_trouble_forbids_the_request() -> None:

@@ -1,4 +1,4 @@
-"""A service called like a component: whatever tells its location says which of both is meant, and is read back so."""
+"""A service called like a component: whatever prints its location says which of both is meant, and is read back so."""
 
 import json
 from pathlib import Path
@@ -88,8 +88,8 @@ def test_a_word_before_a_name_that_is_no_service() -> None:
 
 
 def test_the_conditions_of_the_supervisor(capsys: pytest.CaptureFixture[str], path: str, tmp_path: Path) -> None:
-    told = output(capsys, "synth", path)
-    assert "go.request not service Drive.waiting and not calm.waiting" in told
+    printed = output(capsys, "synth", path)
+    assert "go.request not service Drive.waiting and not calm.waiting" in printed
     document = json.loads(output(capsys, "synth", path, "--json"))
     assert document["summary"]["added"]["go.request"] == "not service Drive.waiting and not calm.waiting"
     assert main(["generate", path, "--target", "python", "-o", str(tmp_path / "out")]) == 0
@@ -105,9 +105,9 @@ def test_the_lines_of_a_diagram() -> None:
 
 
 def test_runs_of_properties(capsys: pytest.CaptureFixture[str], path: str) -> None:
-    told = output(capsys, "verify", path, "--property", "AG !service Drive.waiting")
-    assert "service Drive = idle" in told and "calm = idle" in told and "service calm" not in told
-    assert "Drive.request service Drive = waiting" in told
+    printed = output(capsys, "verify", path, "--property", "AG !service Drive.waiting")
+    assert "service Drive = idle" in printed and "calm = idle" in printed and "service calm" not in printed
+    assert "Drive.request service Drive = waiting" in printed
     # The rest of a verdict is a property again.
     document = json.loads(
         output(capsys, "verify", path, "--json", "--property", "EF (service Drive.waiting and EG !calm.failed)")
@@ -124,6 +124,6 @@ def test_tables_and_explanations(capsys: pytest.CaptureFixture[str], path: str) 
     state = json.loads(output(capsys, "explore", path, "--json"))["states"][0]
     assert state["communications"] == {"Drive": "idle", "calm": "idle"}
     assert state["components"] == {"Drive": "waiting", "Arm": "near"}
-    told = output(capsys, "explain-synthesis", path, "--event", "Drive", "--state", "service Drive.waiting")
-    assert "service Drive is waiting, where it has no transition on Drive.request" in told
-    assert "Drive is waiting" in told.replace("service Drive is waiting", "") or "Drive is idle" in told
+    printed = output(capsys, "explain-synthesis", path, "--event", "Drive", "--state", "service Drive.waiting")
+    assert "service Drive is waiting, where it has no transition on Drive.request" in printed
+    assert "Drive is waiting" in printed.replace("service Drive is waiting", "") or "Drive is idle" in printed

@@ -1,4 +1,4 @@
-"""A signature is of one file and one key; whatever else is beside it is told, and never believed."""
+"""A signature is of one file and one key; whatever else is beside it is reported, and never believed."""
 
 import stat
 import subprocess
@@ -47,7 +47,7 @@ def signed(tmp_path_factory: pytest.TempPathFactory) -> tuple[bytes, PublicKey]:
     return sign(DATA, read_private_key(private)), key
 
 
-def test_what_is_signed_is_taken_and_tells_by_whom(signed: tuple[bytes, PublicKey]) -> None:
+def test_what_is_signed_is_taken_and_names_the_signer(signed: tuple[bytes, PublicKey]) -> None:
     signature, key = signed
     assert signer(DATA, signature, [key]) is key
     assert str(key).startswith("ours (SHA256:")
@@ -89,7 +89,7 @@ def _flipped(data: bytes, place: int, bit: int) -> bytes:
 
 @settings(max_examples=examples(60), suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(signature=st.one_of(st.binary(max_size=300), st.text(max_size=300).map(str.encode)))
-def test_what_is_no_signature_is_told(signed: tuple[bytes, PublicKey], signature: bytes) -> None:
+def test_what_is_no_signature_is_reported(signed: tuple[bytes, PublicKey], signature: bytes) -> None:
     with pytest.raises(SignatureError, match=r"malformed|no public key"):
         signer(DATA, signature, [signed[1]])
 
@@ -156,7 +156,7 @@ def test_a_private_key_is_its_owners_alone_and_nothing_is_overwritten(tmp_path: 
 
 
 @pytest.mark.parametrize("content", ["", "nothing", KNOWN.replace("K2VwB", "K2VuB"), KNOWN[:60], KNOWN_PUBLIC])
-def test_what_is_no_private_key_is_told(content: str, tmp_path: Path) -> None:
+def test_what_is_no_private_key_is_reported(content: str, tmp_path: Path) -> None:
     file = tmp_path / "x.key"
     file.write_text(content)
     file.chmod(0o600)
@@ -171,7 +171,7 @@ def test_public_keys_may_have_comments_and_empty_lines_between_them() -> None:
 
 
 @pytest.mark.parametrize("text", ["", "# none", "ssh-ed25519", "ssh-ed25519 AAAA", RSA, KNOWN_PUBLIC[:-3], "äöü"])
-def test_what_is_no_public_key_is_told(text: str) -> None:
+def test_what_is_no_public_key_is_reported(text: str) -> None:
     with pytest.raises(SignatureError, match=r"^here: (there is )?no "):
         read_public_keys(text, "here")
 

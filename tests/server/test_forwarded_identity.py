@@ -10,7 +10,7 @@ from robosc_api.security import Scope, SecurityError, ServerSecurity, check_list
 from robosc_api.security.forwarded import forwarded_entry
 from robosc_server.operations.health_check import main as health
 from robosc_server.workers import WorkersError
-from robosc_server.workers.factory import check_cluster
+from robosc_server.workers.cluster_check import check_cluster
 from support.job_workers import StartedWorkers
 from support.service import served, status_of_list
 

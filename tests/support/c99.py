@@ -140,7 +140,7 @@ class Reference:
             executor._new_policy = lambda: Splitmix(seed)  # type: ignore[method-assign]
         words = settings_words(self.layout, settings)
         self.executor = executor
-        self._told(words)
+        self._note_command(words)
         return executor
 
     # The middleware.
@@ -226,16 +226,16 @@ class Reference:
 
     # Commands.
 
-    def tell(self, kind: str, *words: object) -> None:
+    def command(self, kind: str, *words: object) -> None:
         """Give the generated code, too, a command that the executor was given."""
-        self._told([kind, microseconds(self.clock.now_s), *words])
+        self._note_command([kind, microseconds(self.clock.now_s), *words])
 
     def let_fail(self, *names: str) -> None:
         """Let these callbacks fail from now on, and no others."""
         self.failing = set(names)
-        self._told(["x", sum(_FAILURES[name] for name in names)])
+        self._note_command(["x", sum(_FAILURES[name] for name in names)])
 
-    def _told(self, words: Sequence[object]) -> None:
+    def _note_command(self, words: Sequence[object]) -> None:
         self.commands.append(" ".join(map(str, words)))
         self.lines.append(self._state(0.0 if words[0] in ("n", "x") else None))
 
@@ -285,20 +285,20 @@ class Reference:
         match kind:
             case "start":
                 executor.start()
-                self._told(["s", now])
+                self._note_command(["s", now])
             case "tick":
                 executor.tick()
-                self._told(["t", now])
+                self._note_command(["t", now])
             case "watch":
                 executor.watch()
-                self._told(["w", now])
+                self._note_command(["w", now])
             case "stop":
                 is_fault = dice.random() < 0.5
                 executor.stop("test", is_fault)
-                self._told(["S", now, int(is_fault)])
+                self._note_command(["S", now, int(is_fault)])
             case "restart":
                 executor.restart()
-                self._told(["R", now])
+                self._note_command(["R", now])
             case "failing":
                 self.let_fail(*[name for name in _FAILURES if dice.random() < 0.15] if dice.random() < 0.4 else [])
             case "receive" if self.layout.received_topics:
@@ -308,7 +308,7 @@ class Reference:
             case "failed" if any(item.kind is CommunicationKind.SERVICE for item in self.model.communications):
                 number = self._some(self.calls)
                 executor.on_call_failed(number, "test")
-                self._told(["f", now, number])
+                self._note_command(["f", now, number])
             case "goal" if any(item.kind is CommunicationKind.ACTION for item in self.model.communications):
                 self._goal(now)
 
@@ -330,7 +330,7 @@ class Reference:
                 shared = float(datum)
             words += data_words(self.layout, type_, shared, is_root=True)
         self.executor.receive(identifier, datum)
-        self._told(words)
+        self._note_command(words)
 
     def _back(self, now: int, event: str) -> None:
         name, _, kind = event.rpartition(".")
@@ -347,7 +347,7 @@ class Reference:
             self.executor.on_feedback(number, datum)
         else:
             self.executor.on_goal_ended(number, "succeeded", datum)
-        self._told(words)
+        self._note_command(words)
 
     def _waiting(self, ids: dict[int, str], name: str) -> int:
         """A number that something comes back with."""
@@ -362,19 +362,19 @@ class Reference:
         match self.dice.randrange(4):
             case 0 | 1:
                 self.executor.on_goal_accepted(number)
-                self._told(["a", now, number])
+                self._note_command(["a", now, number])
             case 2:
                 self.executor.on_goal_ended(number, self.dice.choice(["rejected", "aborted", "cancelled", "lost"]))
-                self._told(["e", now, number])
+                self._note_command(["e", now, number])
             case _:
                 ended = self.dice.random() < 0.7
                 self.executor.on_cancel_refused(number, ended)
-                self._told(["c", now, number, int(ended)])
+                self._note_command(["c", now, number, int(ended)])
 
     # Data.
 
     def _datum(self, type_: Type) -> Any:
-        """Return a possible datum of a type, as far as C can tell it."""
+        """Return a possible datum of a type, as far as C can represent it."""
         dice = self.dice
         match type_:
             case EnumType():

@@ -99,7 +99,7 @@ class LayerReference(Reference):
     def _new(self, settings: Settings) -> Layer:  # type: ignore[override]
         executor = Layer(self.system, self, self, settings, self.clock, self)
         self.executor = executor
-        self._told(layer_settings_words(self.layout, executor.settings))
+        self._note_command(layer_settings_words(self.layout, executor.settings))
         return executor
 
     # Both sides.
@@ -107,7 +107,7 @@ class LayerReference(Reference):
     def let_fail(self, *names: str) -> None:
         """Let these callbacks fail from now on, and no others."""
         self.failing = set(names)
-        self._told(["x", sum(2 ** CALLBACKS.index(name) for name in names)])
+        self._note_command(["x", sum(2 ** CALLBACKS.index(name) for name in names)])
 
     def number(self, message: Any) -> int:
         """Return the number of a message: its last one."""
@@ -203,20 +203,20 @@ class LayerReference(Reference):
 
     def _start(self, now: int) -> None:
         self.executor.start()
-        self._told(["s", now])
+        self._note_command(["s", now])
 
     def _watch(self, now: int) -> None:
         self.dice.choice([self.executor.watch, self.executor.tick])()
-        self._told(["w", now])
+        self._note_command(["w", now])
 
     def _stop(self, now: int) -> None:
         is_fault = self.dice.random() < 0.5
         self.executor.stop("test", is_fault)
-        self._told(["S", now, int(is_fault)])
+        self._note_command(["S", now, int(is_fault)])
 
     def _restart(self, now: int) -> None:
         self.executor.restart()
-        self._told(["R", now])
+        self._note_command(["R", now])
 
     def _fail(self, now: int) -> None:
         dice = self.dice
@@ -225,7 +225,7 @@ class LayerReference(Reference):
     def _call_failed(self, now: int) -> None:
         number = self._some(self.calls)
         self.executor.on_call_failed(number, "test")
-        self._told(["f", now, number])
+        self._note_command(["f", now, number])
 
     def remember(self, message: Any) -> int:
         """The number of a new message."""
@@ -239,7 +239,7 @@ class LayerReference(Reference):
         place = list(self.layout.received_topics).index(identifier)
         number = self.remember(datum)
         self.executor.receive(identifier, datum)
-        self._told(["m", now, place, number, *words])
+        self._note_command(["m", now, place, number, *words])
 
     def _shared(self, types: list[Type], change: Callable[[Any], Any]) -> tuple[Any, list[object]]:
         """A datum of one of some types, changed, and how it is handed over as all of them."""
@@ -267,7 +267,7 @@ class LayerReference(Reference):
         words = [self.last_caller, *self._sent(item.name, message)]
         ask = self.executor.on_call if item.kind is CommunicationKind.SERVICE else self.executor.on_goal
         ask(item.name, self.last_caller, message)
-        self._told(["q", now, self._place(name), *words])
+        self._note_command(["q", now, self._place(name), *words])
 
     def send(self, identifier: str, now: int) -> None:
         """The caller sends a random message."""
@@ -278,7 +278,7 @@ class LayerReference(Reference):
         name = next(item.name for item in self.layout.requests if item.identifier == identifier)
         sent = self._sent(name, datum)
         self.executor.on_request(identifier, datum)
-        self._told(["q", now, self.topics.index(identifier), *sent, *words])
+        self._note_command(["q", now, self.topics.index(identifier), *sent, *words])
 
     def _sendable(self, datum: Any) -> Any:
         tame = self._tame(datum)
@@ -326,7 +326,7 @@ class LayerReference(Reference):
         if self.dice.random() < 0.8:
             caller = next((goal.goal_id for goal in own if goal.action == action), caller)
         self.executor.on_cancel(action, caller)
-        self._told(["q", now, self._place(f"cancel_{action}"), caller])
+        self._note_command(["q", now, self._place(f"cancel_{action}"), caller])
 
     def _open(self) -> list[str]:
         """Calls and goals that something may come back to."""
@@ -351,7 +351,7 @@ class LayerReference(Reference):
         match self.dice.randrange(5):
             case 0 | 1:
                 self.executor.on_goal_accepted(number)
-                self._told(["a", now, number])
+                self._note_command(["a", now, number])
             case 2 | 3:
                 own = self.executor._callers.goal(number)
                 is_cancelled = own is not None and own.is_cancelled and self.dice.random() < 0.8
@@ -360,14 +360,14 @@ class LayerReference(Reference):
             case _:
                 ended = self.dice.random() < 0.7
                 self.executor.on_cancel_refused(number, ended)
-                self._told(["c", now, number, int(ended)])
+                self._note_command(["c", now, number, int(ended)])
 
     def end(self, number: int, outcome: str) -> None:
         """A goal's server ends it, without success."""
         data = {"code": 1} if self.dice.random() < 0.5 else None
         token = -1 if data is None else self.remember(data)
         self.executor.on_goal_ended(number, outcome, data)
-        self._told(["e", microseconds(self.clock.now_s), number, int(outcome == "cancelled"), token])
+        self._note_command(["e", microseconds(self.clock.now_s), number, int(outcome == "cancelled"), token])
 
 
 compare_layer = partial(compare, reference_of=LayerReference)

@@ -8,7 +8,7 @@ from robosc.supervisor import Supervisor
 from robosc.targets.code.c.header import receive_head, reply_head
 from robosc.targets.code.c.layer import call_head, cancel_head, goal_head, request_head, request_parameters
 from robosc.targets.code.c.layout import Layout, event_data
-from support.c99_main import _TOP, BEGIN, LOG, _Program, batch_types, events_back
+from support.c99_main import _TOP, BEGIN, END, LOG, _Program, batch_types, events_back
 
 TOKENS = 4096
 """Messages are told apart by their address in an array of this length."""
@@ -102,19 +102,8 @@ static void do_new(void)
             @p@_goal_ended(&r, now_us, id, is_cancelled, read_message());
             break;
         }
-        case 'c': {
-            const uint32_t id = read_id();
-            @p@_cancel_refused(&r, now_us, id, read_integer() != 0);
-            break;
-        }
-#endif
-        default: printf("what?\\n"); return 1;
-        }
-        print_state(now_us);
-        fflush(stdout);
-    }
-}
 """
+    + END
 )
 
 

@@ -120,6 +120,21 @@ int main(void)
 """
 """Common part of the program: the last settings, and commands of either deployment."""
 
+END = """        case 'c': {
+            const uint32_t id = read_id();
+            @p@_cancel_refused(&r, now_us, id, read_integer() != 0);
+            break;
+        }
+#endif
+        default: printf("what?\\n"); return 1;
+        }
+        print_state(now_us);
+        fflush(stdout);
+    }
+}
+"""
+"""End of the program: the last command of either deployment, and what follows each."""
+
 _CALLBACKS = (
     LOG
     + """
@@ -214,19 +229,8 @@ static void do_new(void)
 #if @P@_ACTION_COUNT > 0
         case 'a': @p@_goal_accepted(&r, now_us, read_id()); break;
         case 'e': @p@_goal_ended(&r, now_us, read_id()); break;
-        case 'c': {
-            const uint32_t id = read_id();
-            @p@_cancel_refused(&r, now_us, id, read_integer() != 0);
-            break;
-        }
-#endif
-        default: printf("what?\\n"); return 1;
-        }
-        print_state(now_us);
-        fflush(stdout);
-    }
-}
 """
+    + END
 )
 
 

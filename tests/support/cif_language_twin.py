@@ -1,4 +1,4 @@
-"""A second reader of CIF: textX with the grammar `cif_language.tx` tells whether a text is one of the language."""
+"""A second reader of CIF: textX with the grammar `cif_language.tx` decides whether a text is one of the language."""
 
 import sys
 from functools import cache

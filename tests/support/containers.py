@@ -317,7 +317,7 @@ class Container:
         return self._outer.wait(limit_s)
 
     def stop(self, limit_s: float) -> int:
-        """Tell it to end, and wait; returns its exit status."""
+        """Ask it to end, and wait; returns its exit status."""
         first = self.pid
         os.kill(first, signal.SIGTERM)
         try:

@@ -262,7 +262,7 @@ def _silent_steps(system: _Watched, state: dict[Any, Any], held: Held) -> list[t
     for event in (*candidates, *system.description.resets, *system.description.taus):
         system._state = state
         if system.enabled(event):
-            # The class's own step is not told: this is only tried.
+            # The class's own step is not reported: this is only tried.
             assert InterpretedSystem.step(system, event) is not None
             target = dict(system._state)
             left = tuple(item for item in held if target[f"action {item[0]}", None] == "executing")

@@ -1,6 +1,6 @@
 """The corpus: models of the published language (language part A), each with what was once found to be its meaning.
 
-`tests/corpus` holds models and libraries `*.rscd`, beside each a recording `*.json`. A recording tells, one fact a
+`tests/corpus` holds models and libraries `*.rscd`, beside each a recording `*.json`. A recording has, one fact a
 line, the findings (not their wording), the systems with and without supervisor, and one run of the executor. Nothing
 here judges: `outcome` works out what a model means now, `differences` compares. A folder `<name>.libraries` beside a
 model is given to its run as a library path.
@@ -178,7 +178,7 @@ def _uncontrolled(system: System) -> tuple[int, int]:
 
 
 class Run:
-    """One executor, told what to do, that tells what came of it.
+    """One executor that obeys a script and reports what came of it.
 
     Attributes:
         open: Calls and goals that were sent and have not ended: communication to id.

@@ -142,7 +142,7 @@ class Scene:
             self.daemon.post(ResetDone())
 
     def exchange(self) -> None:
-        """Do what the drive base's thread does: the robot moves as it is told."""
+        """Do what the drive base's thread does: the robot moves as commanded."""
         output = self.safety.output(self.clock.monotonic())
         self.torque, self.out = output.is_torque_wanted, output.velocity
         self.heading_rad = math.remainder(self.heading_rad + self.out.angular_rad_s * PERIOD_S, math.tau)
@@ -182,7 +182,7 @@ class Scene:
 
 
 class Connected:
-    """A program that notes what it is told.
+    """A program that notes what it receives.
 
     Args:
         scene: Scene with the daemon that it is connected to.
@@ -198,7 +198,7 @@ class Connected:
         scene.daemon.post(Attached(self.program))
 
     def say(self, make: Callable[..., FromProgram], *arguments: Any) -> list[ToProgram]:
-        """Tell the daemon something: what the program is told in the same turn."""
+        """Send the daemon a message: what the program receives in the same turn."""
         self.scene.daemon.post(make(self.program, *arguments))
         return self.cycle()
 

@@ -32,8 +32,8 @@ class Demonstration:
         for line in self.child.stdout:
             if text in line:
                 return
-            assert time.monotonic() < end_s, f"{text!r} was not told in {self.limit_s:g} s"
-        raise AssertionError(f"it ended without telling {text!r}")
+            assert time.monotonic() < end_s, f"{text!r} was not printed in {self.limit_s:g} s"
+        raise AssertionError(f"it ended without printing {text!r}")
 
     def passes(self) -> str:
         """Wait until it has passed and left nothing, and return its output."""

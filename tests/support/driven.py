@@ -1,8 +1,8 @@
-"""A whole bridge that drives a simulated robot over serial lines, with what its wheels were told kept.
+"""A whole bridge that drives a simulated robot over serial lines, with the commands to its wheels kept.
 
 On a virtual host everything happens at its exact time, whatever else the computer does; on this computer, over real
 pseudo-terminals. The loop runs in a thread of its own, the devices' threads in theirs. What counts is what the
-simulated motors are told to do, when they hear it: neither the daemon's own word for it nor the test's look at it.
+simulated motors are commanded to do, when they hear it: neither the daemon's own word for it nor the test's look at it.
 """
 
 import logging
@@ -58,7 +58,7 @@ CHANNELS = """channels:
 
 
 class Recorded:
-    """A device, and what the wheels' motors were told to do whenever something was heard or happened by itself.
+    """A device, and what the wheels' motors were commanded to do whenever something was heard or happened by itself.
 
     Args:
         device: The real one.
@@ -96,7 +96,7 @@ class Recorded:
         self._device.plug_in()
 
     def look(self) -> None:
-        """Note what the motors are told now."""
+        """Note what the motors are commanded now."""
         with self._robot.time.lock:
             world = self._robot.world
             radius_m = world.body.wheel_radius_m
@@ -188,7 +188,7 @@ class Driven:
 
     def moves(self) -> None:
         """Wait until it moves."""
-        self.until(lambda: self.wheels_m_s != (0.0, 0.0), "the wheels to be told to turn")
+        self.until(lambda: self.wheels_m_s != (0.0, 0.0), "the wheels to be commanded to turn")
 
     def steady(self) -> None:
         """Wait until it moves with the velocity that is wanted: nothing changes any more."""
@@ -208,7 +208,7 @@ class Driven:
         with Lateness() if self.host is SYSTEM_HOST else nullcontext() as lateness:
             begin_s = self.robot.time.now_s()
             cause()
-            self.until(lambda: self._is_still(begin_s), "the wheels to be told to stop")
+            self.until(lambda: self._is_still(begin_s), "the wheels to be commanded to stop")
         self.trace.look()
         told = self.trace.told
         assert told[-1][1:] == (0.0, 0.0)
@@ -231,7 +231,7 @@ class Driven:
         assert all(wheels == [0.0, 0.0] for _, *wheels in self.trace.told[before:])
 
     def was_told(self, text: str) -> None:
-        """See that a person was told so, once; waits for it."""
+        """See that a person received this text, once; waits for it."""
         self.until(lambda: any(text in message for message in self.messages), f"the message {text!r}")
         found = [message for message in self.messages if text in message]
         assert len(found) == 1, found

@@ -89,14 +89,14 @@ def check(store: Store) -> None:
 
 
 def migrations_in(caplog: pytest.LogCaptureFixture) -> list[str]:
-    """Lines of the log that tell of a migration; they are cleared."""
+    """Lines of the log that report a migration; they are cleared."""
     found = [record.getMessage() for record in caplog.records if "is migrated from" in record.getMessage()]
     caplog.clear()
     return found
 
 
 def log_migrations(caplog: pytest.LogCaptureFixture) -> None:
-    """Have the log keep what tells of migrations."""
+    """Have the log keep what reports migrations."""
     caplog.set_level(logging.INFO, "robosc_server.store.migrate")
 
 

@@ -159,7 +159,7 @@ class Editor:
         return 0
 
     async def _ended(self) -> None:
-        """Wait for the end of the server, which has been told to."""
+        """Wait for the end of the server, which has been asked to."""
         status = await self._served
         await self.client.stop()  # type: ignore[no-untyped-call]
         self._writer.close()
@@ -217,7 +217,7 @@ class Editor:
         return lsp.TextDocumentIdentifier(self.uri(name))
 
     def save(self, name: str, text: str) -> None:
-        """Write a file, and tell of it as an editor does that watches files."""
+        """Write a file, and report it as an editor does that watches files."""
         path = self.folder / name
         kind = lsp.FileChangeType.Changed if path.exists() else lsp.FileChangeType.Created
         path.parent.mkdir(parents=True, exist_ok=True)
@@ -253,7 +253,7 @@ class Editor:
         self.send(name, [lsp.TextDocumentContentChangeWholeDocument(text)])
 
     def send(self, name: str, changes: list[lsp.TextDocumentContentChangeEvent]) -> None:
-        """Tell of changes."""
+        """Report changes."""
         self._versions[name] += 1
         document = lsp.VersionedTextDocumentIdentifier(self._versions[name], self.uri(name))
         self.client.text_document_did_change(lsp.DidChangeTextDocumentParams(document, changes))
@@ -285,10 +285,10 @@ class Editor:
         where = lsp.Range(self.position(text, at + begin), self.position(text, at + end))
         return lsp.Location(self.uri(name), where)
 
-    # What it is told
+    # What it receives
 
     def until(self, condition: Callable[[], bool]) -> None:
-        """Wait until the server has told something."""
+        """Wait until the server has sent something."""
 
         async def wait() -> None:
             while not condition():

@@ -25,9 +25,14 @@ def supervisor_of(
     return Supervisor(model, deployment, added, certificate)
 
 
+def unsupervised(text: str, deployment: Deployment = Deployment.CONTROLLER) -> Supervisor:
+    """A supervisor of a model's text for which synthesis adds nothing."""
+    return supervisor_of(model_of(text), deployment)
+
+
 def system_of(text: str, deployment: Deployment = Deployment.CONTROLLER) -> InterpretedSystem:
     """The interpreted system of a model's text."""
-    return InterpretedSystem(supervisor_of(model_of(text), deployment))
+    return InterpretedSystem(unsupervised(text, deployment))
 
 
 def example_system(name: str) -> InterpretedSystem:
@@ -36,7 +41,7 @@ def example_system(name: str) -> InterpretedSystem:
 
 
 class RecordingMiddleware:
-    """Remembers what it is asked for, in order, and fails where it is told to.
+    """Remembers what it is asked for, in order, and fails where the test says so.
 
     Attributes:
         sent: ("publish", communication, data), ("default", identifier), ("call", service, id, data),

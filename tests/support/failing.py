@@ -72,15 +72,15 @@ def _written(test: str, maker: str, seed: int | None, files: Callable[[], Files]
     place = folder / re.sub(r"\W+", "_", f"{test} {maker} {'' if seed is None else seed}").strip("_")
     shutil.rmtree(place, ignore_errors=True)
     place.mkdir(parents=True)
-    told = [f"What {maker}({'' if seed is None else seed}) made is in {place}:"]
+    report = [f"What {maker}({'' if seed is None else seed}) made is in {place}:"]
     for name, text in texts.items():
         # As it is, with its line ends; hostile texts may hold what is no character.
         (place / name).write_bytes(text.encode("utf-8", "backslashreplace"))
         lines = text.splitlines()
-        told += [f"--- {name}", *lines[:_LINES], *(["..."] if len(lines) > _LINES else [])]
+        report += [f"--- {name}", *lines[:_LINES], *(["..."] if len(lines) > _LINES else [])]
     is_model = any(name.endswith(".rscd") for name in texts)
-    told.append(_kept(place, tuple(texts)) if is_model else f"--- To keep it as a test, name {maker}({seed}) in one.")
-    return "\n".join(told)
+    report.append(_kept(place, tuple(texts)) if is_model else f"--- To keep it as a test, name {maker}({seed}) in one.")
+    return "\n".join(report)
 
 
 def _kept(place: Path, names: tuple[str, ...]) -> str:

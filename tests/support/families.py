@@ -189,7 +189,7 @@ def inspection_tree(count: int) -> System:
     """Machines in a binary tree, each of which takes a part of either machine below: its own is good if both are.
 
     Parts of the lowest machines are found to be good or bad; behind each machine a buffer, a requirement, knows what it
-    holds. A branch knows long before it tells what it will deliver one after the other.
+    holds. A branch knows long before it shows what it will deliver one after the other.
     """
     kinds = ("good", "bad")
     automata = []

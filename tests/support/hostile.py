@@ -94,7 +94,7 @@ def hostile_text(seed: int, canary: Path, *, is_on_ros: bool = False) -> str:
     low, middle, high = names.take(3)
     level, text, steps, size, flag, first, second = names.take(7)
     other, left, right = names.take(3)
-    good, told = ("^success", "^message") if is_on_ros else names.take(2)
+    good, text = ("^success", "^message") if is_on_ros else names.take(2)
     (robot,) = names.take(1)
     topics = ["/heard", "/number", "/say"]
     return f"""
@@ -103,7 +103,7 @@ robot {robot} {{ /* {comment} */
     constant {limit}: double = 0.5
     constant {words}: string = {texts[0]}
     interface {trigger} use Trigger from std_srvs
-    datatype object {thing} {{ {good}: boolean {told}: string }}
+    datatype object {thing} {{ {good}: boolean {text}: string }}
     datatype enum {kind} from string to {{
         value = {texts[1]} -> {low}
         value = {words} -> {middle}

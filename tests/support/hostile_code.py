@@ -51,7 +51,7 @@ def warm_up() -> None:
 
 
 def tried(line: str) -> str:
-    """Do what a line says, and tell how it went."""
+    """Do what a line says, and report how it went."""
     what, _, rest = line.partition(" ")
     if what == "descriptors":
         return " ".join(_descriptors())

@@ -1,4 +1,4 @@
-"""Real editors for tests, with nothing but what the manual tells to write into their files: Debian's Neovim and Emacs.
+"""Real editors for tests, with nothing but what the manual says to write into their files: Debian's Neovim and Emacs.
 
 Both are driven by keys, as by hands, and asked what they show. The language server is found as any program is.
 """
@@ -200,13 +200,13 @@ class Neovim:
                 is_there, _, _ = select.select([self.process.stdout], [], [], max(0.0, end_s - time.monotonic()))
                 assert is_there, f"no answer to {method}"
                 came = os.read(self.process.stdout.fileno(), 65536)
-                assert came, f"it has ended: {self._told()}"
+                assert came, f"it has ended: {self._log_text()}"
                 self._came += came
             else:
                 self._came = b""
                 return found
 
-    def _told(self) -> str:
+    def _log_text(self) -> str:
         self._log.seek(0)
         return self._log.read().decode()
 
@@ -222,7 +222,7 @@ class Emacs:
     def __init__(self, home: Home, file: Path) -> None:
         assert EMACS is not None
         home.write(".emacs.d/init.el", settings_of("Emacs", "elisp"))
-        # In a new home Emacs would translate all its packages into machine code first, and show what that tells.
+        # In a new home Emacs would translate all its packages into machine code first, and show the output of that.
         home.write(
             ".emacs.d/early-init.el",
             "(setq native-comp-deferred-compilation nil native-comp-jit-compilation nil"
@@ -277,15 +277,15 @@ class Emacs:
             "(with-current-buffer (window-buffer (selected-window)) (require 'json)"
             f" (base64-encode-string (encode-coding-string (json-encode {form}) 'utf-8) t))"
         )
-        told = subprocess.run(
+        reply = subprocess.run(
             ["emacsclient", "-s", self._socket, "--eval", encoded],
             env=self._home.variables,
             capture_output=True,
             timeout=LIMIT_S,
             check=False,
         )
-        assert told.returncode == 0, (told.stdout, told.stderr, self.seen[-2000:])
-        return json.loads(base64.b64decode(told.stdout.strip().strip(b'"')))
+        assert reply.returncode == 0, (reply.stdout, reply.stderr, self.seen[-2000:])
+        return json.loads(base64.b64decode(reply.stdout.strip().strip(b'"')))
 
     def type(self, keys: str) -> None:
         """Type keys, as a terminal sends them."""
@@ -317,7 +317,7 @@ class Emacs:
                                            (flymake-diagnostic-beg item) (flymake-diagnostic-end item))))
                                 (and (bound-and-true-p flymake-mode) (flymake-diagnostics))))"""
         )
-        return [(told, words) for told, words in found]
+        return [(reply, words) for reply, words in found]
 
     def go(self, words: str) -> None:
         """Put the cursor at the `|` of some words, which stand once in the text."""

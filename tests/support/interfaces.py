@@ -26,7 +26,7 @@ def compiled(folder: Path, target: Path) -> FileDescriptorSet:
     names = sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*.proto"))
     options = [f"-I{folder}", f"-I{WELL_KNOWN}", "--include_imports", "--include_source_info"]
     status = protoc.main(["protoc", *options, f"--descriptor_set_out={target}", *names])
-    assert status == 0, "protoc has told why on standard error"
+    assert status == 0, "protoc has said why on standard error"
     return FileDescriptorSet.FromString(target.read_bytes())
 
 

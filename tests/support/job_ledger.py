@@ -63,12 +63,12 @@ class StoredJob:
 
 @dataclass
 class Ledger:
-    """Fate of jobs, as three witnesses tell it.
+    """Fate of jobs, as three witnesses report it.
 
     Attributes:
-        accepted: Ids of accepted jobs by their idempotency keys, as callers were told.
-        results: Digests of the results by id, as callers were told.
-        failures: Reasons of failed jobs by id, as callers were told.
+        accepted: Ids of accepted jobs by their idempotency keys, as callers were answered.
+        results: Digests of the results by id, as callers were answered.
+        failures: Reasons of failed jobs by id, as callers were answered.
         expected: Digests of the right results by id.
         problems: Everything that is wrong, one sentence each.
     """
@@ -102,11 +102,11 @@ class Ledger:
             ("has a wrong result", wrong),
             ("was accepted and is lost", lost),
             ("was answered and is not stored", lost_answers),
-            ("has ended and its caller was never told", silent),
+            ("has ended and its caller was never answered", silent),
             ("has ended more than once", twice),
             ("has ended and no end was noted", unnoted),
             ("is stored and was never answered for", strange),
-            ("is stored with another end than its caller was told", contradicted),
+            ("is stored with another end than its caller was answered", contradicted),
         ):
             self.problems += [f"job {one} {words}" for one in found]
         unexpected = {reason: number for reason, number in failed.items() if reason not in GIVEN_UP}

@@ -1,6 +1,6 @@
 """Workers that do what the text of a task's main file says, in this process: one command a line.
 
-`log FILE` writes a line into a file; `until FILE` waits until there is one; `report N` tells N things; `fail REASON`;
+`log FILE` writes a line into a file; `until FILE` waits until there is one; `report N` reports N things; `fail REASON`;
 `big N` has a result of N bytes; `fault` raises; `spend S` takes S
 seconds of a processor's time; `lose` takes what starts workers with it. Without any of it, the result holds the text.
 """

@@ -95,7 +95,7 @@ class LayerTwin:
     """Expected behaviour of a layer.
 
     Attributes:
-        told: Everything that was reported to either side, in order; the caller's ends of one step come last, sorted.
+        reported: All that was reported to either side, in order; the caller's ends of one step come last, sorted.
         events: Every event that happened.
         unexpected: Number of replies that the model did not wait for, and of cancels of what has ended for the
             caller.
@@ -106,7 +106,7 @@ class LayerTwin:
         self.system = InterpretedSystem(supervisor)
         self.settings = settings
         self.now = 0.0
-        self.told: list[MessageReceived] = []
+        self.reported: list[MessageReceived] = []
         self.events: list[str] = []
         self.unexpected = 0
         self.calls: list[TwinCall] = []
@@ -173,13 +173,13 @@ class LayerTwin:
 
     def zero(self, identifier: str) -> None:
         self.acting.pop(identifier, None)
-        self.told.append(("default", identifier))
+        self.reported.append(("default", identifier))
 
     def cancel(self, goal: TwinGoal) -> None:
         goal.is_cancel_wanted = True
         if goal.is_accepted and not goal.is_cancel_sent:
             goal.is_cancel_sent = True
-            self.told.append(("cancel", goal.action, goal.number))
+            self.reported.append(("cancel", goal.action, goal.number))
 
     def rest(self) -> None:
         for identifier in self.settings["release_identifiers"]:
@@ -202,7 +202,7 @@ class LayerTwin:
             item = None
         blocked = ("blocked", identifier)
         if item is None or not self.allows(item.name, message):
-            self.told.append(blocked)
+            self.reported.append(blocked)
             return
         with self.guard():
             self.take(f"{item.name}.request")
@@ -211,7 +211,7 @@ class LayerTwin:
                 self.acting.pop(identifier, None)
                 if not is_zero(message):
                     self.acting[identifier] = Acting(item.name, [self.holds(item.name)])
-            self.told.append(("publish", item.name, message))
+            self.reported.append(("publish", item.name, message))
 
     def allows(self, name: str, message: Any) -> bool:
         is_open = any(goal.action == name for goal in self.goals)
@@ -220,18 +220,18 @@ class LayerTwin:
 
     def call(self, service: str, caller: Any, message: Any) -> None:
         if not self.allows(service, message):
-            self.told += [("no answer", service, caller), ("blocked", f"/{service}")]
+            self.reported += [("no answer", service, caller), ("blocked", f"/{service}")]
             return
         with self.guard():
             self.take(f"{service}.request")
             self.settle(service)
             self.last_call += 1
             self.calls.append(TwinCall(self.last_call, service, caller, self.now + self.settings["service_timeout_s"]))
-            self.told.append(("call", service, self.last_call, message))
+            self.reported.append(("call", service, self.last_call, message))
 
     def goal(self, action: str, caller: Any, message: Any) -> None:
         if not self.allows(action, message):
-            self.told += [("reject", action, caller), ("blocked", f"/{action}")]
+            self.reported += [("reject", action, caller), ("blocked", f"/{action}")]
             return
         with self.guard():
             self.take(f"{action}.request")
@@ -240,7 +240,7 @@ class LayerTwin:
             goal = TwinGoal(self.last_goal, action, caller, self.now + self.settings["action_timeout_s"])
             goal.history.append(self.system.requirements(action))
             self.goals.append(goal)
-            self.told += [("goal", action, goal.number, message), ("accept", action, caller)]
+            self.reported += [("goal", action, goal.number, message), ("accept", action, caller)]
 
     def cancelled_by_caller(self, goal: TwinGoal) -> None:
         if goal.has_ended_for_caller:
@@ -277,7 +277,7 @@ class LayerTwin:
             if is_fault:
                 raise Fault
         self.finish()
-        self.told.append(("pass", identifier, data))
+        self.reported.append(("pass", identifier, data))
 
     def reply(self, call: TwinCall, data: Any) -> None:
         self.calls.remove(call)
@@ -285,7 +285,7 @@ class LayerTwin:
             assert self.take(f"{call.service}.{'error' if data is None else 'response'}")
             self.settle()
         kind = ("no answer", call.service, call.caller) if data is None else ("answer", call.service, call.caller, data)
-        self.told.append(kind)
+        self.reported.append(kind)
         self.finish()
 
     def accept(self, goal: TwinGoal) -> None:
@@ -302,7 +302,7 @@ class LayerTwin:
             self.unexpected += 1
         # Also if this very feedback turns the goal against its requirements.
         if not goal.has_ended_for_caller:
-            self.told.append(("feedback", goal.action, goal.caller, data))
+            self.reported.append(("feedback", goal.action, goal.caller, data))
         self.finish()
 
     def end(self, goal: TwinGoal, outcome: str, data: Any) -> None:
@@ -315,8 +315,8 @@ class LayerTwin:
             self.unexpected += 1
         if not goal.has_ended_for_caller:
             as_it_is = outcome in ("succeeded", "cancelled") if goal.was_cancelled_by_caller else outcome == "succeeded"
-            told = outcome if as_it_is else "aborted"
-            self.told.append(("end", goal.action, goal.caller, told, data))
+            reported = outcome if as_it_is else "aborted"
+            self.reported.append(("end", goal.action, goal.caller, reported, data))
         self.finish()
 
     # Time and rest.
@@ -335,7 +335,7 @@ class LayerTwin:
         for call in [item for item in self.calls if self.now >= item.until]:
             self.calls.remove(call)
             assert self.take(f"{call.service}.error")
-            self.told.append(("no answer", call.service, call.caller))
+            self.reported.append(("no answer", call.service, call.caller))
             self.settle()
         for goal in sorted(self.goals, key=lambda item: self.actions.index(item.action)):
             if goal.runs_in_model and self.now >= goal.until:
@@ -358,7 +358,7 @@ class LayerTwin:
         self.reasons.clear()
         self.seen.clear()
         self.started = self.now
-        self.told += [("no answer", call.service, call.caller) for call in self.calls]
+        self.reported += [("no answer", call.service, call.caller) for call in self.calls]
         self.calls.clear()
         for goal in self.goals:
             goal.runs_in_model = False
@@ -372,4 +372,4 @@ class LayerTwin:
         for goal in self.goals:
             if not (goal.runs_in_model or goal.was_cancelled_by_caller or goal.has_ended_for_caller):
                 goal.has_ended_for_caller = True
-                self.told.append(("end", goal.action, goal.caller, "aborted", None))
+                self.reported.append(("end", goal.action, goal.caller, "aborted", None))

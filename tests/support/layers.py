@@ -1,4 +1,4 @@
-"""A supervision layer in a test: both its sides remember what they are told, in one list."""
+"""A supervision layer in a test: both its sides remember what they receive, in one list."""
 
 from collections.abc import Callable
 from typing import Any
@@ -15,7 +15,7 @@ from support.execution import Observed, RecordingMiddleware, Sent, system_of
 class BothSides(RecordingMiddleware):
     """The robot's and the caller's side of a layer.
 
-    What the robot's side is told stands in `sent` as in the base class; what the caller's side is told as
+    What the robot's side receives stands in `sent` as in the base class; what the caller's side receives as
     ("pass", identifier, message), ("blocked", identifier), ("answer", service, id, data), ("no answer", service, id),
     ("accept", action, id), ("reject", action, id), ("feedback", action, id, data), ("end", action, id, outcome, data).
     """
@@ -74,7 +74,7 @@ class LayerBench(Observed):
             self.executor.start()
 
     def during(self, act: Callable[..., None], *arguments: Any) -> list[Sent]:
-        """Let something happen: what both sides were told because of it."""
+        """Let something happen: what both sides received because of it."""
         before = len(self.middleware.sent)
         act(*arguments)
         return self.middleware.sent[before:]
@@ -108,7 +108,7 @@ class LayerBench(Observed):
         return self.during(self.executor.on_call_failed, number, "lost")
 
     def feedback(self, number: int, data: Any = None) -> list[Sent]:
-        """A server of the robot tells how far a goal is."""
+        """A server of the robot reports how far a goal is."""
         return self.during(self.executor.on_feedback, number, data)
 
     def end(self, number: int, outcome: str, data: Any = None) -> list[Sent]:

@@ -130,17 +130,17 @@ class LiveRobot:
         return event
 
     def take(self, event: str) -> None:
-        """Let an event happen, tell it and show the state after it."""
+        """Let an event happen, send it and show the state after it."""
         data = self._dice.randint(0, 3)
-        is_told = event.endswith((".response", ".feedback"))
-        self.system.step(event, self.system.read(event, data) if is_told else None)
+        has_data = event.endswith((".response", ".feedback"))
+        self.system.step(event, self.system.read(event, data) if has_data else None)
         self.feed.append(
             {
                 "time": time.time(),
                 "kind": "event",
                 "event": event,
                 "controllable": event.endswith((".request", ".reset", ".cancel")) or ".tau_" in event,
-                "data": data if is_told else None,
+                "data": data if has_data else None,
                 "state": self.system.state(),
                 "decision_us": 100.0,
             }

@@ -48,7 +48,7 @@ def unmet(lock: Lock, needs: Callable[[str], Iterable[str] | None]) -> Iterator[
 
     Args:
         lock: Of one kind of machine, this one.
-        needs: By the name of a package, its requirements as its metadata tells them.
+        needs: By the name of a package, its requirements as its metadata lists them.
     """
     for name, locked in lock.requirements.items():
         for need in map(Requirement, needs(name) or ()):

@@ -86,7 +86,7 @@ class MazeSolver:
             return
         self._goal_rad = None
         self._drive(0.0, 0.0)
-        # Only a scan of where it stands now tells what is to be done next.
+        # Only a scan of where it stands now shows what is to be done next.
         self._done_due_s = now_s + self.scan_s + self.latency_s + 2 * _STEP_S
 
     def _drive(self, linear_m_s: float, angular_rad_s: float) -> None:

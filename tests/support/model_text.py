@@ -187,7 +187,7 @@ _MARK = "__reserved"
 
 
 def _marked(expression: Expression) -> Expression:
-    """The expression, its names that are reserved words marked at their ends: afterwards nobody could tell them."""
+    """The expression, its names that are reserved words marked at their ends: afterwards nobody could know them."""
 
     def renamed(value: object, field: str = "") -> object:
         if isinstance(value, str):

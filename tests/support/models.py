@@ -50,6 +50,16 @@ EMPTY = """robot R {
     }
 }"""
 
+DOOR = """component Door {
+    incoming message open with type: none
+    incoming message shut with type: none
+    behaviour {
+        initial marked state closed { on request to open goto opened }
+        marked state opened { on request to shut goto closed }
+    }
+}"""
+"""A component that opens and shuts."""
+
 
 def bundle_of(text: str, **libraries: str) -> Bundle:
     """A bundle of a model's text and libraries by file name (without the ending), of which no file was looked for."""

@@ -59,7 +59,7 @@ def transition(text: str, guard: Expression | None = None, /, **updates: Express
 
 
 def variable(name: str, type_: Type = BooleanType(), initial: Value = False, is_synthesis: bool = True) -> Variable:  # noqa: B008  # a frozen value
-    """A synthesis variable, unless told otherwise."""
+    """A synthesis variable, unless given otherwise."""
     return Variable(name, type_, initial, is_synthesis)
 
 

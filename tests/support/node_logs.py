@@ -1,6 +1,6 @@
 """Compares the event log of a node with the reference executor: given what came, it must do the same.
 
-The log of a node tells every event with the state after it. What came (events of the environment, with their data) is
+The log of a node has every event with the state after it. What came (events of the environment, with their data) is
 taken from the log; all else (requests with their data, silent steps, states, stops, releases) must be what the
 reference executor does on the same.
 """
@@ -95,7 +95,7 @@ class Reference:
 
 
 def replayed(supervisor: Supervisor, entries: Iterable[Entry], settings: Settings = BY_EVENT) -> Reference:
-    """The reference executor after everything that came to a node, as the node's log tells it."""
+    """The reference executor after everything that came to a node, as the node's log has it."""
     reference = Reference(supervisor, settings)
     model, executor = supervisor.model, reference.executor
     last_of_batch = _last_of_batches(model)
@@ -136,7 +136,7 @@ def _answer(executor: Executor, kind: str, number: int, data: Any) -> None:
     if kind == EventKind.RESPONSE:
         executor.on_reply(number, data)
     else:
-        executor.on_call_failed(number, "as the log tells")
+        executor.on_call_failed(number, "as the log says")
 
 
 def _last_of_batches(model: Model) -> frozenset[str]:

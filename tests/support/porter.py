@@ -152,7 +152,7 @@ class Porter:
         return json.loads(self._states[-1].data)["current"][component]["state"] if self._states else None
 
     def variable(self, component: str, name: str) -> str | None:
-        """Its value, as the layer told it last; None if it has told nothing."""
+        """Its value, as the layer published it last; None if it has published nothing."""
         if not self._states:
             return None
         return str(json.loads(self._states[-1].data)["current"][component]["variables"][name])

@@ -52,7 +52,7 @@ class Promise:
         fault: Fault of a robot that moves.
         base: Driver of its drive base.
         by: Part that stops the wheels.
-        promised_s: Time within which they are told to stand still for good; None: they go on.
+        promised_s: Time within which they are commanded to stand still for good; None: they go on.
         prepare: Function that prepares the fault, and returns what lets it happen.
         number: Signal that is the fault where the bridge is a process; None: there it is as on a virtual host.
         sections: Sections of the configuration, as of `driven`.
@@ -70,7 +70,7 @@ class Promise:
 
 
 def measured_s(promise: Promise, chance: random.Random, host: VirtualHost | SystemHost | None = None) -> float:
-    """Let a fault happen at any time to a robot that moves; return the time until its wheels are told to stand still.
+    """Let a fault happen at any time to a robot that moves; return the time until its wheels are to stand still.
 
     Where nothing is to stop them, return the time for which they have gone on.
 
@@ -174,7 +174,7 @@ def _dies(bridge: Driven, _: ExitStack) -> Cause:
 
 
 def _is_held(bridge: Driven) -> None:
-    # The faster one: of a rover, no wheel is watched that is told less than 0.04 m/s.
+    # The faster one: of a rover, no wheel is watched that is commanded less than 0.04 m/s.
     bridge.robot.world.right.is_blocked = True
 
 

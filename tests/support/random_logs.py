@@ -290,7 +290,7 @@ def walked(supervisor: Supervisor, dice: Random, steps: int, data: Callable[[Ran
         if not is_known:
             continue
         system.step(event, reading)
-        told = {"data": provided if is_own else reading.data, "state": system.state()}
-        entry = {"time": float(number), "kind": "event", "event": event, "controllable": is_own, **told}
+        shown = {"data": provided if is_own else reading.data, "state": system.state()}
+        entry = {"time": float(number), "kind": "event", "event": event, "controllable": is_own, **shown}
         entries.append(json.loads(json_line(entry)))
     return entries

@@ -71,7 +71,7 @@ def wide_system(seed: int) -> System:
     marked states and on what plants can do and be, choices between edges of controllable events, an input variable,
     whole division.
     """
-    return _told("wide_system", seed, _of_seed(seed, is_wide=True))
+    return _kept("wide_system", seed, _of_seed(seed, is_wide=True))
 
 
 def systems() -> st.SearchStrategy[System]:
@@ -98,7 +98,7 @@ def any_system(seed: int) -> System:
 
     Takes a thirtieth of the time of `random_system`.
     """
-    return _told("any_system", seed, _Builder(Random(seed), is_wide=False).system())
+    return _kept("any_system", seed, _Builder(Random(seed), is_wide=False).system())
 
 
 def any_wide_systems() -> st.SearchStrategy[System]:
@@ -108,15 +108,15 @@ def any_wide_systems() -> st.SearchStrategy[System]:
 
 def any_wide_system(seed: int) -> System:
     """Return a system like `any_system`, with all that `wide_system` has."""
-    return _told("any_wide_system", seed, _Builder(Random(seed), is_wide=True).system())
+    return _kept("any_wide_system", seed, _Builder(Random(seed), is_wide=True).system())
 
 
 def random_system(seed: int) -> System:
     """The system of a seed: mostly the first of some candidates whose supervisor disables something."""
-    return _told("random_system", seed, _of_seed(seed, is_wide=False))
+    return _kept("random_system", seed, _of_seed(seed, is_wide=False))
 
 
-def _told(maker: str, seed: int, system: System) -> System:
+def _kept(maker: str, seed: int, system: System) -> System:
     """The system, kept for the case that the test fails; automata that are of no robot have no text but Python's."""
     made(maker, seed, lambda: {"system.py": f"{pformat(system, width=120)}\n"})
     return system

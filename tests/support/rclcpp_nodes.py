@@ -67,7 +67,7 @@ def missing(*packages: str) -> str | None:
 def compiled(
     supervisor: Supervisor, folder: Path, *options: str, state_message: StateMessage = StateMessage.BOTH
 ) -> Path:
-    """The program of a node, compiled without a warning; it can tell its state in either form unless it is to be JSON.
+    """The program of a node, compiled without a warning; it publishes its state in either form unless it is to be JSON.
 
     The form is that of the parameter file, which such a program is not given: JSON if no parameter says otherwise.
     """

@@ -1,4 +1,4 @@
-"""A client that knows nothing of a server but its address: what there is to call, and how, it is told by reflection."""
+"""A client that knows nothing of a server but its address: what there is to call, and how, it learns by reflection."""
 
 import json
 from collections.abc import Iterator

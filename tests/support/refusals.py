@@ -15,4 +15,4 @@ def reason_of(error: Any) -> str:
     for detail in status_pb2.Status.FromString(trailing[_DETAILS]).details:
         if detail.Unpack(info):
             return str(info.reason)
-    raise AssertionError(f"no reason is told: {error}")
+    raise AssertionError(f"no reason is given: {error}")

@@ -177,7 +177,7 @@ class FakeDaemon:
         return [order.command for order in self.orders]
 
     def program(self) -> Program:
-        """The first that was attached, after the turn in which that was told: a snapshot was shown at its end."""
+        """The first that was attached, after the turn in which that was sent: a snapshot was shown at its end."""
         return wait_until(lambda: self.told[0].program if self._turned else None)
 
     def of(self, kind: type[Any]) -> list[Any]:
@@ -237,15 +237,15 @@ class Attachment:
         self.call = stub.Attach(iter(self._requests.get, None))
 
     def send(self, **message: Any) -> None:
-        """Tell the bridge something."""
+        """Send the bridge a message."""
         self._requests.put(pb.AttachRequest(**message))
 
     def end(self) -> None:
-        """No more is told."""
+        """No more is sent."""
         self._requests.put(None)
 
     def receive(self) -> Any:
-        """The next thing that the bridge tells."""
+        """The next message of the bridge."""
         return next(self.call)
 
     def failure(self) -> tuple[grpc.StatusCode, str]:

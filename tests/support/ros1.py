@@ -119,7 +119,7 @@ class Master:
 
 
 class Peer:
-    """The other side of a node: a process of `ros1_peer`, told what to do.
+    """The other side of a node: a process of `ros1_peer`, which obeys orders.
 
     Args:
         master: Master that it talks to.
@@ -186,7 +186,7 @@ class Peer:
         return item
 
     def do(self, what: str, **arguments: Any) -> None:
-        """Tell it to do something."""
+        """Order it to do something."""
         assert self._process.stdin is not None
         self._process.stdin.write(json.dumps({"do": what, **arguments}) + "\n")
         self._process.stdin.flush()

@@ -1,6 +1,6 @@
 """An existing controller that knows of no supervision layer and cares for nothing: it drives, whatever happens.
 
-Run by Debian's Python. It says on standard output what it was told, one JSON document a line.
+Run by Debian's Python. It says on standard output what it received, one JSON document a line.
 """
 
 import json
@@ -23,24 +23,24 @@ PAUSE_S = 0.2
 _writing = threading.Lock()
 
 
-def tell(what: str, data: Any) -> None:
+def report(what: str, data: Any) -> None:
     with _writing:
         print(json.dumps([what, data]), flush=True)
 
 
 def ask() -> None:
-    """Ask again and again: what is told of the first request may be lost, since connections are new then."""
+    """Ask again and again: the answer to the first request may be lost, since connections are new then."""
     client = ActionClient("/count", TestAction)
     power = rospy.ServiceProxy("/power", SetBool)
     rospy.wait_for_service("/power")
     client.wait_for_server()
     for _ in range(TIMES):
-        tell("reply", power(True).success)
+        report("reply", power(True).success)
         ended = threading.Event()
 
         def changed(handle: Any, ended: threading.Event = ended) -> None:
             if handle.get_comm_state() == CommState.DONE:
-                tell("goal", handle.get_goal_status())
+                report("goal", handle.get_goal_status())
                 ended.set()
 
         handle = client.send_goal(TestGoal(goal=3), changed)
@@ -52,7 +52,7 @@ def ask() -> None:
 def main() -> None:
     rospy.init_node("careless")
     velocities = rospy.Publisher("cmd_vel", Twist, queue_size=10)
-    rospy.Subscriber("/scan", LaserScan, lambda scan: tell("scan", list(scan.ranges)))
+    rospy.Subscriber("/scan", LaserScan, lambda scan: report("scan", list(scan.ranges)))
     threading.Thread(target=ask, daemon=True).start()
     velocity = Twist()
     velocity.linear.x = SPEED

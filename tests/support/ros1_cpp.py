@@ -110,7 +110,7 @@ class Master(Process):
 
 
 class Peer:
-    """A rospy process that does as it is told and tells what it hears.
+    """A rospy process that obeys orders and reports what it hears.
 
     Args:
         master: Its master.

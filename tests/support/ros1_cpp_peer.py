@@ -1,6 +1,6 @@
 """The other side of a ROS 1 node under test. Run by the system's Python, which has rospy; JSON, a line each, both ways.
 
-It takes no orders from the node: what it publishes, answers and ends, the test tells it line by line.
+It takes no orders from the node: what it publishes, answers and ends, the test orders line by line.
 """
 
 import importlib
@@ -20,7 +20,7 @@ goals: dict[str, Any] = {}
 lock = threading.Lock()
 
 
-def tell(**entry: Any) -> None:
+def report(**entry: Any) -> None:
     with lock:
         sys.stdout.write(json.dumps(entry) + "\n")
         sys.stdout.flush()
@@ -47,7 +47,7 @@ def filled(message: Any, data: Any) -> Any:
 
 
 class Service:
-    """Answers as told, or not at all."""
+    """Answers as ordered, or not at all."""
 
     def __init__(self, name: str, kind: str) -> None:
         self.answer: Any = None
@@ -58,7 +58,7 @@ class Service:
         self.server = rospy.Service(name, service, self._take)
 
     def _take(self, request: Any) -> Any:
-        tell(kind="called", name=self._name, data=plain(request))
+        report(kind="called", name=self._name, data=plain(request))
         with self.may_answer:
             self.may_answer.wait_for(lambda: self.answer is not None)
             answer, self.answer = self.answer, None
@@ -68,24 +68,24 @@ class Service:
 
 
 class Action:
-    """Tells what comes; goals are accepted, rejected and ended as told. It may ignore them, or cancels."""
+    """Reports what comes; goals are accepted, rejected and ended as ordered. It may ignore them, or cancels."""
 
     def __init__(self, name: str, kind: str, unheard: str | None) -> None:
         self._name = name
         self.kind = kind
         self.server = ActionServer(name, type_of(kind + "Action", "msg"), self._take, self._cancel, auto_start=False)
         if unheard == "goal":
-            self.server.internal_goal_callback = lambda goal: tell(kind="goal", name=name)
+            self.server.internal_goal_callback = lambda goal: report(kind="goal", name=name)
         elif unheard == "cancel":
-            self.server.internal_cancel_callback = lambda goal: tell(kind="cancel", name=name)
+            self.server.internal_cancel_callback = lambda goal: report(kind="cancel", name=name)
         self.server.start()
 
     def _take(self, goal: Any) -> None:
         goals[self._name] = goal
-        tell(kind="goal", name=self._name, data=plain(goal.get_goal()))
+        report(kind="goal", name=self._name, data=plain(goal.get_goal()))
 
     def _cancel(self, goal: Any) -> None:
-        tell(kind="cancel", name=self._name)
+        report(kind="cancel", name=self._name)
 
 
 def execute(order: dict[str, Any]) -> None:
@@ -93,7 +93,7 @@ def execute(order: dict[str, Any]) -> None:
     if what == "subscribe":
         # Bound to the topic by a default: the callback is called later.
         def receive(message: Any, topic: Any = name) -> None:
-            tell(kind="message", name=topic, data=plain(message))
+            report(kind="message", name=topic, data=plain(message))
 
         rospy.Subscriber(name, type_of(order["type"], "msg"), receive, queue_size=1000, tcp_nodelay=True)
     elif what == "publish":
@@ -124,17 +124,17 @@ def execute(order: dict[str, Any]) -> None:
     elif what == "feedback":
         goals[name].publish_feedback(filled(type_of(actions[name].kind + "Feedback", "msg")(), order["data"]))
     else:
-        tell(kind="error", data="no order: " + what)
+        report(kind="error", data="no order: " + what)
 
 
 def main() -> None:
     rospy.init_node(sys.argv[1], disable_signals=True)
-    tell(kind="ready")
+    report(kind="ready")
     for line in sys.stdin:
         try:
             execute(json.loads(line))
         except Exception as error:
-            tell(kind="error", data=f"{line.strip()}: {error}")
+            report(kind="error", data=f"{line.strip()}: {error}")
 
 
 main()

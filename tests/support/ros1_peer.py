@@ -1,4 +1,4 @@
-"""The other side of a ROS 1 node under test: run by Debian's Python, it does what lines of JSON tell it and reports.
+"""The other side of a ROS 1 node under test: run by Debian's Python, it does what lines of JSON order and reports.
 
 Commands, by `do` (replies and reports are lines of JSON, too; `time` is seconds on the steady clock of the machine):
 

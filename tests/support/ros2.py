@@ -177,9 +177,9 @@ class Peer:
         next_repeat = time.monotonic()
         has_ended = False
         while not condition():
-            told = f"{what}\n{process.stderr if process else ''}"
+            description = f"{what}\n{process.stderr if process else ''}"
             assert time.monotonic() < deadline, (
-                f"the node ended before {told}" if has_ended else f"waited {limit_s} s in vain for {told}"
+                f"the node ended before {description}" if has_ended else f"waited {limit_s} s in vain for {description}"
             )
             if process is not None and not process.is_running and not has_ended:
                 has_ended = True
@@ -211,7 +211,7 @@ class Peer:
     def ask(self, client: Any, question: Any, limit_s: float, process: RosProcess | None = None) -> Any:
         """The answer to a question that may be asked again, and is: a server may lose the first answers.
 
-        It has nobody to give them to until it has found the client, which the client cannot tell.
+        It has nobody to give them to until it has found the client, which the client cannot see.
         """
         futures: list[Any] = []
         self.spin_until(

@@ -1,6 +1,6 @@
 """An existing controller that knows of no supervision layer and cares for nothing: it drives, whatever happens.
 
-It says on standard output what it was told, one JSON document a line.
+It says on standard output what it received, one JSON document a line.
 """
 
 import json
@@ -28,10 +28,10 @@ class Careless(Node):  # type: ignore[misc]  # rclpy has no types
         self._power = self.create_client(SetBool, "/power")
         self._count = ActionClient(self, Fibonacci, "/count")
         self._is_asked = False
-        self.create_subscription(LaserScan, "/scan", lambda scan: self._tell("scan", list(scan.ranges)), 10)
+        self.create_subscription(LaserScan, "/scan", lambda scan: self._report("scan", list(scan.ranges)), 10)
         self.create_timer(PERIOD_S, self._drive)
 
-    def _tell(self, what: str, data: Any) -> None:
+    def _report(self, what: str, data: Any) -> None:
         print(json.dumps([what, data]), flush=True)
 
     def _drive(self) -> None:
@@ -41,9 +41,9 @@ class Careless(Node):  # type: ignore[misc]  # rclpy has no types
         if not self._is_asked and self._power.service_is_ready() and self._count.server_is_ready():
             self._is_asked = True
             reply = self._power.call_async(SetBool.Request(data=True))
-            reply.add_done_callback(lambda done: self._tell("reply", done.result().success))
+            reply.add_done_callback(lambda done: self._report("reply", done.result().success))
             goal = self._count.send_goal_async(Fibonacci.Goal(order=3))
-            goal.add_done_callback(lambda done: self._tell("goal", done.result().accepted))
+            goal.add_done_callback(lambda done: self._report("goal", done.result().accepted))
 
 
 def main() -> None:

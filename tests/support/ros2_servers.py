@@ -97,7 +97,7 @@ class Gate:
 
 
 class HeldService:
-    """A service that answers a call when it is told to.
+    """A service that answers a call when the test says so.
 
     Args:
         host: Host that it runs on.
@@ -135,7 +135,7 @@ class End(Enum):
 
 
 class HeldAction:
-    """An action whose goals end when it is told to, or when they are cancelled.
+    """An action whose goals end when the test says so, or when they are cancelled.
 
     Args:
         host: Host that it runs on.
@@ -205,7 +205,7 @@ class HeldAction:
             gate.pause(0.005)
 
     def feedback(self, **fields: Any) -> None:
-        """Tell how far the last goal is."""
+        """Report how far the last goal is."""
         self.handles[-1].publish_feedback(self.action_class.Feedback(**fields))
 
     def is_last_over(self) -> bool:

@@ -9,9 +9,8 @@ import pytest
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import generate, write_files
-from support.models import model_of
+from support.execution import unsupervised
 from support.own_tests import own_tests
-from support.random_supervisors import CERTIFICATE
 
 HOSTILE_LAYER = r"""
 robot None {
@@ -36,7 +35,7 @@ robot None {
 
 def layer_of(text: str) -> Supervisor:
     """A layer to which synthesis adds nothing."""
-    return Supervisor(model_of(text), Deployment.LAYER, (), CERTIFICATE)
+    return unsupervised(text, Deployment.LAYER)
 
 
 def hostile_package(target: str, folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""A safety layer between a commander and wheels that do as they are told, on a clock that the test moves."""
+"""A safety layer between a commander and wheels that obey, on a clock that the test moves."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -70,9 +70,9 @@ class Bench:
             "loop": self.layer.loop_cycled,
             "operator": self.layer.operator_seen,
         }
-        for name, tell in facts.items():
+        for name, report in facts.items():
             if name not in self.silent:
-                tell(self.now_s)
+                report(self.now_s)
         if "command" not in self.silent:
             self.layer.command(self.wanted, self.now_s)
 

@@ -103,7 +103,7 @@ class SafetyTwin:
         return mean_v
 
     def _torque_story(self) -> tuple[bool, bool, list[tuple[tuple[float, float], DriveReading]]]:
-        """Tell whether the motors reported that they hold, whether they let go since, and what was read meanwhile."""
+        """Return whether the motors reported that they hold, whether they let go since, and what was read meanwhile."""
         began = [each for each in self.past if each.name in ("output", "drive", "pause")]
         for index in reversed(range(len(began))):
             if began[index].name == "output" and began[index].torque_since_s is None:

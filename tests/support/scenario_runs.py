@@ -1,7 +1,7 @@
 """The examples' scenarios on virtual time: a whole bridge, the bytes of its lines, and a robot in a scene.
 
 Where a scenario needs a camera, its pictures come on the same clock, and so does what a program beyond the remote
-endpoint tells.
+endpoint shows.
 """
 
 import math
@@ -124,8 +124,8 @@ class Companion:
     Args:
         run: Scenario that it belongs to.
         serves: Services and actions of the model that it answers.
-        identifier: Identifier on which it tells the person of each scan.
-        data: Function that returns what is told of a person, or of nobody.
+        identifier: Identifier on which it informs the person of each scan.
+        data: Function that returns what is reported of a person, or of nobody.
     """
 
     def __init__(
@@ -140,7 +140,7 @@ class Companion:
         run.host.thread(self._work, "companion").start()
 
     def say(self, item: FromProgram) -> None:
-        """Tell the bridge something."""
+        """Send the bridge a message."""
         self._run.machine.operations.post(item)
 
     def _work(self) -> None:

@@ -46,9 +46,10 @@ async def small_server(
     unary: Callable[..., Any] | None = None,
     stream: Callable[..., Any] | None = None,
     setup: Callable[[grpc.aio.Server], Any] = lambda server: None,
+    options: Sequence[tuple[str, int]] = (),
 ) -> AsyncIterator[tuple[grpc.aio.Channel, grpc.aio.Server]]:
     """A server with the methods `Unary` and `Stream` on bytes, and a channel to it."""
-    server = grpc.aio.server(interceptors=list(interceptors))
+    server = grpc.aio.server(interceptors=list(interceptors), options=list(options))
     handlers: dict[str, Any] = {}
     if unary is not None:
         handlers["Unary"] = grpc.unary_unary_rpc_method_handler(unary)

@@ -107,7 +107,7 @@ class SteppedTwin:
             if deployment is Deployment.CONTROLLER
             else Layer(system, self, _Careless(self), settings, clock, log)
         )
-        # What others do on what they were told; not while the executor is telling it.
+        # What others do with what they received; not while the executor is handing it over.
         self._waiting: deque[Callable[[], None]] = deque()
         self._turn: Turn | None = None
         self._goal: tuple[int, float, float] | None = None

@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
-DATA, HEADERS, SETTINGS, PING = 0, 1, 4, 6
+DATA, HEADERS, RST_STREAM, SETTINGS, PING = 0, 1, 3, 4, 6
 ACKNOWLEDGED, END_OF_STREAM, END_OF_HEADERS = 1, 1, 4
 
 _PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
@@ -33,9 +33,9 @@ class Stranger:
         # The thread that answers sends, too: a frame must not get into the middle of another one.
         self._sending = threading.Lock()
         self.line = socket.create_connection((host, int(port)), source_address=(source, 0))
-        told = b"".join(struct.pack(">HI", number, value) for number, value in (settings or {}).items())
+        payload = b"".join(struct.pack(">HI", number, value) for number, value in (settings or {}).items())
         # At once: a server may end a connection that has begun and says nothing.
-        self._send(_PREFACE + _frame(SETTINGS, 0, 0, told))
+        self._send(_PREFACE + frame(SETTINGS, 0, 0, payload))
         self.is_open = True
         self.frames: list[tuple[int, int, bytes]] = []
         self._thread = threading.Thread(target=self._answer)
@@ -43,7 +43,7 @@ class Stranger:
 
     def send(self, kind: int, flags: int, stream: int, content: bytes) -> None:
         """A frame; nobody takes it where the server has ended the connection."""
-        self._send(_frame(kind, flags, stream, content))
+        self._send(frame(kind, flags, stream, content))
 
     def call(
         self, stream: int, path: str, metadata: Mapping[str, str] | None = None, flags: int = END_OF_HEADERS
@@ -98,7 +98,8 @@ class Stranger:
         self.is_open = False
 
 
-def _frame(kind: int, flags: int, stream: int, content: bytes) -> bytes:
+def frame(kind: int, flags: int, stream: int, content: bytes) -> bytes:
+    """Return a frame of HTTP/2."""
     return struct.pack(">I", len(content))[1:] + struct.pack(">BBI", kind, flags, stream) + content
 
 

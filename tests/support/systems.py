@@ -48,7 +48,7 @@ def automaton(
     variables: Iterable[DiscreteVariable] = (),
     blocks: Iterable[str] = (),
 ) -> Automaton:
-    """An automaton; it starts where its first edge does, and all its locations are marked, unless told otherwise.
+    """An automaton; it starts where its first edge does, and all its locations are marked, unless given otherwise.
 
     Args:
         name: Its name.

@@ -32,7 +32,7 @@ class Node:
         return SimpleNamespace(publish=self.published.setdefault(topic, []).append)
 
     def get_clock(self) -> Any:
-        """A clock that tells one time."""
+        """A clock that shows one time."""
         return SimpleNamespace(now=lambda: SimpleNamespace(to_msg=lambda: "now"))
 
 

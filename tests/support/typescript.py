@@ -41,7 +41,7 @@ def compiled_client(folder: Path) -> Path:
             *_FILES,
         ]
     )
-    assert status == 0, "protoc has told why on standard error"
+    assert status == 0, "protoc has said why on standard error"
     ran = subprocess.run([compiler], cwd=folder, capture_output=True, text=True, timeout=240)
     assert ran.returncode == 0, ran.stdout + ran.stderr
     return folder / "built" / "client.js"

@@ -69,7 +69,7 @@ def definition(**changes: Any) -> Message:
         ("driving", "still", "halted.response", _DOWN),
         ("driving", "driving", "move.request", _UP),
     ]
-    told = {
+    message = {
         "type": "definition",
         "robot": "Carrier",
         "version": "0.1.0",
@@ -95,12 +95,12 @@ def definition(**changes: Any) -> Message:
         "log": None,
         "scene": None,
     }
-    return {**told, **changes}
+    return {**message, **changes}
 
 
 def update(**changes: Any) -> Message:
     """The robot while nothing is wrong."""
-    told = {
+    message = {
         "type": "update",
         "number": 1,
         "time_s": BEGIN_S,
@@ -123,7 +123,7 @@ def update(**changes: Any) -> Message:
         "drive": drive(0.5, 0.25, 0.6),
         "age_s": 0.01,
     }
-    return {**told, **changes}
+    return {**message, **changes}
 
 
 def drive(x_m: float, y_m: float, heading_rad: float) -> Message:
@@ -139,7 +139,7 @@ def drive(x_m: float, y_m: float, heading_rad: float) -> Message:
 
 def entry(number: int, **changes: Any) -> Message:
     """An event of the model, a hundredth of a second after the one before."""
-    told = {
+    message = {
         "number": number,
         "time_s": BEGIN_S + number / 100,
         "kind": "event",
@@ -148,7 +148,7 @@ def entry(number: int, **changes: Any) -> Message:
         "text": f"number {number}",
         "transitions": [],
     }
-    return {**told, **changes}
+    return {**message, **changes}
 
 
 def events(entries: Sequence[Mapping[str, Any]], lost: int = 0) -> Message:

@@ -39,14 +39,14 @@ def _in_words(value: Any) -> str:
 
 def wanted(components: Any, places: Any, enabled: list[str]) -> str:
     """Return the value that `SHOWN` is to have, as the browser writes it."""
-    told = {
+    shown = {
         name: {
             "state": part["state"],
             "variables": {variable: _in_words(value) for variable, value in part["variables"].items()},
         }
         for name, part in components.items()
     }
-    return json.dumps({"components": told, "places": places, "enabled": enabled}, separators=(",", ":"))
+    return json.dumps({"components": shown, "places": places, "enabled": enabled}, separators=(",", ":"))
 
 
 def shows(seen: Visit, state: str) -> None:

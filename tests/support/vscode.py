@@ -89,9 +89,9 @@ class VsCode:
         part.write_text(json.dumps({"step": step, "given": given}, default=str))
         part.rename(self._orders / f"order-{number}.json")
         self.until(answer.exists, f"no answer to {step}")
-        told = json.loads(answer.read_text())
-        assert "error" not in told, told["error"]
-        return told["value"]
+        reply = json.loads(answer.read_text())
+        assert "error" not in reply, reply["error"]
+        return reply["value"]
 
     def command(self, name: str, *given: Any) -> Any:
         """Run a command of the extension; files are given as paths."""
@@ -115,11 +115,11 @@ class VsCode:
 
     def seen(self) -> str:
         """Return the text that the window's pages show, and the processes of `robosc view`."""
-        told = []
+        texts = []
         for frame in self.page.frames:
             with contextlib.suppress(Error):  # It is gone.
-                told.append(f"{frame.url}\n{frame.locator('body').inner_text(timeout=1000)}")
-        return "\n".join([*told, f"processes: {self.views()}"])
+                texts.append(f"{frame.url}\n{frame.locator('body').inner_text(timeout=1000)}")
+        return "\n".join([*texts, f"processes: {self.views()}"])
 
     def live_view(self) -> Frame:
         """The page of the live view that a panel shows: there is one at a time."""

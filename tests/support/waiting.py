@@ -1,4 +1,4 @@
-"""Waiting for what tells nobody that it has happened; what does is waited for by its event.
+"""Waiting for what nobody reports; what does is waited for by its event.
 
 It is asked for often, and a limit is there for failing tests alone: nothing is decided by how long it takes.
 """

@@ -131,6 +131,7 @@ class DynamixelBase:
         bus = self._bus
         return BusCounters() if bus is None else bus.counters
 
+    # Each drive base with a bus has its own `attend` and `wake`: when it asks its source, only its line decides.
     def attend(self, source: VelocitySource) -> None:
         """Command newer velocities of this source from now on, also between the requests of an exchange."""
         self._source = source

@@ -1,7 +1,6 @@
 """Serial ports of this computer, by the most stable of their names."""
 
 import os
-from collections.abc import Sequence
 from pathlib import Path
 
 DEVICES = Path("/dev")
@@ -27,8 +26,3 @@ def stable_name(path: str, devices: Path = DEVICES) -> str:
             if os.path.realpath(name) == real:
                 return str(name)
     return path
-
-
-def is_among(path: str, ports: Sequence[str]) -> bool:
-    """Return True if a port is one of these, by whatever name."""
-    return os.path.realpath(path) in {os.path.realpath(port) for port in ports}

@@ -14,10 +14,12 @@ import grpc.aio
 from grpc_health.v1 import health, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection
 
+from robosc_api.connection_watch import Arrivals, CallsByConnection, ConnectionLimits, ConnectionWatch
 from robosc_api.layers import Layers
 from robosc_api.malformed import MalformedRequests
 from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts
 from robosc_api.security import Guard, SecurityError, ServerSecurity, TokenFile, add_port
+from robosc_api.security.addresses import split_address
 from robosc_bridge.configuration.structure import Configuration
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.served_endpoint import ServedEndpoint
@@ -49,6 +51,12 @@ REFLECTION_IDLE_S = 30.0
 
 PING_S, PING_LIMIT_S = 5.0, 3.0
 """After so long without a word a caller is asked whether it is there, and taken for gone if it does not answer."""
+
+UNASKED_BYTES = 16 * 2**20
+"""Bytes that all connections together may have received since their last requests: a robot has little memory."""
+
+_WATCH_SHARE = 0.002
+"""Share of a core for the watch over connections: the control loop runs beside it."""
 
 _HANDSHAKE_LIMIT_S = 3.0
 _GRACE_S = 0.5
@@ -125,8 +133,11 @@ class RemoteEndpoint(ServedEndpoint):
         )
         shutdown = ShutdownLayer()
         prompt = RequestTimeouts(REQUEST_LIMIT_S, dict.fromkeys(REFLECTION_METHODS, REFLECTION_IDLE_S))
-        # Whatever looks at a call sees it with its request.
-        layers = Layers(shutdown, prompt, guard, MalformedRequests(convert.SERVICE_NAME))
+        arrivals = Arrivals()
+        # Outside of the request timeouts: a call without a request is open, too.
+        layers = Layers(
+            shutdown, guard, CallsByConnection(arrivals), prompt, arrivals, MalformedRequests(convert.SERVICE_NAME)
+        )
         server = grpc.aio.server(interceptors=[layers], options=_options())
         service = BridgeService(self._operations, settings.operator_timeout_s)
         convert.add_service(service, server)  # type: ignore[no-untyped-call]  # generated
@@ -136,17 +147,30 @@ class RemoteEndpoint(ServedEndpoint):
         self.address = add_port(server, settings.address, security)
         await server.start()
         self._is_listening()
-        slots = ConnectionSlots(int(self.address.rpartition(":")[2]), MAXIMUM_CONNECTIONS)
+        port = split_address(self.address)[1]
+        slots = ConnectionSlots(port, MAXIMUM_CONNECTIONS)
         try:
-            while not self._end.is_set():
-                slots.poll()
-                with contextlib.suppress(TimeoutError):
-                    async with asyncio.timeout(_LOOK_S):
-                        await self._end.wait()
+            with _watch(port, arrivals):
+                while not self._end.is_set():
+                    slots.poll()
+                    with contextlib.suppress(TimeoutError):
+                        async with asyncio.timeout(_LOOK_S):
+                            await self._end.wait()
         finally:
             service.close()
             shutdown.close()
             await server.stop(_GRACE_S)
+
+
+def _watch(port: int, arrivals: Arrivals) -> ConnectionWatch:
+    """Return the watch over the connections, which delays no other thread of the bridge."""
+    limits = ConnectionLimits(
+        connections=MAXIMUM_CONNECTIONS,
+        request_bytes=MAXIMUM_REQUEST_BYTES,
+        unasked_bytes=UNASKED_BYTES,
+    )
+    # The control loop must not wait while the allocator returns memory.
+    return ConnectionWatch(port, limits, arrivals, share=_WATCH_SHARE, returns_memory=False)
 
 
 def _options() -> list[tuple[str, int]]:
@@ -169,6 +193,8 @@ def _options() -> list[tuple[str, int]]:
         ("grpc.http2.max_pings_without_data", 0),
         # Callers may ask as often.
         ("grpc.http2.min_ping_interval_without_data_ms", 1000),
+        # A probed window grows to megabytes, all of which could arrive of a message that is refused for its size.
+        ("grpc.http2.bdp_probe", 0),
     ]
 
 

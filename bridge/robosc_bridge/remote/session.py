@@ -1,7 +1,6 @@
 """A program's stream in both directions, at a rate that the loop can follow."""
 
 import asyncio
-import contextlib
 import logging
 import threading
 from collections import deque
@@ -10,6 +9,7 @@ from collections.abc import AsyncIterator, Awaitable, Callable
 from robosc_bridge.daemon.operations import Operations
 from robosc_bridge.daemon.programs.items import Attached, Detached, Program, ToProgram
 from robosc_bridge.remote import convert
+from robosc_bridge.remote.loop_call import LoopCall
 from robosc_bridge.remote.operator_presence import OperatorPresence
 
 _log = logging.getLogger(__name__)
@@ -55,15 +55,15 @@ class ProgramSession:
         self._operations = operations
         self._operator_timeout_s = operator_timeout_s
         self._is_operator = hello.is_operator
-        self._loop = asyncio.get_running_loop()
-        self._presence = OperatorPresence(self._loop.time)
+        self._presence = OperatorPresence(asyncio.get_running_loop().time)
+        # The control loop's thread tells what it has put.
+        self._put_call = LoopCall(self._called)
         self._news = asyncio.Event()
         self._overflow = asyncio.Event()
         # Filled by the loop's thread and this one.
         self._lock = threading.Lock()
         self._waiting: deque[ToProgram | str] = deque()
         self._waiting_bytes = 0
-        self._is_called = False
         self._is_full = False
         self._is_over = False
         self._taken = self._taken_bytes = 0
@@ -158,13 +158,9 @@ class ProgramSession:
             else:
                 self._waiting.append(item)
                 self._waiting_bytes += weight
-        if not self._is_called:
-            self._is_called = True
-            with contextlib.suppress(RuntimeError):  # The endpoint is closed.
-                self._loop.call_soon_threadsafe(self._called)
+        self._put_call.ask()
 
     def _called(self) -> None:
-        self._is_called = False
         if self._is_full:
             self._overflow.set()
         self._news.set()

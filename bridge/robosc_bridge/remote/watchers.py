@@ -11,6 +11,7 @@ from google.protobuf.struct_pb2 import Struct
 
 from robosc_bridge.daemon.feed import Feed, Subscription
 from robosc_bridge.remote import convert
+from robosc_bridge.remote.loop_call import LoopCall
 
 MAXIMUM_EVENTS = 1000
 """Events that wait for a watcher."""
@@ -76,17 +77,17 @@ class Watchers:
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
-        self._loop = asyncio.get_running_loop()
+        # The control loop's thread tells that there is something new.
+        self._news = LoopCall(self._hand_out)
         self._watchers: set[Watcher] = set()
         self._subscription: Subscription | None = None
-        self._is_called = False
 
     def join(self, *, with_events: bool) -> Watcher:
         """Add a watcher."""
         watcher = Watcher(with_events=with_events)
         self._watchers.add(watcher)
         if self._subscription is None:
-            self._subscription = self._feed.subscribe(self._call)
+            self._subscription = self._feed.subscribe(self._news.ask)
         return watcher
 
     def leave(self, watcher: Watcher) -> None:
@@ -101,16 +102,7 @@ class Watchers:
         for watcher in self._watchers:
             watcher.wake()
 
-    def _call(self) -> None:
-        """From the control loop's thread: let `_hand_out` be called soon, once."""
-        if not self._is_called:
-            self._is_called = True
-            with contextlib.suppress(RuntimeError):  # The endpoint is closed.
-                self._loop.call_soon_threadsafe(self._hand_out)
-
     def _hand_out(self) -> None:
-        # First, so that whatever comes from here on calls again.
-        self._is_called = False
         if self._subscription is None:
             return
         update = self._subscription.take()

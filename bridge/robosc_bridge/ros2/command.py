@@ -12,7 +12,7 @@ from typing import Any
 
 from robosc_api.security import credentials_of
 from robosc_bridge.ros2.frames import Frames, Place
-from robosc_bridge.terminal.commands import DONE, REFUSED, WRONG, add_connection_arguments
+from robosc_bridge.terminal.commands import DONE, REFUSED, WRONG, add_connection_arguments, run_alone
 
 NAME = "ros2"
 """Name of the command."""
@@ -85,11 +85,7 @@ def add_command(commands: Any) -> None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run only this command; returns the exit status."""
-    parser = argparse.ArgumentParser(prog="robosc-bridge", description=__doc__)
-    add_command(parser.add_subparsers(required=True, metavar="COMMAND"))
-    arguments = parser.parse_args(argv)
-    status: int = arguments.run(arguments)
-    return status
+    return run_alone(add_command, __doc__, argv)
 
 
 def _rate(text: str) -> float:

@@ -69,8 +69,19 @@ def add_commands(commands: Any) -> None:
 
 def main(argv: Sequence[str] | None = None) -> int:
     """Run one of these commands; returns the exit status."""
-    parser = argparse.ArgumentParser(prog="robosc-bridge", description=__doc__)
-    add_commands(parser.add_subparsers(required=True, metavar="COMMAND"))
+    return run_alone(add_commands, __doc__, argv)
+
+
+def run_alone(add: Callable[[Any], None], description: str | None, argv: Sequence[str] | None) -> int:
+    """Run commands without those of the daemon, which take longer to load; returns the exit status.
+
+    Args:
+        add: Function that adds them to subparsers of argparse.
+        description: Description of them all.
+        argv: Arguments; None: those of the program.
+    """
+    parser = argparse.ArgumentParser(prog="robosc-bridge", description=description)
+    add(parser.add_subparsers(required=True, metavar="COMMAND"))
     arguments = parser.parse_args(argv)
     status: int = arguments.run(arguments)
     return status

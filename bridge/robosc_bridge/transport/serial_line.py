@@ -144,6 +144,7 @@ class SerialLine(PolledLine):
             return error
         return LineLostError(self.path, f"the line is gone: {_words(error)}")
 
+    # As in `robosc_simulated.closing`: a driver and a simulated device share no code.
     def __enter__(self) -> Self:
         return self
 

@@ -193,6 +193,7 @@ def parser(prog: str, description: str) -> argparse.ArgumentParser:
         prog: The command.
         description: Description of what it does.
     """
+    # Options of the same names as for serial lines have other choices, defaults and words there.
     found = argparse.ArgumentParser(prog=prog, description=description)
     found.add_argument(
         "--scene",

@@ -226,13 +226,7 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
             parser.add_argument("--package", metavar="NAME", help="name of the generated package")
             add_initial_argument(parser)
         if name == "explore":
-            parser.add_argument(
-                "--limit",
-                type=number_up_to(MAXIMUM_LIMIT),
-                default=DEFAULT_LIMIT,
-                metavar="N",
-                help="give up beyond N states (default: %(default)s)",
-            )
+            _add_limit(parser, DEFAULT_LIMIT, "give up beyond N states")
         parser.add_argument("--label", type=_label, default="", metavar="TEXT", help="name of the job in lists")
         parser.add_argument(
             "--idempotency-key",
@@ -253,6 +247,16 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
         add_connection_arguments(parser, epilog=_SUBMIT_EPILOG)
 
 
+def _add_limit(parser: argparse.ArgumentParser, default: int, meaning: str) -> None:
+    parser.add_argument(
+        "--limit",
+        type=number_up_to(MAXIMUM_LIMIT),
+        default=default,
+        metavar="N",
+        help=f"{meaning} (default: %(default)s)",
+    )
+
+
 def _add_verify_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("supervisor", nargs="?", type=given_path, metavar="FILE.rsup", help="the supervisor to check")
     add_property_arguments(parser)
@@ -261,13 +265,7 @@ def _add_verify_arguments(parser: argparse.ArgumentParser) -> None:
         choices=[str(deployment) for deployment in Deployment],
         help="refuse a supervisor made for another deployment (default: as the file says; without a file: controller)",
     )
-    parser.add_argument(
-        "--limit",
-        type=number_up_to(MAXIMUM_LIMIT),
-        default=FOREIGN_STATES,
-        metavar="N",
-        help="verify up to N states of a supervisor file one by one (default: %(default)s)",
-    )
+    _add_limit(parser, FOREIGN_STATES, "verify up to N states of a supervisor file one by one")
     parser.add_argument("--strict", action="store_true", help="fail if maximal permissiveness could not be checked")
     add_engine_options(parser)
     # A server has no keys to check a file with.

@@ -8,6 +8,7 @@ from launch.actions import DeclareLaunchArgument
 from launch.substitutions import LaunchConfiguration
 from launch_ros.actions import Node
 
+# Each launch file here is whole, so that it can be copied for a robot of one's own.
 CONTROLLER = "maze_solver_controller"
 
 

@@ -12,6 +12,7 @@ from math import prod
 from robosc.automata.compile import compile_expression
 from robosc.automata.state import Subject
 from robosc.automata.structure import InputVariable
+from robosc.conditions.literals import merged
 from robosc.expressions import Expression, Received, StateTest, Value, VariableRead, leaves
 from robosc.targets.cif.numbers import Number, Term, number_text
 from robosc.targets.cif.subjects import Place, Reader, Source
@@ -91,7 +92,7 @@ class Table:
         for part, runs in result.branches:
             found.setdefault(self._where(part, wanted), []).extend(runs)
         return any_of(
-            all_of([self.reader.test(result.source, _merged(runs), self.place), text])
+            all_of([self.reader.test(result.source, merged(runs), self.place), text])
             for text, runs in found.items()
             if text != FALSE
         )
@@ -102,17 +103,6 @@ class Table:
         parts = [(runs, self._number(part)) for part, runs in result.branches]
         cases = [(self.reader.test(result.source, runs, self.place), text) for runs, text in parts[:-1]]
         return chosen(cases, parts[-1][1])
-
-
-def _merged(runs: list[range]) -> list[range]:
-    """The same indices in as few runs as possible."""
-    found: list[range] = []
-    for run in sorted(runs, key=lambda run: run.start):
-        if found and found[-1].stop == run.start:
-            found[-1] = range(found[-1].start, run.stop)
-        else:
-            found.append(run)
-    return found
 
 
 @dataclass(slots=True)

@@ -45,7 +45,7 @@ from robosc_server.store.factory import DATABASE_FILE, is_in_use
 from robosc_server.store.inspection import inspect_postgresql, inspect_sqlite
 from robosc_server.store.migrate import latest_version
 from robosc_server.workers import WorkersError
-from robosc_server.workers.factory import check_cluster
+from robosc_server.workers.cluster_check import check_cluster
 
 _CONNECT_S = 5.0
 _TRY_S = 20.0

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
-from robosc_api.connection_watch import Arrivals
+from robosc_api.connection_watch import Arrivals, is_health_check
 from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.security import ENTRY, caller_of, is_loopback_peer, network_of
 from robosc_server.tasks.task import Reason, RefusedError
@@ -17,7 +17,6 @@ their own."""
 HEALTH_CALLS_PER_CALLER = 50
 """Enough for probes, and for channels that watch their server."""
 
-_HEALTH = "/grpc.health."
 _RETRY_S = 1.0
 
 
@@ -56,9 +55,10 @@ class OpenCalls(Layer):
         super().__init__()
         self._identify = identify
         by_connection = arrivals or Arrivals()
-        self._slots, self._health_slots = _CallSlots(limits, by_connection), _CallSlots(health, by_connection)
+        self._slots = _CallSlots(limits, by_connection)
+        self._health_slots = _CallSlots(health, by_connection, are_checks=True)
         # For monitoring on this machine, which other hosts cannot crowd out.
-        self._own_health_slots = _CallSlots(health, by_connection)
+        self._own_health_slots = _CallSlots(health, by_connection, are_checks=True)
 
     @property
     def count(self) -> int:
@@ -81,18 +81,23 @@ class OpenCalls(Layer):
             slots.take(network_of(identify(context)), context)
             return behaviour(request, context)
 
-        return with_behaviour(inner, counted_health_check if method.startswith(_HEALTH) else counted)
+        return with_behaviour(inner, counted_health_check if is_health_check(method) else counted)
 
 
 class _CallSlots:
     """Places for the calls of some methods.
 
+    Args:
+        limits: Limits on the calls.
+        arrivals: Layer that is told of each call.
+        are_checks: True if the calls are health checks.
+
     Attributes:
         taken: Number of slots that are taken.
     """
 
-    def __init__(self, limits: CallLimits, arrivals: Arrivals) -> None:
-        self._limits, self._arrivals = limits, arrivals
+    def __init__(self, limits: CallLimits, arrivals: Arrivals, *, are_checks: bool = False) -> None:
+        self._limits, self._arrivals, self._are_checks = limits, arrivals, are_checks
         self._by_caller: dict[str, int] = {}
         self.taken = 0
 
@@ -106,25 +111,31 @@ class _CallSlots:
         Raises:
             RefusedError: There is no slot for this caller; none is taken.
         """
+        peer = context.peer()
         count = self._by_caller.get(caller, 0)
         entry = ENTRY.get()
         limit = self._limits.per_caller if entry is None or entry.quota.calls is None else entry.quota.calls
         if count >= limit:
+            self._refused(peer)
             message = f"the caller has reached its limit of {limit} open calls, watches included; try again later"
             raise RefusedError(Reason.QUOTA_EXCEEDED, message, _RETRY_S)
         if self.taken >= self._limits.calls:
+            self._refused(peer)
             raise RefusedError(
                 Reason.SERVER_BUSY, "the server has reached its limit of open calls; try again later", _RETRY_S
             )
         self._by_caller[caller] = count + 1
         self.taken += 1
         # When the call has ended for gRPC as well: an unread response keeps it open after the handler has returned.
-        peer = context.peer()
         self._arrivals.begun(peer)
         context.add_done_callback(partial(self._release, caller, peer))
 
+    def _refused(self, peer: str) -> None:
+        if not self._are_checks:
+            self._arrivals.refused(peer)
+
     def _release(self, caller: str, peer: str, context: Any) -> None:
-        self._arrivals.ended(peer)
+        self._arrivals.ended(peer, is_check=self._are_checks)
         self.taken -= 1
         left = self._by_caller[caller] - 1
         if left:

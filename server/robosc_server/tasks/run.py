@@ -41,8 +41,16 @@ from robosc_server.tasks.synthesis_attempt import OnReport, SynthesisAttempt
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
 from robosc_server.tasks.verify import DEFAULT_STATES, NoPropertyError, verification
 
+_WARM_UP_ROUNDS = 3
+
 _WARM_UP_MODEL = """
 robot Rehearsal {
+    interface twist use Twist from geometry_msgs
+    interface laser_scan use LaserScan from sensor_msgs
+    datatype object Vector { x: double y: double z: double }
+    datatype object Velocity { linear: Vector angular: Vector }
+    datatype object Scan { ranges: array(double) }
+    datatype enum Distance from Scan to { value.ranges[0] > 1.0 and value.ranges[9] > 1.0 -> far default -> near }
     component Button {
         outgoing message pressed with identifier: "/pressed", type: boolean
         behaviour {
@@ -52,8 +60,37 @@ robot Rehearsal {
             state down { transition if !is_down goto up }
         }
     }
+    component Lidar {
+        outgoing message scan with identifier: "/scan", type: Distance links laser_scan
+        behaviour {
+            variable distance: Distance = near
+            on response from scan do distance := value
+            initial marked state blocked { transition if distance = far goto clear }
+            marked state clear { transition if distance = near goto blocked }
+        }
+    }
+    component Line {
+        outgoing message offset with identifier: "/offset", type: double
+        outgoing message lost with identifier: "/lost", type: none
+        behaviour {
+            variable current: double = 0.0
+            on response from offset do current := value goto found
+            on response from lost do current := 0.0 goto absent
+            initial marked state absent { }
+            marked state found { }
+        }
+    }
+    component Base {
+        incoming message drive with identifier: "/cmd_vel", type: Velocity links twist
+        incoming message halt with identifier: "/cmd_vel", type: Velocity links twist
+        behaviour { initial marked state ready { on request to drive on request to halt } }
+    }
     component Door { incoming message open with identifier: "/open", type: none }
     requirement open needs Button.down
+    requirement drive needs Line.found and Lidar.clear
+    requirement halt needs Line.absent or Lidar.blocked
+    provide drive with { linear: { x: 0.1 }, angular: { z: Line.current } }
+    provide halt with { linear: { x: 0.0 } }
 }
 """
 
@@ -123,12 +160,20 @@ NOT_PRELOADED = ("robosc.cli", "robosc.event_logs", "robosc.starter")
 
 
 def warm_up() -> None:
-    """Run a small task, so that every fork of this process has what is loaded or built on first use."""
+    """Run a small task, so that every fork of this process has what is loaded or built on first use.
+
+    Python makes faster instructions of those that have run twice; a fork that did so would copy their pages.
+    """
     file = pb.SourceFile(name="warm_up.rscd", text=_WARM_UP_MODEL)
     request = pb.SynthesizeRequest(bundle=pb.Bundle(main=file))
-    run_task(TaskKind.SYNTHESIZE, request.SerializeToString(), TaskLimits(), lambda report: None)
+    for _ in range(_WARM_UP_ROUNDS):
+        run_task(TaskKind.SYNTHESIZE, request.SerializeToString(), TaskLimits(), lambda report: None)
     # The first lookup loads the reader of package resources.
     resources.files("robosc.targets").joinpath("none").is_file()
+
+
+def make_ready() -> None:
+    """Make the decision diagrams of the first synthesis of every fork."""
     keep_ready(resolve_engine("auto"))
 
 

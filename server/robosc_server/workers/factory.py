@@ -1,9 +1,7 @@
-"""Factory of workers from the setting `workers`: `local`, or the address of a cluster, which is checked before."""
+"""Factory of workers from the setting `workers`: `local`, or the address of a cluster."""
 
 import re
 
-from robosc_api.security.addresses import is_loopback_host, split_address
-from robosc_server.workers import WorkersError
 from robosc_server.workers.dask_cluster import DaskWorkers
 from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
 
@@ -32,19 +30,3 @@ def open_workers(
         address = f"{'tls' if found[1] else 'tcp'}://{found['address']}"
         return DaskWorkers(address, task_function, must_be_confined=must_be_confined)
     raise ValueError(f"workers are 'local', 'dask://HOST:PORT' or 'dask+tls://HOST:PORT', and not {spec!r}")
-
-
-def check_cluster(spec: str, *, is_insecure_allowed: bool) -> None:
-    """Check what can be known before a cluster is connected.
-
-    Raises:
-        WorkersError: It is on another machine and has no TLS: its parts run what they are sent as programs.
-    """
-    found = CLUSTER.fullmatch(spec)
-    if found is None or found[1] or is_insecure_allowed:
-        return
-    if not is_loopback_host(split_address(found["address"])[0]):
-        raise WorkersError(
-            f"the cluster at {spec} is on other machines and has no TLS, so whoever can reach it can run programs there"
-            " and here: use dask+tls://, or set insecure_workers_beyond_loopback on a network of its own"
-        )

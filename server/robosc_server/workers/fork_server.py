@@ -20,7 +20,7 @@ import traceback
 from pathlib import Path
 from typing import NoReturn
 
-from robosc_server.workers import child, confinement, kernel
+from robosc_server.workers import child, confinement, kernel, shared_memory
 from robosc_server.workers.child import TaskFunction
 from robosc_server.workers.sandbox import Sandbox
 
@@ -121,7 +121,8 @@ def _load(name: str) -> TaskFunction:
     """Import the function that runs tasks, with everything that it needs, and return it.
 
     The tuples `PRELOADED` and `NOT_PRELOADED` of its module name packages to import and prefixes of modules to skip;
-    the function `warm_up` builds what is built on first use. Each of them is optional.
+    the function `warm_up` builds what is built on first use. The function `make_ready` makes what each task uses up;
+    what there is before is kept for ever. Each of them is optional.
     """
     module_name, _, attribute = name.partition(":")
     tasks = importlib.import_module(module_name)
@@ -135,11 +136,15 @@ def _load(name: str) -> TaskFunction:
                     importlib.import_module(module.name)
     if warm_up := getattr(tasks, "warm_up", None):
         warm_up()
+    shared_memory.keep_objects()
+    if make_ready := getattr(tasks, "make_ready", None):
+        make_ready()
     return function
 
 
 def main() -> None:
     """Import, freeze, serve."""
+    shared_memory.reserve_arenas()
     line = socket.socket(fileno=int(sys.argv[1]))
     line.set_inheritable(False)
     confinement.exit_with_parent(int(sys.argv[3]))
@@ -165,11 +170,14 @@ def main() -> None:
     gc.collect()
     gc.freeze()
     gc.disable()
+    shared_memory.join_pages()
     sys.stdout.flush()
     sys.stderr.flush()
     child.redirect_to_devnull()
     with contextlib.suppress(ConnectionError):
         _ForkServer(line, function, sandbox).run()
+    # The end of an interpreter would free each object for itself.
+    os._exit(0)
 
 
 def _give_up(line: socket.socket, message: str) -> NoReturn:

@@ -12,6 +12,8 @@ SET_DUMPABLE = 4
 SET_SECCOMP = 22
 SET_NO_NEW_PRIVILEGES = 38
 
+_COLLAPSE = 25
+
 _CAPABILITIES_VERSION = 0x20080522  # Three: 64 bits for each set.
 
 # Built once here, not in each forked process.
@@ -22,6 +24,7 @@ if _LIBRARY is not None:
     _LIBRARY.syscall.restype = ctypes.c_long
     _LIBRARY.prctl.argtypes = [ctypes.c_int, *[ctypes.c_ulong] * 4]
     _LIBRARY.capset.argtypes = [ctypes.c_char_p, ctypes.c_char_p]
+    _LIBRARY.madvise.argtypes = [ctypes.c_size_t, ctypes.c_size_t, ctypes.c_int]
 
 
 def prctl(option: int, *values: int) -> None:
@@ -60,6 +63,16 @@ def drop_capabilities() -> None:
         return  # A sandbox around the server may forbid the call.
     # The kernel writes to the header only where it does not know the version.
     if library.capset(_CAPABILITIES_HEADER, _NO_CAPABILITIES):
+        raise _error()
+
+
+def collapse(address: int, size: int) -> None:
+    """`madvise(2)` with `MADV_COLLAPSE`: make huge pages of memory that begins and ends at the border of one.
+
+    Raises:
+        OSError: The kernel refuses it, does not know it, or is not Linux.
+    """
+    if _library().madvise(address, size, _COLLAPSE):
         raise _error()
 
 

@@ -17,6 +17,7 @@ from robosc_server.workers import WorkersError
 from robosc_server.workers.exit_reasons import ProcessExit
 from robosc_server.workers.fork_server import MUST_BE_CONFINED, PACKET_BYTES
 from robosc_server.workers.process import WorkerProcess
+from robosc_server.workers.shared_memory import ENVIRONMENT
 
 _LOG = logging.getLogger(__name__)
 
@@ -299,7 +300,8 @@ def _tasks_under_way(tasks: list[Task]) -> str:
 def _environment() -> dict[str, str]:
     """Return the environment of workers: variables that Python programs need, and the same module search path.
 
-    Workers get nothing else, such as database passwords, cloud keys or settings of the server.
+    Others say how the C library places memory. Workers get nothing else, such as database passwords, cloud keys or
+    settings of the server.
     """
     # A copy, since another thread may change the environment.
     environment = {
@@ -307,5 +309,6 @@ def _environment() -> dict[str, str]:
         for name, value in os.environ.copy().items()
         if name in _INHERITED or name.startswith(_INHERITED_PREFIXES)
     }
+    environment |= ENVIRONMENT
     environment["PYTHONPATH"] = os.pathsep.join(path for path in sys.path if path)
     return environment

@@ -85,10 +85,10 @@ def _busy_core() -> Iterator[None]:
 
 
 def _calls(title: str, echo: _Server, service: _Server, seconds: float) -> str:
-    kinds = _kinds()
+    kinds = call_kinds()
     rows = []
     for load in kinds.values():
-        _measured(service.address, load(1), count=_WARM_UP)
+        run_load(service.address, load(1), count=_WARM_UP)
     for clients in CLIENTS:
         asked = {"empty echo": (echo, _echo(clients))} | {
             name: (service, load(clients)) for name, load in kinds.items()
@@ -98,9 +98,9 @@ def _calls(title: str, echo: _Server, service: _Server, seconds: float) -> str:
         # By turns, since other guests of the same machine make it faster and slower all the time.
         for _ in range(_TURNS):
             for name, (server, chosen) in asked.items():
-                before_s = _processor_s(server.pid)
-                found[name].append(_measured(server.address, chosen, duration_s=seconds / _TURNS))
-                used_s[name] += _processor_s(server.pid) - before_s
+                before_s = processor_s(server.pid)
+                found[name].append(run_load(server.address, chosen, duration_s=seconds / _TURNS))
+                used_s[name] += processor_s(server.pid) - before_s
         measured = {name: together(parts) for name, parts in found.items()}
         rows += [_row(name, clients, measured, used_s) for name in asked]
     header = [
@@ -110,7 +110,7 @@ def _calls(title: str, echo: _Server, service: _Server, seconds: float) -> str:
     return text_table(title, header, rows)
 
 
-def _kinds() -> dict[str, Callable[[int], Load]]:
+def call_kinds() -> dict[str, Callable[[int], Load]]:
     bundle = load_bundle(MODEL)
     options = SynthesisOptions()
     check, synthesize = (request_of(task).SerializeToString() for task in (Check(bundle), Synthesize(bundle, options)))
@@ -150,7 +150,7 @@ def _echo(clients: int) -> Load:
     return Load(METHOD, False, lambda number: REQUEST, clients, channels=min(clients, 4))
 
 
-def _measured(address: str, load: Load, **amount: Any) -> Measured:
+def run_load(address: str, load: Load, **amount: Any) -> Measured:
     chosen = Load(load.method, load.is_stream, load.request, load.concurrency, channels=load.channels, **amount)
     return asyncio.run(measure(address, Credentials(), chosen))
 
@@ -175,14 +175,14 @@ def _share(part: float, whole: float) -> str:
 
 def _memory(address: str, pid: int) -> str:
     """Memory of the server's process, beginning when all has been used once."""
-    load = _kinds()["Synthesize, cached"](8)
+    load = call_kinds()["Synthesize, cached"](8)
     rows = [["before", _megabytes(_resident_bytes(pid))]]
     for number in range(1, 5):
-        found = _measured(address, load, count=CALLS // 4)
+        found = run_load(address, load, count=CALLS // 4)
         assert len(found.times_s) == CALLS // 4, found.errors
         rows.append([f"after {number * CALLS // 4:,} calls", _megabytes(_resident_bytes(pid))])
     # What is kept of each request is bounded, too.
-    found = _measured(address, _kinds()["Check"](8), count=_DISTINCT)
+    found = run_load(address, call_kinds()["Check"](8), count=_DISTINCT)
     assert len(found.times_s) == _DISTINCT, found.errors
     rows.append([f"after {_DISTINCT:,} different ones (Check)", _megabytes(_resident_bytes(pid))])
     return text_table("Memory of the server", ["Synthesize, cached", "MB"], rows)
@@ -220,9 +220,9 @@ async def _watched(address: str, pid: int, job_id: str) -> list[list[str]]:
         await asyncio.sleep(0.01)
     opened_s = time.perf_counter() - begun_s
     resident = _resident_bytes(pid)
-    used_s, before = _processor_s(pid), messages
+    used_s, before = processor_s(pid), messages
     await asyncio.sleep(_WATCHED_S)
-    used_s, reports = _processor_s(pid) - used_s, messages - before
+    used_s, reports = processor_s(pid) - used_s, messages - before
     async with grpc.aio.insecure_channel(address) as channel:
         stub = jobs_pb2_grpc.JobServiceStub(channel)  # type: ignore[no-untyped-call]
         cancelled_s = time.perf_counter()
@@ -244,7 +244,7 @@ def _resident_bytes(pid: int) -> int:
     return int(line.split()[1]) * 1024
 
 
-def _processor_s(pid: int) -> float:
+def processor_s(pid: int) -> float:
     """Time of a processor that a process has used, without its children's."""
     # A thread that ends meanwhile is an idle one of gRPC.
     used_ns = 0

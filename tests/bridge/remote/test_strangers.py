@@ -3,6 +3,8 @@
 import socket
 import struct
 import time
+from collections.abc import Callable, Sequence
+from functools import partial
 from typing import Any
 
 import grpc
@@ -10,15 +12,18 @@ import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection_pb2
 
+from robosc_api import connection_watch
 from robosc_api.request_timeouts import REFLECTION_METHODS
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.remote import RemoteEndpoint
 from robosc_bridge.remote import endpoint as endpoint_module
 from robosc_bridge.remote.connection_slots import ConnectionSlots
+from robosc_bridge.remote.data import value_of
 from robosc_bridge.remote.endpoint import MAXIMUM_CALLS, MAXIMUM_CONNECTIONS
-from support.remote import FakeDaemon, connected, served
-from support.strangers import SETTINGS, strangers
+from support.floods import MOST_BYTES, endless_headers, resets
+from support.remote import Attachment, FakeDaemon, connected, served
+from support.strangers import SETTINGS, Stranger, strangers
 from support.waiting import PATIENCE_S, wait_until
 
 
@@ -40,6 +45,8 @@ def test_connections_that_take_all_places_are_told_of(
     monkeypatch.setattr(endpoint_module, "IDLE_S", 3600.0)
     monkeypatch.setattr(endpoint_module, "_LOOK_S", 0.01)
     monkeypatch.setattr(endpoint_module, "MAXIMUM_CONNECTIONS", 3)
+    # Where connections are watched, those without a call give way before all places are taken.
+    monkeypatch.setattr(connection_watch, "can_watch", lambda: False)
     with served(daemon) as endpoint, strangers(endpoint.address, 3):
         wait_until(lambda: "all 3 connections of the remote endpoint are taken" in caplog.text)
 
@@ -125,3 +132,75 @@ def test_calls_of_a_connection_are_bounded(endpoint: RemoteEndpoint) -> None:
         told = next(content for kind, flags, content in stranger.frames if kind == SETTINGS and not flags)
         settings = {struct.unpack_from(">HI", told, at) for at in range(0, len(told), 6)}
         assert (3, MAXIMUM_CALLS) in settings
+
+
+STOP = "/robosc_api.v1.BridgeService/Stop"
+
+needs_counts = pytest.mark.skipif(
+    not connection_watch.can_watch(), reason="the kernel of this system does not count bytes"
+)
+
+
+def resets_of_stops(port: int, between: Callable[[], object]) -> int:
+    return resets(port, STOP, between)
+
+
+@needs_counts
+@pytest.mark.parametrize("flood", [endless_headers, resets_of_stops])
+def test_floods_are_cut_off_while_others_are_answered_and_can_stop(
+    flood: Callable[[int, Callable[[], object]], int],
+    daemon: FakeDaemon,
+    endpoint: RemoteEndpoint,
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    port = int(endpoint.address.rpartition(":")[2])
+    with connected(endpoint.address) as stub:
+        # The caller has the time that it takes to be answered once for each chunk of the flood.
+        sent = flood(port, lambda: stub.GetStatus(pb.GetStatusRequest(), timeout=PATIENCE_S))
+        assert sent < MOST_BYTES
+        # By the watch: gRPC itself ends connections on which its pings are not answered.
+        wait_until(lambda: "closed connections" in caplog.text)
+        stub.Stop(pb.StopRequest(), timeout=PATIENCE_S)
+    assert daemon.commands()[-1] is OperatorCommand.STOP
+
+
+def one_is_ended(held: Sequence[Stranger]) -> bool:
+    return not all(each.is_open for each in held)
+
+
+@needs_counts
+def test_unused_connections_give_way_before_all_places_are_taken(
+    daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(endpoint_module, "IDLE_S", 3600.0)
+    monkeypatch.setattr(endpoint_module, "MAXIMUM_CONNECTIONS", 8)
+    with served(daemon) as endpoint, connected(endpoint.address) as stub:
+        watch = stub.Watch(pb.WatchRequest(), timeout=PATIENCE_S)
+        assert next(watch).HasField("snapshot")
+        for _ in range(3):
+            with strangers(endpoint.address, 6) as held:
+                wait_until(partial(one_is_ended, held))
+        assert next(watch).HasField("snapshot")
+        watch.cancel()
+
+
+@needs_counts
+def test_the_messages_of_a_program_are_no_flood(daemon: FakeDaemon, monkeypatch: pytest.MonkeyPatch) -> None:
+    made: list[connection_watch.ConnectionWatch] = []
+
+    def noted(*arguments: Any, **more: Any) -> connection_watch.ConnectionWatch:
+        made.append(connection_watch.ConnectionWatch(*arguments, **more))
+        return made[0]
+
+    monkeypatch.setattr(endpoint_module, "ConnectionWatch", noted)
+    with served(daemon) as endpoint, connected(endpoint.address) as stub:
+        program = Attachment(stub, name="arm")
+        assert program.receive().HasField("welcome")
+        # Far more than an open call and the slack explain.
+        for _ in range(60):
+            # A name that is too long, so that each is answered at once.
+            program.send(give=pb.Message(identifier="/order", data=value_of({"x" * 30_000: 1})))
+            assert "a name of more than" in program.receive().refused.why
+            made[0].look()
+        assert not made[0].closed
+        program.end()

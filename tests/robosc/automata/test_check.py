@@ -128,7 +128,7 @@ def test_the_sound_system_is() -> None:
 
 
 @pytest.mark.parametrize(("faulty", "message"), FAULTY, ids=[message for _, message in FAULTY])
-def test_one_fault_is_told_once(faulty: System, message: str) -> None:
+def test_one_fault_is_reported_once(faulty: System, message: str) -> None:
     with pytest.raises(InvalidSystemError) as caught:
         check_system(faulty)
     (line,) = str(caught.value).split("\n")
@@ -136,7 +136,7 @@ def test_one_fault_is_told_once(faulty: System, message: str) -> None:
     assert message in line
 
 
-def test_all_faults_are_told() -> None:
+def test_all_faults_are_reported() -> None:
     faulty = replace(with_automaton(initial=("gone",)), marker=Constant(1), initial=Constant(2))
     with pytest.raises(InvalidSystemError) as caught:
         check_system(faulty)

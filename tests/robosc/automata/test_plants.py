@@ -5,7 +5,7 @@ import pytest
 from robosc.automata import Automaton, Edge
 from robosc.automata.plants import communication_plant, component_plant
 from robosc.expressions import FALSE, TRUE, IntegerType, Received, StringType, VariableRead
-from robosc.model.structure import Component
+from robosc.model.structure import Communication, Component
 from support.models_by_hand import action, component, incoming, outgoing, service, transition, variable
 from support.systems import edge
 
@@ -30,37 +30,36 @@ def test_outgoing_message() -> None:
     assert _arcs(plant) == {"idle -scan.response-> idle"}
 
 
-def test_service() -> None:
-    plant = communication_plant(service("calibrate"))
-    assert plant.name == "service calibrate"
-    assert plant.locations == ("idle", "waiting", "ready", "failed")
+@pytest.mark.parametrize(
+    ("communication", "name", "busy", "kinds", "arcs"),
+    [
+        (service("go"), "service go", "waiting", "request response error reset", ()),
+        (
+            action("go"),
+            "action go",
+            "executing",
+            "request response feedback error cancel reset",
+            ("executing -go.feedback-> executing", "executing -go.cancel-> idle"),
+        ),
+    ],
+    ids=["service", "action"],
+)
+def test_service_and_action(
+    communication: Communication, name: str, busy: str, kinds: str, arcs: tuple[str, ...]
+) -> None:
+    plant = communication_plant(communication)
+    assert plant.name == name
+    assert plant.locations == ("idle", busy, "ready", "failed")
     assert plant.initial == ("idle",)
     assert plant.marked == {"idle"}
-    assert plant.alphabet == {f"calibrate.{kind}" for kind in ("request", "response", "error", "reset")}
+    assert plant.alphabet == {f"go.{kind}" for kind in kinds.split()}
     assert _arcs(plant) == {
-        "idle -calibrate.request-> waiting",
-        "waiting -calibrate.response-> ready",
-        "waiting -calibrate.error-> failed",
-        "ready -calibrate.reset-> idle",
-        "failed -calibrate.reset-> idle",
-    }
-
-
-def test_action() -> None:
-    plant = communication_plant(action("go"))
-    assert plant.name == "action go"
-    assert plant.locations == ("idle", "executing", "ready", "failed")
-    assert plant.initial == ("idle",)
-    assert plant.marked == {"idle"}
-    assert plant.alphabet == {f"go.{kind}" for kind in ("request", "response", "feedback", "error", "cancel", "reset")}
-    assert _arcs(plant) == {
-        "idle -go.request-> executing",
-        "executing -go.feedback-> executing",
-        "executing -go.response-> ready",
-        "executing -go.error-> failed",
-        "executing -go.cancel-> idle",
+        f"idle -go.request-> {busy}",
+        f"{busy} -go.response-> ready",
+        f"{busy} -go.error-> failed",
         "ready -go.reset-> idle",
         "failed -go.reset-> idle",
+        *arcs,
     }
 
 

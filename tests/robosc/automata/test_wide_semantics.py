@@ -31,7 +31,7 @@ def test_a_system_begins_wherever_all_its_parts_may() -> None:
     assert Semantics(replace(made, initial=both)).initial_states == (("a", 2), ("b", 0), ("b", 2))
 
 
-def test_too_many_ways_to_begin_are_told() -> None:
+def test_too_many_ways_to_begin_are_reported() -> None:
     wide = IntegerType(0, MAXIMUM_CHOICES)
     made = system(automaton("A", ["a -go-> a"], variables=[DiscreteVariable("n", wide, tuple(range(wide.high or 0)))]))
     assert len(Semantics(made).initial_states) == MAXIMUM_CHOICES
@@ -189,7 +189,7 @@ def test_a_controllable_event_is_allowed_only_where_each_of_its_edges_is_good(en
     assert synthesize(replace(made, invariants=(StateTest("A", "a"),)), engine=engine).statistics.states == 1
 
 
-def test_choices_between_edges_are_told() -> None:
+def test_choices_between_edges_are_reported() -> None:
     n = VariableRead("B", "n")
     up = Binary("+", n, Constant(2))
     made = system(

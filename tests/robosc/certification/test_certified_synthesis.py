@@ -130,9 +130,9 @@ def test_a_wrong_synthesis_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def test_progress_and_cancellation() -> None:
-    told: list[Progress] = []
-    make_supervisor(bundle_of(COUNTER), on_progress=told.append)
-    assert list(dict.fromkeys(item.stage for item in told)) == [
+    reported: list[Progress] = []
+    make_supervisor(bundle_of(COUNTER), on_progress=reported.append)
+    assert list(dict.fromkeys(item.stage for item in reported)) == [
         "check",
         "synthesis",
         "verification",

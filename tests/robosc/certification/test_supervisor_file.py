@@ -245,7 +245,7 @@ def test_false_certificates_are_caught() -> None:
     assert _passed(verify_supervisor_file(change(supervisor, certificate=modest), bundle, LIMITS))
 
 
-def test_a_false_claim_is_told_as_one() -> None:
+def test_a_false_claim_is_reported_as_false() -> None:
     bundle = bundle_of(COUNTER)
     found = verify_supervisor_file(change(_supervisor(bundle), added=()), bundle, LIMITS)
     assert _failed_checks(found) >= {"certificate", "safe"}
@@ -260,7 +260,7 @@ def test_a_false_claim_is_told_as_one() -> None:
     assert fault.state.text().startswith("C = s, C.n = 3, C.busy = true")
 
 
-def test_another_digest_is_told_and_decides_nothing() -> None:
+def test_another_digest_is_reported_and_decides_nothing() -> None:
     bundle = bundle_of(COUNTER)
     supervisor = _supervisor(bundle)
     other = bundle_of(COUNTER + "// the same")

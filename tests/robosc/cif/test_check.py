@@ -203,11 +203,11 @@ def test_files_are_read_from_their_folders(tmp_path: Path) -> None:
 )  # fmt: skip
 def test_findings(text: str, code: str | None, column: int) -> None:
     _, found = checked(text)
-    told = [(item.code, item.location.column) for item in found if item.location]
-    assert ((code, column) in told) if code else (told == [("cif-unsupported", 1)]), told
+    reported = [(item.code, item.location.column) for item in found if item.location]
+    assert ((code, column) in reported) if code else (reported == [("cif-unsupported", 1)]), reported
 
 
-def test_everything_that_synthesis_does_not_take_is_told_in_one_run() -> None:
+def test_everything_that_synthesis_does_not_take_is_reported_in_one_run() -> None:
     text = """event e; cont c; func int f(int x): return x; end
 invariant true;
 plant p:

@@ -30,12 +30,12 @@ def test_steps_are_those_of_the_syntax_tree(seed: int) -> None:
     names = [str(subject) for subject in subjects(found.system)]
     states = semantics.initial_states
     for state in random.sample(states, min(60, len(states))):
-        told = dict(zip(names, state, strict=True))
+        values = dict(zip(names, state, strict=True))
         for event, is_controllable in EVENTS.items():
             if not any(event in item.alphabet for item in found.system.automata):
                 continue
-            allowed, expected = meaning.targets(told, event, is_controllable=is_controllable)
+            allowed, expected = meaning.targets(values, event, is_controllable=is_controllable)
             targets = {tuple(target[name] for name in names) for target in expected}
-            assert semantics.targets(state, event) == targets, (text, told, event)
+            assert semantics.targets(state, event) == targets, (text, values, event)
             if targets:
-                assert semantics.condition(state, event) is allowed, (text, told, event)
+                assert semantics.condition(state, event) is allowed, (text, values, event)

@@ -93,7 +93,7 @@ def test_tokens_are_the_longest() -> None:
     ]  # fmt: skip
 
 
-def test_automaton_or_invariant_is_told_by_what_follows_the_colon() -> None:
+def test_what_follows_the_colon_decides_between_automaton_and_invariant() -> None:
     body = parse(SourceFile("m.cif", "requirement r: c needs p; requirement q: location: initial; end")).body
     assert [type(item).__name__ for item in body] == ["Invariant", "Component"]
     assert errors("requirement r: invariant p;")
@@ -125,7 +125,7 @@ def test_place_of_an_error(text: str, place: tuple[int, int]) -> None:
     assert found[0].fix
 
 
-def test_several_errors_are_told_in_one_run() -> None:
+def test_several_errors_are_reported_in_one_run() -> None:
     text = "const int = 3;\nplant p:\n  controllable a 3;\n  location x:\n    edge a goto;\n    initial;\nend\nalg y;\n"
     assert [item.location.line for item in errors(text) if item.location] == [1, 3, 5, 8]
 

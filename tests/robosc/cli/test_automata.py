@@ -55,9 +55,9 @@ def test_a_model_without_a_supervisor(model: str, capsys: pytest.CaptureFixture[
         assert (status, json.loads(out)["status"]) == (1, "empty")
 
 
-def test_what_is_to_blame_is_told(model: str, capsys: pytest.CaptureFixture[str]) -> None:
+def test_what_is_to_blame_is_reported(model: str, capsys: pytest.CaptureFixture[str]) -> None:
     Path(model).write_text(TANK.replace("when level > 1", "").replace("level in any", "level = 1"))
-    told = [
+    sentences = [
         "trouble:",
         "  from an initial state tank.u_drain, tank.u_drain can follow, and nothing can prevent it",
     ]
@@ -71,7 +71,7 @@ def test_what_is_to_blame_is_told(model: str, capsys: pytest.CaptureFixture[str]
             "  tank.cif:1:7: the range of tank.level: integer(0..3)",
             "there is a supervisor without it",
         ]
-    assert told[0] in lines
+    assert sentences[0] in lines
     document = json.loads(run(capsys, "synth", model, "--json")[1])
     assert document["explanation"]["blamed"][0]["part"]["location"]["line"] == 1
     document = json.loads(run(capsys, "explain-synthesis", model, "--json")[1])
@@ -353,7 +353,7 @@ def test_simulate_says_which_of_several_states(
     assert "-> STATE" in typed("help\n")[1]
 
 
-def test_simulate_begins_as_it_is_told(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_simulate_begins_in_the_given_state(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     for text, status, message in (
         ("tank.level = 3", 1, "tank cannot begin in a state with tank.level = 3"),
         ("tank.level = 9", 1, "tank.level is never '9': it is one of 0, 1, 2, 3"),

@@ -1,12 +1,12 @@
 """`robosc check --synthesize`, and the warnings that only synthesis can give as the commands print them."""
 
-import json
 from pathlib import Path
 from typing import Any
 
 import pytest
 
 from robosc.cli.main import main
+from support.commands import run_json
 from support.models import EMPTY, EXAMPLES, UNSUPPORTED
 
 LINE_FOLLOWER = str(EXAMPLES / "line_follower" / "line_follower.rscd")
@@ -38,15 +38,6 @@ def write(tmp_path: Path) -> Any:
     return written
 
 
-def document_of(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, dict[str, Any]]:
-    status = main([*arguments, "--json"])
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    document = json.loads(captured.out)
-    assert isinstance(document, dict)
-    return status, document
-
-
 def test_only_with_the_option_check_synthesizes(capsys: pytest.CaptureFixture[str], write: Any) -> None:
     model = write(LIGHTS)
     assert main(["check", "--strict", model]) == 0
@@ -64,14 +55,14 @@ def test_only_with_the_option_check_synthesizes(capsys: pytest.CaptureFixture[st
 
 def test_json_has_the_findings_and_what_became_of_the_synthesis(capsys: pytest.CaptureFixture[str], write: Any) -> None:
     model = write(LIGHTS)
-    status, document = document_of(capsys, "check", "--synthesize", model)
+    status, document = run_json(capsys, "check", "--synthesize", model)
     assert (status, document["status"], document["reason"], document["warnings"]) == (0, "supervisor", "", 2)
     first = document["diagnostics"][0]
     assert (first["code"], first["message"], first["line"]) == ("competing-requests", COMPETING, 4)
     assert [place["line"] for place in first["related"]] == [3]
-    status, synthesized = document_of(capsys, "synth", model)
+    status, synthesized = run_json(capsys, "synth", model)
     assert (status, synthesized["diagnostics"]) == (0, document["diagnostics"])
-    assert "status" not in document_of(capsys, "check", model)[1]
+    assert "status" not in run_json(capsys, "check", model)[1]
 
 
 def test_synth_prints_the_warnings_and_the_exit_status_stays(capsys: pytest.CaptureFixture[str], write: Any) -> None:
@@ -94,19 +85,23 @@ def test_deployment_and_engine_are_those_of_the_synthesis(
         ("layer", ["unused-requirement"]),
     ):
         options = ["--synthesize", "--engine", engine, "--deployment", deployment]
-        _, document = document_of(capsys, "check", *options, model)
+        _, document = run_json(capsys, "check", *options, model)
         assert [item["code"] for item in document["diagnostics"]] == codes
 
 
-@pytest.mark.parametrize("option", [["--engine", "cudd"], ["--deployment", "controller"]])
-def test_options_of_the_synthesis_need_it(capsys: pytest.CaptureFixture[str], option: list[str]) -> None:
-    assert main(["check", LINE_FOLLOWER, *option]) == 2
-    assert "they need --synthesize" in capsys.readouterr().err
-
-
-def test_an_unknown_engine_is_wrong_use(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["check", LINE_FOLLOWER, "--synthesize", "--engine", "magic"]) == 2
-    assert "unknown engine 'magic'" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("options", "problem"),
+    [
+        (["--engine", "cudd"], "they need --synthesize"),
+        (["--deployment", "controller"], "they need --synthesize"),
+        (["--synthesize", "--engine", "magic"], "unknown engine 'magic'"),
+    ],
+)
+def test_wrong_use_of_options_of_the_synthesis(
+    capsys: pytest.CaptureFixture[str], options: list[str], problem: str
+) -> None:
+    assert main(["check", LINE_FOLLOWER, *options]) == 2
+    assert problem in capsys.readouterr().err
 
 
 def test_a_robot_without_a_supervisor_fails(capsys: pytest.CaptureFixture[str], write: Any) -> None:
@@ -115,14 +110,14 @@ def test_a_robot_without_a_supervisor_fails(capsys: pytest.CaptureFixture[str], 
     capsys.readouterr()
     assert main(["check", "--synthesize", model]) == 1
     assert "robot.rscd: no supervisor exists: " in capsys.readouterr().err
-    status, document = document_of(capsys, "check", "--synthesize", model)
+    status, document = run_json(capsys, "check", "--synthesize", model)
     assert (status, document["status"]) == (1, "empty")
     assert document["reason"].startswith("no supervisor exists: ")
 
 
 def test_a_model_beyond_synthesis_fails_and_keeps_its_findings(capsys: pytest.CaptureFixture[str], write: Any) -> None:
     model = write(UNSUPPORTED.replace("on response from", "on response to"))
-    status, document = document_of(capsys, "check", "--synthesize", model)
+    status, document = run_json(capsys, "check", "--synthesize", model)
     assert (status, document["status"]) == (1, "unsupported model")
     assert document["reason"]
     assert [item["code"] for item in document["diagnostics"]] == ["wrong-preposition"]
@@ -132,7 +127,7 @@ def test_a_model_beyond_synthesis_fails_and_keeps_its_findings(capsys: pytest.Ca
 
 def test_a_model_with_errors_is_not_synthesized(capsys: pytest.CaptureFixture[str], write: Any) -> None:
     model = write("robot R { requirement go needs Nobody.here }")
-    status, document = document_of(capsys, "check", "--synthesize", model)
+    status, document = run_json(capsys, "check", "--synthesize", model)
     assert (status, document["status"], document["errors"]) == (1, "model errors", 2)
 
 
@@ -145,6 +140,6 @@ def test_a_library_has_nothing_to_synthesize_and_nothing_wrong(capsys: pytest.Ca
 def test_a_file_that_is_no_text_is_an_error_like_any_other(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     path = tmp_path / "robot.rscd"
     path.write_bytes(b"robot \xff")
-    plain = document_of(capsys, "check", str(path))
+    plain = run_json(capsys, "check", str(path))
     assert plain[0] == 1
-    assert document_of(capsys, "check", "--synthesize", str(path)) == plain
+    assert run_json(capsys, "check", "--synthesize", str(path)) == plain

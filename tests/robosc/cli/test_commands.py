@@ -5,23 +5,16 @@ import os
 import subprocess
 import sys
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from robosc.cli.main import main
 from robosc.supervisor import decode
-from support.models import EMPTY, EXAMPLES
+from support.commands import run_json
+from support.models import EXAMPLES
 
 LINE_FOLLOWER = str(EXAMPLES / "line_follower" / "line_follower.rscd")
 NAVIGATION = str(EXAMPLES / "navigation" / "navigation.rscd")
-
-
-@pytest.fixture
-def empty(tmp_path: Path) -> str:
-    path = tmp_path / "empty.rscd"
-    path.write_text(EMPTY, encoding="utf-8")
-    return str(path)
 
 
 @pytest.fixture
@@ -29,15 +22,6 @@ def broken(tmp_path: Path) -> str:
     path = tmp_path / "broken.rscd"
     path.write_text("robot R {\n  requirement go needs\n    Nobody.here\n}\n", encoding="utf-8")
     return str(path)
-
-
-def run_json(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, dict[str, Any]]:
-    status = main([*arguments, "--json"])
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    document = json.loads(captured.out)
-    assert isinstance(document, dict)
-    return status, document
 
 
 def test_check_of_a_sound_model(capsys: pytest.CaptureFixture[str]) -> None:
@@ -277,8 +261,8 @@ def test_definitions_of_one_s_own_refuse_packages_and_no_model(
     )
     given = [str(path), "-I", str(tmp_path / "power_msgs")]
     assert main(["check", *given]) == 0
-    assert "warning: power_msgs" in (told := capsys.readouterr().err)
-    assert f"[{code}]" in told
+    assert "warning: power_msgs" in (printed := capsys.readouterr().err)
+    assert f"[{code}]" in printed
     assert main(["synth", *given, "-o", str(tmp_path / "robot.rsup")]) == 0
     assert main(["check", "--strict", *given]) == 1
     assert main(["generate", *given, "--target", "ros2", "-o", str(tmp_path / "out")]) == 1
@@ -440,9 +424,11 @@ def test_silent_steps_that_never_end_are_an_error_unless_allowed(
     target, folder = tmp_path / "out.rsup", tmp_path / "out"
     assert main(["synth", str(model), "-o", str(target)]) == 1
     assert main(["generate", str(model), "--target", "python", "-o", str(folder)]) == 1
-    told = capsys.readouterr().err
-    assert told.count("error: silent steps never end: from the initial state, B.tau_1, B.tau_2 repeat themselves") == 2
-    assert told.count("--allow-livelock overrides this") == 2
+    printed = capsys.readouterr().err
+    assert (
+        printed.count("error: silent steps never end: from the initial state, B.tau_1, B.tau_2 repeat themselves") == 2
+    )
+    assert printed.count("--allow-livelock overrides this") == 2
     assert not target.exists() and not folder.exists()
     status, document = run_json(capsys, "synth", str(model))
     assert (status, document["status"], document["summary"]) == (1, "model errors", None)
@@ -460,7 +446,9 @@ def test_silent_steps_that_never_end_are_an_error_unless_allowed(
 
 
 @pytest.mark.parametrize("words", [["--strict", "check", "x.rscd"], ["--library-path=x", "check"], ["--json"]])
-def test_options_before_a_command_are_told_their_place(words: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_before_a_command_are_refused_with_their_place(
+    words: list[str], capsys: pytest.CaptureFixture[str]
+) -> None:
     with pytest.raises(SystemExit) as left:
         main(words)
     assert left.value.code == 2

@@ -31,12 +31,21 @@ def test_the_time_of_conditions_is_limited(capsys: pytest.CaptureFixture[str]) -
     assert hasty["certificate"]["maximally_permissive"] == plain["certificate"]["maximally_permissive"] == "passed"
 
 
-@pytest.mark.parametrize("seconds", ["-1", "nan", "soon"])
-def test_a_time_is_a_number_from_zero_on(capsys: pytest.CaptureFixture[str], seconds: str) -> None:
-    with pytest.raises(SystemExit) as caught:
-        main(["synth", NAVIGATION, f"--condition-seconds={seconds}"])
-    assert caught.value.code == 2
-    assert f"invalid time value: '{seconds}'" in capsys.readouterr().err
+@pytest.mark.parametrize(
+    ("option", "words", "problem"),
+    [
+        ("--condition-seconds", ("-1", "nan", "soon"), "invalid time value: '{word}'"),
+        ("--max-nodes", ("0", "-1", "many"), "is not a number from 1 on"),
+    ],
+)
+def test_a_limit_that_is_no_such_number_is_wrong_use(
+    capsys: pytest.CaptureFixture[str], option: str, words: tuple[str, ...], problem: str
+) -> None:
+    for word in words:
+        with pytest.raises(SystemExit) as caught:
+            main(["synth", NAVIGATION, f"{option}={word}"])
+        assert caught.value.code == 2
+        assert problem.format(word=word) in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("command", [["synth"], ["explore"], ["check", "--synthesize"]])
@@ -45,14 +54,6 @@ def test_too_few_nodes_end_it(capsys: pytest.CaptureFixture[str], command: list[
     assert main([*command, NAVIGATION, "--max-nodes", "50", "--engine", engine]) == 1
     captured = capsys.readouterr()
     assert captured.err == "robosc: BDD node limit 50 exceeded; raise it with --max-nodes\n"
-
-
-@pytest.mark.parametrize("number", ["0", "-1", "many"])
-def test_a_limit_is_a_number_from_one_on(capsys: pytest.CaptureFixture[str], number: str) -> None:
-    with pytest.raises(SystemExit) as caught:
-        main(["synth", NAVIGATION, f"--max-nodes={number}"])
-    assert caught.value.code == 2
-    assert "is not a number from 1 on" in capsys.readouterr().err
 
 
 @pytest.mark.parametrize("option", [["--reorder"], ["--max-nodes", "5"]])

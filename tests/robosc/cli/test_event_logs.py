@@ -42,8 +42,8 @@ def change(folder: Path, old: str, new: str) -> None:
 @pytest.mark.parametrize("model", ["maze.rsup", MODEL])
 def test_a_right_log_passes(model: str, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["check-log", "maze.jsonl", "--model", model]) == 0
-    told = "passed against the supervisor of MazeSolver: 6 events, 2 of them requests, 1 restarts"
-    assert capsys.readouterr().out == f"maze.jsonl: {told}\n"
+    output = "passed against the supervisor of MazeSolver: 6 events, 2 of them requests, 1 restarts"
+    assert capsys.readouterr().out == f"maze.jsonl: {output}\n"
 
 
 def test_a_wrong_log_fails_with_the_line(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -52,8 +52,8 @@ def test_a_wrong_log_fails_with_the_line(folder: Path, capsys: pytest.CaptureFix
     wrong, last = capsys.readouterr().out.splitlines()
     assert wrong.startswith("maze.jsonl:4: move.request was not allowed: its requirements do not hold; the state after")
     assert "Rotator is in idle, not in " in wrong
-    told = "failed: 1 violations against the supervisor of MazeSolver: 6 events, 2 of them requests, 1 restarts"
-    assert last == f"maze.jsonl: {told}"
+    output = "failed: 1 violations against the supervisor of MazeSolver: 6 events, 2 of them requests, 1 restarts"
+    assert last == f"maze.jsonl: {output}"
 
 
 def test_for_machines(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
@@ -135,6 +135,6 @@ def test_what_cannot_be_is_one_clear_message(
     folder: Path, arguments: list[str], status: int, problem: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(arguments) == status
-    told = capsys.readouterr()
-    assert (told.out, told.err.count("\n")) == ("", 1)
-    assert problem in told.err
+    output = capsys.readouterr()
+    assert (output.out, output.err.count("\n")) == ("", 1)
+    assert problem in output.err

@@ -1,29 +1,14 @@
 """`robosc explain-synthesis`, and the explanation that `robosc synth` and its kin print without a supervisor."""
 
-import json
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from robosc.cli.main import main
-from support.models import EMPTY, EXAMPLES
+from support.commands import run_json
+from support.models import EXAMPLES
 
 NAVIGATION = str(EXAMPLES / "navigation" / "navigation.rscd")
-
-
-@pytest.fixture
-def empty(tmp_path: Path) -> str:
-    path = tmp_path / "empty.rscd"
-    path.write_text(EMPTY, encoding="utf-8")
-    return str(path)
-
-
-def run_json(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, Any]:
-    status = main([*arguments, "--json"])
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    return status, json.loads(captured.out)
 
 
 def test_every_controllable_event_and_warnings(capsys: pytest.CaptureFixture[str]) -> None:
@@ -84,7 +69,7 @@ def test_without_a_supervisor(capsys: pytest.CaptureFixture[str], empty: str) ->
     assert explanation["trouble"]["way"]["events"] == ["broken.response"]
     assert [item["part"]["kind"] for item in explanation["blamed"]] == ["marking"]
     assert explanation["is_minimal"]
-    # The commands that need a supervisor tell the same.
+    # The commands that need a supervisor print the same.
     for command in (["synth"], ["explore"], ["check", "--synthesize"], ["generate", "--target", "python", "-o", "x"]):
         status, found = run_json(capsys, *command, empty)
         assert (status, found["explanation"]) == (1, explanation)

@@ -102,7 +102,7 @@ def test_a_package_that_cannot_be_called_so(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_the_help_tells_of_changed_files(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_the_help_explains_changed_files(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     words = ["generate", LINE_FOLLOWER, "--target", "python", "-o", str(tmp_path)]
     assert main(words) == 0
     next(tmp_path.glob("*.py")).write_text("changed")
@@ -110,6 +110,6 @@ def test_the_help_tells_of_changed_files(capsys: pytest.CaptureFixture[str], tmp
     capsys.readouterr()
     with pytest.raises(SystemExit):
         main(["generate", "--help"])
-    told = " ".join(capsys.readouterr().out.partition("exit status:")[2].split())
-    assert "1 nothing is written: " in told
-    assert "files were changed since they were generated" in told
+    help_text = " ".join(capsys.readouterr().out.partition("exit status:")[2].split())
+    assert "1 nothing is written: " in help_text
+    assert "files were changed since they were generated" in help_text

@@ -4,13 +4,13 @@ import json
 import shlex
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
 
 import pytest
 
 from robosc.cli import new
 from robosc.cli.main import main
 from robosc.cli.output import UsageError
+from support.commands import run_json
 from support.models import EXAMPLES
 from support.pages import read_page
 
@@ -155,13 +155,6 @@ def test_new_never_touches_a_file_that_comes_in_between(tmp_path: Path, monkeypa
 # doc
 
 
-def doc_json(capsys: pytest.CaptureFixture[str], *arguments: str) -> tuple[int, dict[str, Any]]:
-    status = main(["doc", *arguments, "--json"])
-    captured = capsys.readouterr()
-    assert captured.err == ""
-    return status, json.loads(captured.out)
-
-
 def test_doc_prints_the_page_or_writes_it(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["doc", str(LINE_FOLLOWER)]) == 0
     printed = capsys.readouterr().out
@@ -169,11 +162,11 @@ def test_doc_prints_the_page_or_writes_it(capsys: pytest.CaptureFixture[str]) ->
     assert main(["doc", str(LINE_FOLLOWER), "-o", "page.md"]) == 0
     assert capsys.readouterr().out == "page.md\n"
     assert Path("page.md").read_text(encoding="utf-8") == printed
-    status, document = doc_json(capsys, str(LINE_FOLLOWER))
+    status, document = run_json(capsys, "doc", str(LINE_FOLLOWER))
     assert (status, document["page"], document["file"], document["errors"]) == (0, printed, None, 0)
 
 
-def test_doc_tells_warnings_and_still_makes_the_page(capsys: pytest.CaptureFixture[str]) -> None:
+def test_doc_prints_warnings_and_still_makes_the_page(capsys: pytest.CaptureFixture[str]) -> None:
     Path("r.rscd").write_text("robot R { component C { service s with request: none, response: none } }", "utf-8")
     assert main(["doc", "r.rscd"]) == 1
     assert "[links-required]" in capsys.readouterr().err
@@ -188,7 +181,7 @@ def test_doc_of_a_model_with_errors_writes_no_page(tmp_path: Path, capsys: pytes
     assert main(["doc", "r.rscd", "-o", "page.md"]) == 1
     captured = capsys.readouterr()
     assert captured.out == "" and "[unknown-name]" in captured.err
-    status, document = doc_json(capsys, "r.rscd", "-o", "page.md")
+    status, document = run_json(capsys, "doc", "r.rscd", "-o", "page.md")
     assert (status, document["page"], document["file"]) == (1, None, None) and document["errors"] > 0
     assert everything(tmp_path) == ["r.rscd"]
 
@@ -200,7 +193,7 @@ def test_doc_of_what_is_no_robot(capsys: pytest.CaptureFixture[str]) -> None:
     Path("bytes.rscd").write_bytes(b"\xff\xfe")
     assert main(["doc", "bytes.rscd"]) == 1
     assert capsys.readouterr().out == ""
-    status, document = doc_json(capsys, "bytes.rscd")
+    status, document = run_json(capsys, "doc", "bytes.rscd")
     assert (status, document["page"], document["errors"]) == (1, None, 1)
 
 

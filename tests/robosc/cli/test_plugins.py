@@ -70,9 +70,9 @@ def test_what_cannot_run_says_why_in_one_sentence(
     arguments: list[str], problem: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(arguments) == 2
-    told = capsys.readouterr()
-    assert told.err.startswith(f"robosc: {problem}")
-    assert (told.out, told.err.count("\n")) == ("", 1)
+    output = capsys.readouterr()
+    assert output.err.startswith(f"robosc: {problem}")
+    assert (output.out, output.err.count("\n")) == ("", 1)
 
 
 @pytest.mark.usefixtures("installed")

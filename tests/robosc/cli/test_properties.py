@@ -66,7 +66,7 @@ def test_wrong_use(arguments: list[str], message: str, capsys: pytest.CaptureFix
     assert message in capsys.readouterr().err
 
 
-def test_quiet_tells_what_fails(capsys: pytest.CaptureFixture[str]) -> None:
+def test_quiet_prints_what_fails(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify", NAVIGATION, "-q", "--property", HOLDS]) == 0
     assert capsys.readouterr().out == ""
     assert main(["verify", NAVIGATION, "-q", "--property", HOLDS, "--property", "reachable false"]) == 1
@@ -87,7 +87,7 @@ def test_properties_of_a_supervisor_that_is_handed_over(tmp_path: Path, capsys: 
     assert "no right supervisor" in capsys.readouterr().out
 
 
-def test_the_engine_may_be_told_more(capsys: pytest.CaptureFixture[str]) -> None:
+def test_options_are_passed_to_the_engine(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["verify", NAVIGATION, "--reorder", "--property", HOLDS]) == 0
     assert main(["verify", NAVIGATION, "--max-nodes", "60", "--property", HOLDS]) == 1
     assert "BDD node limit 60 exceeded" in capsys.readouterr().err

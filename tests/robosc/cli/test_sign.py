@@ -37,8 +37,8 @@ def test_for_machines(folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
     made = json.loads(capsys.readouterr().out)
     assert (made["private"], made["public"]) == ("more.key", "more.pub")
     assert main(["sign", "maze.rsup", "--key", "more.key", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert told == {"file": "maze.rsup.sig", "model": "MazeSolver", "deployment": "controller"}
+    output = json.loads(capsys.readouterr().out)
+    assert output == {"file": "maze.rsup.sig", "model": "MazeSolver", "deployment": "controller"}
     assert main(["verify", "maze.rsup", "--signed-by", "ours.pub", "--signed-by", "more.pub", "--json"]) == 0
     found = json.loads(capsys.readouterr().out)
     assert found == {
@@ -55,10 +55,10 @@ def test_a_changed_file_fails_with_and_without_its_model(folder: Path, capsys: p
     for model in ([], [MODEL]):
         capsys.readouterr()
         assert main(["verify", "maze.rsup", *model, "--signed-by", "ours.pub"]) == 1
-        told = capsys.readouterr()
-        assert (told.out, told.err.count("\n")) == ("", 1)
-        assert "the signature of the lab (SHA256:" in told.err
-        assert "has been changed" in told.err
+        output = capsys.readouterr()
+        assert (output.out, output.err.count("\n")) == ("", 1)
+        assert "the signature of the lab (SHA256:" in output.err
+        assert "has been changed" in output.err
     assert main(["verify", "maze.rsup", MODEL]) == 0
 
 
@@ -84,9 +84,9 @@ def test_what_cannot_be_is_one_clear_message(
 ) -> None:
     capsys.readouterr()
     assert main(arguments) == status
-    told = capsys.readouterr().err
-    assert problem in told
-    assert told.count("\n") == 1
+    output = capsys.readouterr().err
+    assert problem in output
+    assert output.count("\n") == 1
     assert not (folder / "new.key").exists()
 
 

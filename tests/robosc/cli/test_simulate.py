@@ -324,9 +324,9 @@ def test_a_terminal_has_a_prompt_completion_and_goes_on_after_mistakes(folder: P
     os.close(host)
 
 
-def test_help_tells_every_command_of_the_shell(folder: Path) -> None:
+def test_help_lists_every_command_of_the_shell(folder: Path) -> None:
     made = synthesize(folder / "gate.rscd").supervisor
     assert made is not None
     shell: Any = Shell(Run(made), ModelOfTest(folder / "gate.rscd"))
-    told = {word for line in HELP.splitlines() for word in re.findall(r"[a-z-]+", line)}
-    assert set(shell._commands) <= told
+    listed = {word for line in HELP.splitlines() for word in re.findall(r"[a-z-]+", line)}
+    assert set(shell._commands) <= listed

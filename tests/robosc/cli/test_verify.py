@@ -121,8 +121,8 @@ def test_a_false_figure_does_not_prevent_the_search(capsys: pytest.CaptureFixtur
     supervisor["added"] = []
     supervisor["certificate"] |= {"states": "9" * 9, "transitions": None}
     bad.write_text(json.dumps(document), encoding="utf-8")
-    status, told = _json(capsys, str(bad), str(model))
-    assert (status, told["status"], told["checks"]["safe"]) == (1, "failed", "failed")
+    status, result = _json(capsys, str(bad), str(model))
+    assert (status, result["status"], result["checks"]["safe"]) == (1, "failed", "failed")
 
 
 LIVELOCK = """robot Live {
@@ -143,9 +143,9 @@ def test_a_false_claim_about_the_controller_is_found(capsys: pytest.CaptureFixtu
     assert document["supervisor"]["certificate"]["controller"]["finite_response"] == "failed"
     document["supervisor"]["certificate"]["controller"]["finite_response"] = "passed"
     bad.write_text(json.dumps(document), encoding="utf-8")
-    status, told = _json(capsys, str(bad), str(model))
-    assert (status, told["checks"]["certificate"]) == (1, "failed")
-    assert told["faults"][0]["message"] == "it says 'finite response of the controller: passed', which is false"
+    status, result = _json(capsys, str(bad), str(model))
+    assert (status, result["checks"]["certificate"]) == (1, "failed")
+    assert result["faults"][0]["message"] == "it says 'finite response of the controller: passed', which is false"
 
 
 def test_another_model_and_another_deployment_fail(capsys: pytest.CaptureFixture[str], right: str) -> None:
@@ -193,7 +193,7 @@ def test_a_limit_is_a_number(limit: str, right: str) -> None:
     assert ended.value.code == 2
 
 
-def test_synthesis_verifies_as_far_as_it_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_synthesis_verifies_up_to_the_given_limit(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["synth", NAVIGATION, "--verify-limit", "0", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["summary"]["certificate"]["safe"] == "not checked"

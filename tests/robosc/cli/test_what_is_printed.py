@@ -38,7 +38,7 @@ def run(command: str, is_buffered: bool, place: int) -> "subprocess.CompletedPro
 
 
 @pytest.mark.parametrize(("command", "is_buffered"), EACH)
-def test_a_full_disk_is_told(command: str, is_buffered: bool) -> None:
+def test_a_full_disk_is_reported(command: str, is_buffered: bool) -> None:
     with Path("/dev/full").open("w") as full:
         found = run(command, is_buffered, full.fileno())
     assert found.returncode == 2
@@ -64,10 +64,10 @@ def test_a_server_serves_though_nobody_takes_where_it_listens(tmp_path: Path) ->
         assert process.stderr is not None
         try:
             lines = iter(process.stderr.readline, "")
-            told = next((line for line in lines if "listening on 127.0.0.1:" in line), None)
+            address = next((line for line in lines if "listening on 127.0.0.1:" in line), None)
         finally:
             process.terminate()
         rest = process.stderr.read()
-    assert told is not None
-    assert "No space left on device" in told
+    assert address is not None
+    assert "No space left on device" in address
     assert (process.returncode, "Exception" in rest) == (0, False)

@@ -42,7 +42,7 @@ def random_diagram(seed: int, *, is_ordered: bool) -> DecisionDiagram:
         if place != level:
             level, below = place, len(nodes)
         starts = (0, *sorted(dice.sample(range(1, size), dice.randint(0, min(3, size - 1)))))
-        # Newer nodes more often: a root that leads to nearly nothing tells little.
+        # Newer nodes more often: a root that leads to nearly nothing shows little.
         choices = [0, 1, *range(2, below + 2), *range(max(2, below - 2), below + 2)]
         nodes.append(DecisionNode(*place, starts, tuple(dice.choice(choices) for _ in starts)))
     diagram = DecisionDiagram(tuple(nodes), len(nodes) + 1)
@@ -164,7 +164,7 @@ def test_small_diagrams_read_like_the_model(nodes: list[DecisionNode], text: str
     assert in_words(formula, ()) == text
 
 
-def test_a_choice_is_told_as_one() -> None:
+def test_a_choice_is_printed_as_one() -> None:
     domains: dict[Subject, SubjectDomain] = {(name, None): SubjectDomain(("no", "yes"), None) for name in "XABCDEF"}
     nodes = [node("C", None, (0, 1), (0, 1)), node("B", None, (0, 1), (0, 2)), node("A", None, (0, 1), (0, 3))]
     nodes += [node("F", None, (0, 1), (0, 1)), node("E", None, (0, 1), (0, 5)), node("D", None, (0, 1), (0, 6))]
@@ -217,7 +217,7 @@ def test_the_effort_of_all_formulas_together_is_bounded() -> None:
 
 @pytest.mark.parametrize("count", [200, 20_000])
 @pytest.mark.parametrize("make", [range, lambda count: [f"l{number}" for number in range(count)]])
-def test_many_ranges_of_one_place_are_told_without_a_formula(
+def test_many_ranges_of_one_place_are_printed_without_a_formula(
     count: int, make: Callable[[int], range | list[str]]
 ) -> None:
     values = make(count)

@@ -119,7 +119,7 @@ def _is_stable(system: InterpretedSystem, state: dict[Any, Any]) -> bool:
     return not any(system.enabled(event) for event in system.description.resets + system.description.taus)
 
 
-def test_traces_tell_the_truth() -> None:
+def test_traces_lead_to_the_failures_they_report() -> None:
     """Each can be replayed, a cycle leads back to where it began, and two orders end where they say they do."""
     kinds: Counter[str] = Counter()
     for seed in range(150):

@@ -86,7 +86,7 @@ def test_an_explanation_loads_no_more_than_it_needs() -> None:
 
 
 @pytest.mark.parametrize("is_terminal", [False, True])
-def test_on_a_terminal_check_tells_where_to_read_more(
+def test_on_a_terminal_check_says_where_to_read_more(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch, tmp_path: Path, is_terminal: bool
 ) -> None:
     path = tmp_path / "empty.rscd"

@@ -139,7 +139,7 @@ def test_all_examples_bear_a_mark_where_there_is_a_place() -> None:
 def test_what_is_fixed_is_sound(item: Page) -> None:
     if item.fixed[0].kind in AUTOMATIC:
         found = findings(item, item.fixed)
-        # A note tells no fault, and what is fixed may well be worth one.
+        # A note reports no fault, and what is fixed may well be worth one.
         assert [one for one in found if one.severity is not Severity.NOTE or one.code == item.code] == []
 
 
@@ -164,7 +164,7 @@ def test_a_session_goes_as_it_is_shown(item: Page, tmp_path: Path) -> None:
         assert (f"[{item.code}]" in result.stderr) == is_example
 
 
-def test_the_limits_that_pages_tell_are_those_of_the_source() -> None:
+def test_limits_in_pages_are_those_of_the_source() -> None:
     assert f"more than {MAXIMUM_BYTES} bytes" in page("file-too-large").markdown
     assert f"larger than {MAXIMUM_BYTES // 2**20} MiB" in page("file-too-large").markdown
     with pytest.raises(LanguageError) as raised:

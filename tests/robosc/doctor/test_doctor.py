@@ -115,7 +115,7 @@ def test_a_machine_that_has_everything_is_ready(machine: MadeUp, purpose: Purpos
     assert problems(machine, purpose) == {}
 
 
-def test_everything_is_told_where_no_purpose_is(machine: MadeUp) -> None:
+def test_everything_is_reported_where_no_purpose_is_given(machine: MadeUp) -> None:
     parts = [item.part for item in examine(machine)]
     assert {"Python", "robosc", "extra bridge", "ROS 2", "rclpy", "middleware", "rospy", "colcon", "catkin"} <= set(
         parts
@@ -157,7 +157,9 @@ def test_what_is_missing_comes_with_a_fix(
         assert problems(machine)[part].grade is Grade.NOTE
 
 
-def test_without_the_kernel_it_is_told_where_to_read_about_it(machine: MadeUp, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_without_the_kernel_the_report_says_where_to_read_about_it(
+    machine: MadeUp, monkeypatch: pytest.MonkeyPatch
+) -> None:
     assert "kernel" not in problems(machine, Purpose.SYNTH)
     monkeypatch.setattr("robosc.doctor.checks.kernel_problem", lambda: "it was not made")
     found = problems(machine, Purpose.SYNTH)["kernel"]
@@ -176,7 +178,7 @@ def test_ros_that_is_not_sourced(machine: MadeUp) -> None:
     assert found["rclpy"].fix == "source /opt/ros/jazzy/setup.bash"
 
 
-def test_a_distribution_that_is_not_tested_is_told(machine: MadeUp) -> None:
+def test_a_distribution_that_is_not_tested_is_reported(machine: MadeUp) -> None:
     machine.environment = {"ROS_DISTRO": "humble", "ROS_VERSION": "2"}
     assert "tested with jazzy" in problems(machine, Purpose.ROS2)["ROS 2"].message
     # ROS 1 is no distribution of ROS 2.
@@ -205,7 +207,7 @@ def test_why_a_port_cannot_be_used(machine: MadeUp) -> None:
     assert "chmod" in problems(machine, Purpose.BRIDGE)["serial port"].fix
 
 
-def test_who_holds_a_port_is_told(machine: MadeUp) -> None:
+def test_who_holds_a_port_is_reported(machine: MadeUp) -> None:
     machine.users = ("turtlebot3_ros (41)",)
     found = problems(machine, Purpose.BRIDGE)["serial port"]
     assert (found.grade, found.message) == (Grade.NOTE, "/dev/ttyACM0 is used by turtlebot3_ros (41)")
@@ -316,7 +318,7 @@ def test_what_is_no_server(server: str, capsys: pytest.CaptureFixture[str]) -> N
 
 
 @pytest.mark.parametrize(
-    ("version", "told"),
+    ("version", "message"),
     [
         ((3, 10, 12), "3.10.12 is too old; RoboSC needs 3.12 or 3.13"),
         ((3, 11, 7), "3.11.7 is too old; RoboSC needs 3.12 or 3.13"),
@@ -325,21 +327,23 @@ def test_what_is_no_server(server: str, capsys: pytest.CaptureFixture[str]) -> N
         ((3, 14, 0), "3.14.0 is newer than what is tested; RoboSC needs 3.12 or 3.13"),
     ],
 )
-def test_versions_of_python(version: tuple[int, ...], told: str) -> None:
-    assert unsupported(version) == told
+def test_versions_of_python(version: tuple[int, ...], message: str) -> None:
+    assert unsupported(version) == message
 
 
 def test_the_metadata_has_the_same_versions_of_python() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text("utf-8"))["project"]
     versions = [f"{OLDEST[0]}.{minor}" for minor in range(OLDEST[1], NEWEST[1] + 1)]
     assert project["requires-python"] == f">={versions[0]},<{NEWEST[0]}.{NEWEST[1] + 1}"
-    told = [line.rpartition(" ")[2] for line in project["classifiers"] if line.startswith("Programming Language")]
-    assert told == versions
+    message = [line.rpartition(" ")[2] for line in project["classifiers"] if line.startswith("Programming Language")]
+    assert message == versions
     matrix = (ROOT / "docs" / "install.md").read_text("utf-8")
     assert all(f"| {version} |" in matrix for version in versions)
 
 
-def test_an_old_python_tells_that_it_is(monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:
+def test_an_old_python_is_refused_with_its_version(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
     monkeypatch.setattr(sys, "version_info", (3, 11, 7, "final", 0))
 
     def load() -> Callable[[], int]:

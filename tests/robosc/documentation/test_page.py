@@ -33,7 +33,7 @@ def section(sections: list[Section], title: str) -> Section:
 
 
 def agrees(model: Model, text: str) -> None:
-    """The page tells of every part of the model what the model says, and is well formed."""
+    """The page says of every part of the model what the model says, and is well formed."""
     sections = read_page(text)
     assert (sections[0].level, sections[0].title) == (1, model.name)
     titles = [item.title for item in sections if item.level == 2]
@@ -321,7 +321,7 @@ def test_what_extends_a_communication_has_columns_of_its_own() -> None:
     assert "stamped with frame" not in rows[0]
 
 
-def test_findings_are_told_with_their_line() -> None:
+def test_findings_are_reported_with_their_line() -> None:
     place = Location("/somewhere/robot.rscd", 7, 3)
     finding = Diagnostic(Severity.NOTE, "partial-update", "<b> *can* | be", place, "Fix `it`.")
     lines = section(read_page(page(model_of("robot R { }"), [finding])), "Findings").lines

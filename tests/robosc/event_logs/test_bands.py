@@ -25,10 +25,10 @@ from robosc.motion_record import Motion, Sample
 SVG = "{http://www.w3.org/2000/svg}"
 
 
-def run_of(*told: tuple[float, str, Any]) -> LoggedRun:
+def run_of(*given: tuple[float, str, Any]) -> LoggedRun:
     """A log: events by the state of a component `Arm`, or entries of other kinds by their fields."""
     entries = []
-    for line, (time_s, name, content) in enumerate(told, 1):
+    for line, (time_s, name, content) in enumerate(given, 1):
         if name in ("restart", "blocked", "fault"):
             entries.append(LogEntry(line, 100.0 + time_s, name, "", False, content))
         else:
@@ -61,14 +61,14 @@ def test_a_band_has_a_gap_where_the_model_began_again() -> None:
 
 
 @pytest.mark.parametrize("seed", range(5))
-def test_bands_tell_the_state_at_every_time(seed: int) -> None:
+def test_bands_show_the_state_at_every_time(seed: int) -> None:
     """The twin looks the last event before each time up."""
     chance = random.Random(seed)
     times = sorted(chance.uniform(0.0, 10.0) for _ in range(60))
-    told = [(time_s, "e", arm(chance.choice("abc"))) for time_s in times]
-    told[chance.randrange(20, 40)] = (times[30], "restart", {"what": ""})
-    told.sort(key=lambda item: item[0])
-    run = run_of(*told)
+    given = [(time_s, "e", arm(chance.choice("abc"))) for time_s in times]
+    given[chance.randrange(20, 40)] = (times[30], "restart", {"what": ""})
+    given.sort(key=lambda item: item[0])
+    run = run_of(*given)
     begin_s, end_s = 1.0, times[-1] - times[0]
     (band,), _ = bands_of(run, begin_s, end_s)
     for _ in range(200):

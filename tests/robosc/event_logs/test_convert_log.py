@@ -1,4 +1,4 @@
-"""Event logs as MCAP files: read back, they tell what the log and the record of motion tell."""
+"""Event logs as MCAP files: read back, they hold what the log and the record of motion hold."""
 
 import json
 import math
@@ -88,8 +88,8 @@ def test_every_entry_stands_in_the_log_topic_in_words(tmp_path: Path) -> None:
         entry("dropped", count=3),
     )
     found = convert_log(log, tmp_path / "run.mcap")
-    told = [(item.level, item.name, item.msg, item.function, item.line) for item in on(found.path, "/robosc/log")]
-    assert told == [
+    read_back = [(item.level, item.name, item.msg, item.function, item.line) for item in on(found.path, "/robosc/log")]
+    assert read_back == [
         (20, "go.request", "go.request: speed = 0.5", "event", 1),
         (30, "blocked", "blocked: /cmd_vel, forbidden", "blocked", 2),
         (30, "scan.response", "unknown scan.response: Arm.a, Arm.b", "unknown", 3),
@@ -102,7 +102,7 @@ def test_every_entry_stands_in_the_log_topic_in_words(tmp_path: Path) -> None:
     assert found.notes == ("the log lacks 3 entries that its writer lost",)
 
 
-def test_states_and_variables_are_told_when_they_change(tmp_path: Path) -> None:
+def test_states_and_variables_are_written_when_they_change(tmp_path: Path) -> None:
     log = written(
         tmp_path,
         event(0.0, "a", arm("up", n=1, x=1, flag=True, front="wall", pose={"x": 0.5, "unset": None})),
@@ -129,7 +129,7 @@ def test_states_and_variables_are_told_when_they_change(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_last_messages_by_any_time_are_the_state_of_the_log(tmp_path: Path, seed: int) -> None:
-    """The twin: each state of the log as a whole, beside the changes that the messages tell."""
+    """The twin: each state of the log as a whole, beside the changes in the messages."""
     import random
 
     chance = random.Random(seed)
@@ -146,10 +146,10 @@ def test_the_last_messages_by_any_time_are_the_state_of_the_log(tmp_path: Path, 
             last[topic] = content.data
         by_time[time_ns] = dict(last)
     for entry in read_log(tmp_path / "run.jsonl").entries:
-        told = by_time[round(entry.time_s * 1e6) * 1000]
+        read_back = by_time[round(entry.time_s * 1e6) * 1000]
         for name, part in entry.state.items():
-            assert told[f"/robosc/state/{name}"] == part["state"]
-            assert told[f"/robosc/variables/{name}/v"] == part["variables"]["v"]
+            assert read_back[f"/robosc/state/{name}"] == part["state"]
+            assert read_back[f"/robosc/variables/{name}/v"] == part["variables"]["v"]
 
 
 def test_names_that_ros_refuses_are_changed_and_stay_different(tmp_path: Path) -> None:

@@ -61,7 +61,7 @@ def test_a_fault_after_the_last_event_is_drawn() -> None:
 
 
 def test_what_says_nothing_new_can_be_left_out() -> None:
-    told = [
+    given = [
         ("a", 1, "x"),
         ("a", 1, "x"),
         ("a", 2, "x"),
@@ -73,7 +73,7 @@ def test_what_says_nothing_new_can_be_left_out() -> None:
     run = LoggedRun(
         tuple(
             LogEntry(line, float(line), "event", name, False, {"data": data, "state": {"A": {"state": state}}})
-            for line, (name, data, state) in enumerate(told, 1)
+            for line, (name, data, state) in enumerate(given, 1)
         )
     )
     sequence = sequence_of(run, only_changes=True)
@@ -89,7 +89,7 @@ def test_what_says_nothing_new_can_be_left_out() -> None:
         ({"events": ("move",)}, "no event of the log is called 'move'; there are scan.response, move.request"),
     ],
 )
-def test_nothing_to_show_is_told(chosen: dict[str, object], problem: str, tmp_path: Path) -> None:
+def test_nothing_to_show_is_reported(chosen: dict[str, object], problem: str, tmp_path: Path) -> None:
     with pytest.raises(PlotError) as caught:
         draw_sequence(SHORT, tmp_path / "plot.png", **chosen)  # type: ignore[arg-type]
     assert str(caught.value).startswith(problem)
@@ -100,7 +100,7 @@ def test_nothing_to_show_is_told(chosen: dict[str, object], problem: str, tmp_pa
     assert list(tmp_path.iterdir()) == []
 
 
-def test_marks_that_would_cover_one_of_the_same_event_are_left_out_and_told() -> None:
+def test_marks_that_would_cover_one_of_the_same_event_are_left_out_and_reported() -> None:
     run = run_of(*((number * 0.001, "scan.response") for number in range(10_001)), (10.0, "move.request"))
     sequence = sequence_of(run).thinned(100)
     scan, move = sequence.rows

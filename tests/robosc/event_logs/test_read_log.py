@@ -54,7 +54,7 @@ def test_components_that_do_not_change_are_kept_once_but_never_mixed_up(tmp_path
     assert [repr(entry.state["A"]["variables"]["v"]) for entry in run.entries] == ["1", "1", "1.0", "True"]
 
 
-def test_a_last_line_that_is_cut_off_is_left_out_and_told(tmp_path: Path) -> None:
+def test_a_last_line_that_is_cut_off_is_left_out_and_reported(tmp_path: Path) -> None:
     run = read_log(written(tmp_path, event(), '{"time":2.0,"kind":"ev', end=""))
     assert (len(run.entries), run.torn_line) == (1, 2)
     assert run.notes() == ("line 2, the last one, is cut off and was left out",)
@@ -101,7 +101,7 @@ def test_lines_that_were_torn_by_a_full_disk_are_those_that_the_log_counts(tmp_p
         ('{"time": 1.0, "kind": "x", "n": ' + "9" * 5000 + "}", "no JSON"),
     ],
 )  # fmt: skip
-def test_what_is_no_entry_is_told_with_its_line(line: Any, problem: str, tmp_path: Path) -> None:
+def test_what_is_no_entry_is_reported_with_its_line(line: Any, problem: str, tmp_path: Path) -> None:
     file = written(tmp_path, event(), line, event())
     with pytest.raises(LogError) as caught:
         read_log(file)

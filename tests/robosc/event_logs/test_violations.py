@@ -59,7 +59,9 @@ def log() -> list[Entry]:
     return World.of(bench)
 
 
-def told(folder: Path, entries: list[Entry], deployment: Deployment = Deployment.CONTROLLER) -> list[tuple[int, str]]:
+def violations_of(
+    folder: Path, entries: list[Entry], deployment: Deployment = Deployment.CONTROLLER
+) -> list[tuple[int, str]]:
     found = check_log(read(folder, entries), supervisor(deployment))
     return [(item.line, item.sentence) for item in found.violations]
 
@@ -73,7 +75,7 @@ def test_the_log_is_right(tmp_path: Path) -> None:
     assert names(entries) == [
         "look.request", "scan.response", "level.response", "Eye.tau_1", "look.response", "look.reset", "go.request",
     ]  # fmt: skip
-    assert told(tmp_path, entries) == []
+    assert violations_of(tmp_path, entries) == []
 
 
 def wrong(number: int, **changes: Any) -> list[Entry]:
@@ -120,10 +122,10 @@ _NOTHING_NEAR = {"value.level": 5}
         ),
     ],
 )
-def test_what_is_wrong_is_told_once_with_its_line(
+def test_what_is_wrong_is_reported_once_with_its_line(
     entries: list[Entry], line: int, sentence: str, tmp_path: Path
 ) -> None:
-    found = told(tmp_path, entries)
+    found = violations_of(tmp_path, entries)
     assert found[0][0] == line
     assert found[0][1].startswith(sentence)
     assert len(found) <= 2
@@ -137,20 +139,20 @@ def test_a_difference_says_what_is_what(tmp_path: Path) -> None:
         "the state after level.response is not the logged one: Eye.level is 5, not 7; Eye.far is 2.0, not 3.0; Wheels "
         "is in on_ground, not in in the air"
     )
-    assert told(tmp_path, entries)[0] == (3, sentence)
+    assert violations_of(tmp_path, entries)[0] == (3, sentence)
 
 
 def test_what_the_log_leaves_out_is_taken_from_it(tmp_path: Path) -> None:
-    assert told(tmp_path, wrong(3, data=_NOTHING_NEAR)) == []
+    assert violations_of(tmp_path, wrong(3, data=_NOTHING_NEAR)) == []
 
 
 def test_messages_as_they_came_are_converted(tmp_path: Path) -> None:
     """Check messages as nodes in C++ log them."""
     entries = wrong(2, data={"near": 2.0, "level": 5})
     entries[2]["data"] = {"near": 2.0, "level": 5}
-    assert told(tmp_path, entries) == []
+    assert violations_of(tmp_path, entries) == []
     entries[1]["data"] = {"near": 0.5, "level": 5}
-    assert told(tmp_path, entries)[0][0] == 2
+    assert violations_of(tmp_path, entries)[0][0] == 2
 
 
 def test_a_request_while_the_robot_is_to_be_at_rest(tmp_path: Path) -> None:
@@ -158,20 +160,20 @@ def test_a_request_while_the_robot_is_to_be_at_rest(tmp_path: Path) -> None:
     stop = {"time": 1.0, "kind": "stop", "what": "scan on /scan is stale"}
     entries.insert(6, stop)
     sentence = "go.request happened while the robot was to be at rest: scan on /scan is stale"
-    assert told(tmp_path, entries) == [(8, sentence)]
+    assert violations_of(tmp_path, entries) == [(8, sentence)]
     entries.insert(7, {"time": 1.0, "kind": "resume", "what": "level is back"})
-    assert len(told(tmp_path, entries)) == 1
+    assert len(violations_of(tmp_path, entries)) == 1
     entries.insert(8, {"time": 1.0, "kind": "resume", "what": "scan is back"})
-    assert told(tmp_path, entries) == []
+    assert violations_of(tmp_path, entries) == []
     entries[6] = {"time": 1.0, "kind": "fault", "what": "it broke"}
-    assert told(tmp_path, entries) == [(10, "go.request happened while the robot was to be at rest: a fault")]
+    assert violations_of(tmp_path, entries) == [(10, "go.request happened while the robot was to be at rest: a fault")]
 
 
 def test_a_stop_of_somebody_else_is_not_ended_by_a_sensor_of_that_name(tmp_path: Path) -> None:
     entries = log()
     entries.insert(6, {"time": 1.0, "kind": "stop", "what": "scan on the operator's desk"})
     entries.insert(7, {"time": 1.0, "kind": "resume", "what": "scan is back"})
-    assert [line for line, _ in told(tmp_path, entries)] == [9]
+    assert [line for line, _ in violations_of(tmp_path, entries)] == [9]
 
 
 PROVIDING = """
@@ -202,7 +204,7 @@ def given() -> list[Entry]:
     return World.of(bench)
 
 
-def told_of_giver(folder: Path, entries: list[Entry]) -> list[tuple[int, str]]:
+def violations_of_giver(folder: Path, entries: list[Entry]) -> list[tuple[int, str]]:
     found = check_log(read(folder, entries), supervisor_of(model_of(PROVIDING)))
     return [(item.line, item.sentence) for item in found.violations]
 
@@ -211,13 +213,13 @@ def test_requests_carry_what_the_model_provides(tmp_path: Path) -> None:
     entries = given()
     assert names(entries) == ["often.response", "ready.response", "go.request", "often.response", "go.request"]
     assert entries[4]["data"] == {"x": 0.1 + 0.2, "inner": {"n": 1}}
-    assert told_of_giver(tmp_path, entries) == []
+    assert violations_of_giver(tmp_path, entries) == []
     # The last place of a double is a matter of who computes it.
     entries[4]["data"]["x"] = 0.3
-    assert told_of_giver(tmp_path, entries) == []
+    assert violations_of_giver(tmp_path, entries) == []
     for data in (77, None, {"x": 0.3}, {"x": 0.3, "inner": {"n": 0}}, {"x": 0.31, "inner": {"n": 1}}):
         entries[4]["data"] = data
-        ((line, sentence),) = told_of_giver(tmp_path, entries)
+        ((line, sentence),) = violations_of_giver(tmp_path, entries)
         assert line == 5
         assert sentence.startswith("go.request carries ")
         assert sentence.endswith('where the model provides {"x": 0.30000000000000004, "inner": {"n": 1}}')
@@ -226,11 +228,11 @@ def test_requests_carry_what_the_model_provides(tmp_path: Path) -> None:
 def test_nothing_is_requested_before_the_first_message_of_a_sensor_that_may_be_stale(tmp_path: Path) -> None:
     entries = given()
     entries.insert(1, entries.pop(2))
-    found = told_of_giver(tmp_path, entries)
+    found = violations_of_giver(tmp_path, entries)
     assert found == [(2, "go.request happened before the first message on /ready")]
     # It may have come with nothing that could be taken.
     entries.insert(1, {"time": 1.0, "kind": "unknown", "event": "ready.response", "unknown": ["value"]})
-    assert told_of_giver(tmp_path, entries) == []
+    assert violations_of_giver(tmp_path, entries) == []
 
 
 def test_a_log_without_events_has_not_passed(tmp_path: Path) -> None:
@@ -244,15 +246,15 @@ def test_a_log_without_events_has_not_passed(tmp_path: Path) -> None:
 def test_a_restart_begins_in_the_initial_state(tmp_path: Path) -> None:
     entries = log()
     entries += [{"time": 1.0, "kind": "fault", "what": "x"}, {"time": 1.0, "kind": "restart", "what": ""}, *log()]
-    assert told(tmp_path, entries) == []
+    assert violations_of(tmp_path, entries) == []
     del entries[8]
-    assert told(tmp_path, entries)[0][0] == 9
+    assert violations_of(tmp_path, entries)[0][0] == 9
 
 
 def test_what_is_unexpected_must_not_be_possible(tmp_path: Path) -> None:
     unexpected = {"time": 1.0, "kind": "unexpected", "event": "look.response", "data": None}
-    assert told(tmp_path, [*log(), unexpected]) == []
-    found = told(tmp_path, [log()[0], unexpected])
+    assert violations_of(tmp_path, [*log(), unexpected]) == []
+    found = violations_of(tmp_path, [log()[0], unexpected])
     assert found == [(2, "look.response is logged as unexpected, but could happen")]
 
 
@@ -275,9 +277,9 @@ def blocked(identifier: str, why: str) -> Entry:
     ],
 )
 def test_whether_a_layer_was_right_to_hold_a_request_back(entry: Entry, sentence: str, tmp_path: Path) -> None:
-    found = told(tmp_path, [entry], Deployment.LAYER)
+    found = violations_of(tmp_path, [entry], Deployment.LAYER)
     assert [text[: len(sentence)] for _, text in found] == [sentence] * bool(sentence)
-    assert told(tmp_path, [entry]) == [(1, "a controller holds back nothing, as a layer does")]
+    assert violations_of(tmp_path, [entry]) == [(1, "a controller holds back nothing, as a layer does")]
 
 
 def test_a_layer_as_it_is(tmp_path: Path) -> None:
@@ -300,7 +302,7 @@ def test_a_supervisor_of_another_deployment_is_refused(tmp_path: Path) -> None:
         check_log(read(tmp_path, []), made, Deployment.LAYER)
 
 
-def test_only_so_many_violations_are_told_one_by_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_violations_beyond_the_limit_are_only_counted(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(checking, "MAXIMUM_VIOLATIONS", 2)
     found = check_log(read(tmp_path, wrong(1, event="come.request")[:1] * 5), supervisor())
     assert (len(found.violations), found.violation_count, found.has_passed) == (2, 5, False)

@@ -6,11 +6,8 @@ import pytest
 
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.protocol import ControlledSystem
-from robosc.model.structure import Deployment
-from robosc.supervisor import Supervisor
+from support.execution import unsupervised
 from support.generated import load_system
-from support.models import model_of
-from support.random_supervisors import CERTIFICATE
 
 MODEL = """
 robot R {
@@ -44,7 +41,7 @@ robot R {
 
 @pytest.fixture(params=["interpreted", "generated"])
 def system(request: pytest.FixtureRequest) -> ControlledSystem:
-    supervisor = Supervisor(model_of(MODEL), Deployment.CONTROLLER, (), CERTIFICATE)
+    supervisor = unsupervised(MODEL)
     return InterpretedSystem(supervisor) if request.param == "interpreted" else load_system(supervisor)
 
 

@@ -36,7 +36,7 @@ robot Robot {
 """.replace("transition if distance > 1.0 goto far", "on response from scan do distance := value goto far")
 
 
-def test_every_event_is_told_with_all_that_belongs_to_it() -> None:
+def test_every_event_is_logged_with_all_that_belongs_to_it() -> None:
     b = bench(ROBOT)
     b.clock.advance(2.5)
     b.receive("scan", 4.0)

@@ -58,7 +58,7 @@ def test_what_is_allowed_goes_through_unchanged() -> None:
     assert (entry["event"], entry["controllable"], entry["data"]) == ("move.request", True, ON)
 
 
-def test_what_is_not_allowed_is_held_back_told_and_logged() -> None:
+def test_what_is_not_allowed_is_held_back_reported_and_logged() -> None:
     b = layer(ROBOT)
     b.receive("/scan", False)
     assert b.request("/cmd_vel", ON) == [BLOCKED]

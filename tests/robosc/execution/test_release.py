@@ -1,5 +1,7 @@
 """Semantics 3.6: messages that keep acting after they were sent."""
 
+import pytest
+
 from support.execution import Bench, Sent, bench, example_system
 
 HEAD = """
@@ -123,8 +125,16 @@ def test_what_the_request_itself_makes_false_releases_nothing() -> None:
     assert b.receive("done") == []
 
 
-def test_another_conjunct_that_turns_releases_while_the_request_is_not_enabled_anyway() -> None:
-    b = bench(SELF)
+@pytest.mark.parametrize(
+    "requirement",
+    [
+        "requirement rotate needs Rotator.idle and Rotator.healthy",
+        "requirement Rotator.turning or !Rotator.healthy disables rotate",
+    ],
+    ids=["needs", "disables"],
+)
+def test_another_conjunct_that_turns_releases_while_the_request_is_not_enabled_anyway(requirement: str) -> None:
+    b = bench(SELF.replace("requirement rotate needs Rotator.idle and Rotator.healthy", requirement))
     b.tick()
     assert b.receive("fault") == [ZERO]
 
@@ -134,17 +144,6 @@ def test_a_conjunct_is_watched_only_from_the_message_on() -> None:
     b.receive("fault")
     assert b.tick(2) == []
     assert b.receive("fault") == []
-
-
-def test_disables_is_watched_conjunct_by_conjunct() -> None:
-    b = bench(
-        SELF.replace(
-            "requirement rotate needs Rotator.idle and Rotator.healthy",
-            "requirement Rotator.turning or !Rotator.healthy disables rotate",
-        )
-    )
-    b.tick()
-    assert b.receive("fault") == [ZERO]
 
 
 def test_a_blocked_request_releases_like_a_forbidden_one() -> None:
@@ -328,18 +327,13 @@ RESTING = (
 )
 
 
-def test_what_came_true_after_the_message_releases_when_it_turns_again() -> None:
-    b = bench(RESTING.replace("LATER", "idle"))
+@pytest.mark.parametrize("later", ["idle", "resting"], ids=["enabled-meanwhile", "not-enabled-meanwhile"])
+def test_what_came_true_after_the_message_releases_when_it_turns_again(later: str) -> None:
+    b = bench(RESTING.replace("LATER", later))
     assert len(b.tick()) == 1
     assert b.receive("done") == []
-    assert b.receive("fault") == [ZERO]
-
-
-def test_so_does_a_conjunct_of_a_request_that_was_not_enabled_meanwhile() -> None:
-    b = bench(RESTING.replace("LATER", "resting"))
-    assert len(b.tick()) == 1
-    assert b.receive("done") == []
-    assert b.tick() == []
+    if later == "resting":
+        assert b.tick() == []
     assert b.receive("fault") == [ZERO]
 
 
@@ -349,7 +343,7 @@ def test_after_a_stop_nothing_acts_any_more() -> None:
     assert b.receive("clear", False) == []
 
 
-def test_so_does_a_request_without_requirements_that_was_enabled_meanwhile() -> None:
+def test_a_request_without_requirements_that_was_enabled_meanwhile_releases() -> None:
     b = bench(
         f"""
         robot Lifted {{ {HEAD}

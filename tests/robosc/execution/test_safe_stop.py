@@ -429,7 +429,7 @@ def test_a_goal_that_ends_at_the_moment_of_a_fault_has_ended() -> None:
     assert ("goal", "park", 1, None) in b.tick(3)
     b.executor.on_goal_accepted(1)
     b.clock.advance(3.0)
-    # The call has timed out, so that the wheels must stop, and they cannot be told to.
+    # The call has timed out, so that the wheels must stop, and that cannot be commanded.
     b.middleware.failing = {"publish_default"}
     b.executor.on_goal_ended(1, "succeeded", None)
     assert b.executor.is_faulty

@@ -19,6 +19,7 @@ from robosc.synthesis.engines import make_manager
 from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
 from robosc.synthesis.ways import WayNotFoundError
 from support.effort import seeds
+from support.engines import needs_cudd
 from support.random_systems import explicit_supervisor, random_system, wide_system
 
 EXAMPLES = 40
@@ -27,10 +28,7 @@ WIDE = ("plant condition", "nobody's", "impossible")
 STATES = 6
 """States of a system that are looked at."""
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _needs_cudd() -> None:
-    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+pytestmark = needs_cudd
 
 
 class Twin:
@@ -246,7 +244,7 @@ def test_ways_of_the_plants_leave_what_is_allowed(effort: int, monkeypatch: pyte
 
 @pytest.mark.random
 def test_ways_are_given_up(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Check that what takes too long is told as that, and never as no way at all."""
+    """Check that what takes too long is reported as that, and never as no way at all."""
     met: Counter[str] = Counter()
     monkeypatch.setattr(runs, "MAXIMUM_EFFORT", 0)
     monkeypatch.setattr(ways, "MAXIMUM_NODES", 0)

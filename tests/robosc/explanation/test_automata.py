@@ -71,7 +71,7 @@ def explained(system: System, state: str | None = None) -> Explanation:
 
 
 def values_of(system: System, state: tuple[object, ...]) -> StateValues:
-    """A state as an explanation tells it."""
+    """A state as an explanation shows it."""
     values = dict(zip(subjects(system), state, strict=True))
     return StateValues(
         components={item.name: str(values[Subject(item.name)]) for item in system.automata if len(item.locations) > 1},
@@ -128,7 +128,7 @@ _SEARCHES: tuple[Callable[..., Any], ...] = (
 
 
 @pytest.mark.random
-def test_either_search_tells_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_both_searches_find_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     """No explanation speaks of what is left out since nothing leads there."""
     pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
     for seed in seeds(EXAMPLES):
@@ -141,7 +141,7 @@ def test_either_search_tells_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 @pytest.mark.parametrize("search", _SEARCHES)
-def test_a_step_that_never_happens_is_told_by_its_harmful_target(
+def test_a_step_that_never_happens_is_explained_by_its_harmful_target(
     search: Callable[..., Any], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """From b, which no run reaches, there is a way on: the trouble is c."""
@@ -160,8 +160,8 @@ def test_states_that_no_run_reaches_do_not_hold_up_explanations() -> None:
     pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
     found = check_cif(load_cif(Path(__file__).parents[2] / "models" / "wafer_handling.cif"))
     assert found.system is not None
-    told = explain_synthesis(SystemWords(found.system), engine="cudd", event="load.c_on")
-    assert told.events[0].status == "restricted"
+    result = explain_synthesis(SystemWords(found.system), engine="cudd", event="load.c_on")
+    assert result.events[0].status == "restricted"
 
 
 def _check_a_state(system: System, seed: int, met: Counter[str]) -> None:
@@ -208,7 +208,7 @@ LIMIT = Automaton("limit", ("x", "y"), ("x",), frozenset({"x"}), frozenset({"go"
 AT = Location("made.cif", 3, 5)
 
 
-def test_a_requirement_automaton_is_told_with_its_place_and_its_location() -> None:
+def test_a_requirement_automaton_is_reported_with_its_place_and_its_location() -> None:
     free = Automaton("limit", ("x", "y"), ("x",), frozenset({"x", "y"}), frozenset({"go"}), (Edge("x", "go", "y"),),
                      role=Role.REQUIREMENT)  # fmt: skip
     system = System("s", (GO, STOP), (PLANT, free))
@@ -281,7 +281,7 @@ def test_runs_begin_where_the_supervisor_lets_them() -> None:
     assert explain_synthesis(words, after="go").state is not None
 
 
-def test_no_initial_state_is_told() -> None:
+def test_no_initial_state_is_reported() -> None:
     system = System("s", (GO, STOP), (PLANT,), initial=StateTest("p.q", "b"))
     found = explain_synthesis(SystemWords(system))
     assert found.empty is not None

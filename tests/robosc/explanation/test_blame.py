@@ -23,15 +23,13 @@ from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
 from robosc.verification import synthesize_explicit
 from support.effort import seeds
 from support.empty_systems import empty_system
+from support.engines import needs_cudd
 
 ENGINES = ("cudd", "autoref")
 EXAMPLES = 30
 LIMIT = 50_000
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _needs_cudd() -> None:
-    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+pytestmark = needs_cudd
 
 
 def empty(seed: int) -> System:
@@ -355,7 +353,7 @@ def _check_detour(
     met[str(BlockingCauseKind.BEHAVIOUR)] += BlockingCauseKind.BEHAVIOUR not in kinds
 
 
-def test_a_search_that_takes_too_long_tells_what_it_has() -> None:
+def test_a_search_that_takes_too_long_reports_what_it_has() -> None:
     """Check for any limit: blamed constraints are to blame, and only a search to its end calls the blame minimal."""
     symbolic = Symbolic(empty_system(3), "cudd")
     full = find_blame(symbolic.problems, symbolic.constraints, symbolic.manager.false, symbolic.monitor)

@@ -12,12 +12,13 @@ from robosc.execution.runtime.event_log import plain
 from robosc.explanation.blocked import MAXIMUM_REASONS, Requests, StateError, read_value
 from robosc.explanation.notation import MAXIMUM_NAMES
 from robosc.expressions import BooleanType, DoubleType, EnumType, IntegerType, StringType
-from robosc.model.structure import CommunicationKind, Deployment
+from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
 from support.effort import examples
+from support.execution import supervisor_of
 from support.generated import example_supervisor
 from support.models import model_of
-from support.random_supervisors import CERTIFICATE, random_data, random_supervisor
+from support.random_supervisors import random_data, random_supervisor
 
 _CALLED = (CommunicationKind.SERVICE, CommunicationKind.ACTION)
 
@@ -78,7 +79,7 @@ def test_a_request_has_a_reason_if_and_only_if_it_is_not_enabled(seed: int) -> N
 
 @given(st.integers(0, 10**6))
 @settings(max_examples=examples(40))
-def test_what_is_told_without_locations_holds_with_them(seed: int) -> None:
+def test_a_report_without_locations_holds_with_them(seed: int) -> None:
     supervisor, dice = random_supervisor(seed), Random(seed)
     requests = Requests(supervisor.executable, supervisor.added)
     for system in wander(supervisor, dice, 6):
@@ -87,8 +88,8 @@ def test_what_is_told_without_locations_holds_with_them(seed: int) -> None:
         whole, part = requests.availability(system.state(), known), requests.availability(system.state(), some)
         assert set(part.enabled) <= set(whole.enabled)
         assert {item.event for item in part.blocked} <= {item.event for item in whole.blocked}
-        told = {*part.enabled, *part.unknown, *(item.event for item in part.blocked)}
-        assert told == set(requests.events)
+        reported = {*part.enabled, *part.unknown, *(item.event for item in part.blocked)}
+        assert reported == set(requests.events)
 
 
 def test_the_sentences_are_in_the_words_of_the_model() -> None:
@@ -145,7 +146,7 @@ def test_what_a_requirement_reads_is_listed_up_to_a_limit() -> None:
         f"behaviour {{ {variables} initial marked state s {{ }} }} }} "
         f"requirement few needs C.v0 > C.v1 requirement many needs {' + '.join(f'C.{name}' for name in names)} > 9 }}"
     )
-    supervisor = Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE)
+    supervisor = supervisor_of(model)
     available = Requests(supervisor.executable, ()).availability(InterpretedSystem(supervisor).state(), {})
     few, many = (item.why[0] for item in available.blocked)
     assert few.endswith("C.v0 > C.v1, which does not hold (C.v0 is 1, C.v1 is 1)")

@@ -21,20 +21,12 @@ from robosc.source import Location
 from robosc.synthesis import runs, ways
 from robosc.verification import ExplicitSupervisor, synthesize_explicit
 from support.effort import seeds
-from support.models import checked, marked_place
+from support.engines import needs_cudd
+from support.models import DOOR, checked, marked_place
 from support.random_supervisors import random_supervisor
 
 LIMIT = 2_000
 EXAMPLES = 40
-
-DOOR = """component Door {
-    incoming message open with type: none
-    incoming message shut with type: none
-    behaviour {
-        initial marked state closed { on request to open goto opened }
-        marked state opened { on request to shut goto closed }
-    }
-}"""
 
 LIFT = """component Lift {
     outgoing message up with type: none
@@ -49,10 +41,7 @@ LIFT = """component Lift {
 requirement bottom needs Lift.n = 0"""
 """Armed, it may count beyond its range; nothing sets it back."""
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _needs_cudd() -> None:
-    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+pytestmark = needs_cudd
 
 
 def robot(*parts: str) -> str:
@@ -87,7 +76,7 @@ def place(location: Location | None) -> tuple[int, int]:
 # No supervisor
 
 
-def test_trouble_and_blame_tell_one_story() -> None:
+def test_trouble_and_blame_agree() -> None:
     """Two things are broken, each of them enough; the one that is not blamed would be broken sooner."""
     text = """component C { outgoing message slip with type: none
         behaviour { initial marked state a { on response from slip goto b }
@@ -259,7 +248,7 @@ def test_never_because_of_behaviours_requirements_or_the_supervisor() -> None:
     report = event(robot(door), "slam")
     assert (report.status, [item.kind for item in report.reasons]) == ("never", ["behaviour"])
     assert report.stopped is None
-    # There is a way, but it is forbidden: that is told.
+    # There is a way, but it is forbidden: that is reported.
     reachable = door.replace("to shut goto closed", "to shut goto ajar")
     report = event(robot(reachable, "requirement shut needs Door.closed"), "slam")
     assert report.status == "never"
@@ -304,7 +293,7 @@ def test_ways_that_take_too_long_to_find(monkeypatch: pytest.MonkeyPatch) -> Non
     assert (report.status, report.stopped, report.unfound) == ("never", None, unfound)
     assert f"slam.request: can never happen\n  {report.reasons[0].message}" in str(explained(reachable, event="slam"))
     assert f"\n  {unfound}" in str(explained(reachable, event="slam"))
-    # Where it is known that there is none, that is told.
+    # Where it is known that there is none, that is reported.
     (ajar, *_) = explained(
         robot(DOOR.replace("marked state opened", "marked state ajar { }\n marked state opened"))
     ).remarks
@@ -400,7 +389,7 @@ def test_a_silent_step_that_changes_nothing_is_no_way_on() -> None:
     assert [item.kind for item in explained(text).remarks] == ["only-uncontrollable"]
 
 
-def test_an_unknown_requirement_is_told_to_be_unknown() -> None:
+def test_an_unknown_requirement_is_reported_as_unknown() -> None:
     text = robot(
         """component N { outgoing message p with type: integer(0..60) incoming message go with type: none
            behaviour { variable n: integer(0..60) on response from p do n := value
@@ -417,7 +406,7 @@ def test_an_unknown_requirement_is_told_to_be_unknown() -> None:
         assert reason.message.endswith(why)
 
 
-def test_what_is_told_is_what_stands_in_every_way() -> None:
+def test_a_reported_condition_holds_in_every_way() -> None:
     """The first event of the shortest way is possible later; what stops every way is the last."""
     text = robot(
         """component S { outgoing message o with type: none
@@ -482,7 +471,7 @@ def test_texts_are_on_one_line_and_the_document_has_every_attribute() -> None:
 
 
 def places_of(model: Model) -> Places:
-    """A place of its own for every part of a model; lines tell which part."""
+    """A place of its own for every part of a model; lines say which part."""
     places = Places(Location("m", 1, 1))
     places.communications.update({item.name: Location("c", n + 1, 1) for n, item in enumerate(model.communications)})
     places.requirements.extend(Location("r", n + 1, 1) for n in range(len(model.requirements)))

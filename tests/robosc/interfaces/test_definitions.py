@@ -87,7 +87,7 @@ def test_what_is_no_definition(text: str) -> None:
         ("int8[3] s", None),
     ],
 )
-def test_the_version_of_ros_that_a_text_tells(text: str, version: int | None) -> None:
+def test_the_version_of_ros_that_a_text_shows(text: str, version: int | None) -> None:
     assert ros_version_of(parse_definition(text, "p"), "p") == version
 
 

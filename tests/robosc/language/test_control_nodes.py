@@ -68,14 +68,14 @@ BODIES = ("{ }", "{ go halt }", "Main {\n dock;\n find }", "(3) { Sensor.a dock 
 
 
 @pytest.mark.parametrize("name", EVERY_NAME)
-def test_every_node_is_told(name: str) -> None:
+def test_every_control_node_has_a_fix(name: str) -> None:
     for body in BODIES:
         mended(written(f"{name} {body}"))
 
 
 @pytest.mark.parametrize("family", Family)
 @pytest.mark.parametrize("place", ["component", "behaviour", "state"])
-def test_every_family_is_told_wherever_it_stands(family: Family, place: str) -> None:
+def test_every_family_has_its_fix_wherever_it_stands(family: Family, place: str) -> None:
     for body in BODIES:
         if (family, place, body) != (Family.STATE_MACHINE, "component", "{ }"):  # Another word for 'behaviour'.
             mended(written(f"{_NAMES[family].split()[0]} {body}", place))
@@ -147,7 +147,7 @@ def test_what_is_read(line: str, node: Node | None) -> None:
     assert read(line) == node
 
 
-def told(line: str, place: str = "robot") -> str:
+def fix_of(line: str, place: str = "robot") -> str:
     found = first_error(written(line, place))
     assert found is not None
     return found.fix
@@ -173,17 +173,17 @@ def told(line: str, place: str = "robot") -> str:
         (f"Sequence {{ {'x' * 250} {'y' * 250} {'z' * 250} {'w' * 250} }}", "Remove it, and write a component"),
     ],
 )
-def test_what_is_told(line: str, fix: str) -> None:
-    assert told(line).startswith(fix)
+def test_the_fix_of_a_control_node(line: str, fix: str) -> None:
+    assert fix_of(line).startswith(fix)
 
 
 def test_a_node_of_a_component_stays_in_it_as_its_behaviour() -> None:
-    assert told("Sequence { go halt }", "component").startswith("Write 'behaviour { initial marked state step_1 {")
-    assert told("Sequence { go halt }", "behaviour").startswith("Write 'initial marked state step_1 {")
-    assert " in the robot instead of 'Sequence { go halt }'." in told("Sequence { go halt }", "state")
+    assert fix_of("Sequence { go halt }", "component").startswith("Write 'behaviour { initial marked state step_1 {")
+    assert fix_of("Sequence { go halt }", "behaviour").startswith("Write 'initial marked state step_1 {")
+    assert " in the robot instead of 'Sequence { go halt }'." in fix_of("Sequence { go halt }", "state")
 
 
-def test_two_nodes_are_told_at_once() -> None:
+def test_two_nodes_are_reported_at_once() -> None:
     text = written("Sequence { go halt }\nFallback { dock find }")
     codes = [item.message.split("'")[1] for item in parse(SourceFile("r.rscd", text)).diagnostics]
     assert codes == ["Sequence", "Fallback"]
@@ -247,7 +247,7 @@ def text_of(tree: Tree) -> str:
 
 
 def ticked(tree: Tree, run: _Run) -> bool:
-    """Run a tree to its end as the books tell it; `run` runs a leaf and returns if it succeeded."""
+    """Run a tree to its end as the books define it; `run` runs a leaf and returns if it succeeded."""
     if isinstance(tree, str):
         return run(tree)
     name, children = tree
@@ -359,7 +359,7 @@ def test_random_trees_do_the_same_as_states() -> None:
     for number in range(400):
         tree = drawn(dice, 4)
         line = text_of(tree)
-        if isinstance(tree, str) or not told(line).startswith("Write 'component Order"):
+        if isinstance(tree, str) or not fix_of(line).startswith("Write 'component Order"):
             continue
         after = mended(written(line))
         wanted = expected(tree, outcomes_of(number), 60)

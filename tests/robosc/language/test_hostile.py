@@ -219,7 +219,7 @@ def test_many_imports_from_one_library_and_from_many() -> None:
 
 @pytest.mark.timeout(30)
 @pytest.mark.parametrize("piece", ["component {", "requirement ", "provide m with {", "state s {", "on ", "constant :"])
-def test_many_errors_are_told_up_to_a_limit(piece: str) -> None:
+def test_many_errors_are_reported_up_to_a_limit(piece: str) -> None:
     found = codes("robot R {" + piece * 50_000 + "}")
     assert 1 <= len(found) <= 100
     assert set(found) <= {"syntax-error", "nesting-too-deep"}

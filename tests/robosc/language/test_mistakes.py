@@ -1,4 +1,4 @@
-"""Mistakes that people make are told in their place, with a fix that leads to a good model."""
+"""Mistakes that people make are reported in their place, with a fix that leads to a good model."""
 
 import re
 from collections import Counter
@@ -13,7 +13,7 @@ WANTED = 0.975
 """Share of all mistakes with a good message."""
 WANTED_OF_EACH = 0.9
 WANTED_OF_SOME = {
-    # Nested parentheses over several lines do not tell which one lacks its end.
+    # Nested parentheses over several lines do not show which one lacks its end.
     "missing comma or bracket": 0.75,
 }
 """Share of each category in which a person has to think."""
@@ -91,7 +91,7 @@ ROBOT = """robot R {
 
 
 @pytest.mark.parametrize(
-    ("right", "wrong", "told"),
+    ("right", "wrong", "fix"),
     [
         (":= value", "= value", "Write ':=' instead of '='."),
         (":= value", "== value", "Write ':=' instead of '=='."),
@@ -127,12 +127,12 @@ ROBOT = """robot R {
         ("component Motor {", "component Motor", "Write '{' before it."),
     ],
 )
-def test_what_is_told_is_obeyed(right: str, wrong: str, told: str) -> None:
+def test_a_fix_obeyed_to_the_letter_leads_to_a_good_model(right: str, wrong: str, fix: str) -> None:
     text = ROBOT.replace(right, wrong, 1)
     assert text != ROBOT
     found = first_error(text)
     assert found is not None
-    assert found.fix.startswith(told)
+    assert found.fix.startswith(fix)
     for _ in range(3):
         if found is None:
             break
@@ -148,7 +148,7 @@ def test_a_direction_that_is_used_rightly_too_is_not_turned() -> None:
     assert found.fix.startswith("Use request")
 
 
-def test_what_nothing_is_known_of_is_told_so() -> None:
+def test_an_unknown_word_is_reported_without_a_guess() -> None:
     assert fix_syntax("a", "zzz", ("a name", "'on'")).startswith("Write one of the expected words here")
 
 

@@ -1,7 +1,7 @@
 """The parser against its twin: textX with the grammar `tests/support/robosc.tx`.
 
 Both read a text or neither does. What they read is one tree, places included; what they refuse, they refuse at one
-place, the first token that fits nowhere. `may_differ` names where the parser tells of an error elsewhere on purpose.
+place, the first token that fits nowhere. `may_differ` names where the parser reports an error elsewhere on purpose.
 """
 
 import re
@@ -46,15 +46,15 @@ def compare(text: str) -> syntax.File | None:
     if faults and may_differ(faults[0], text, twin):
         return None
     if not twin.stopped:
-        assert told(own.diagnostics) == told(twin.findings), text
+        assert reported(own.diagnostics) == reported(twin.findings), text
         assert own.tree == twin.tree, text
         return own.tree
     assert faults, text
-    assert told(faults[:1]) == told(twin.findings), (text, faults[0].message)
+    assert reported(faults[:1]) == reported(twin.findings), (text, faults[0].message)
     return None
 
 
-def told(findings: Iterable[Diagnostic | textx_parser.Finding]) -> list[tuple[str, int, int]]:
+def reported(findings: Iterable[Diagnostic | textx_parser.Finding]) -> list[tuple[str, int, int]]:
     """Codes and places, up to the first syntax error: the parser leaves out the rest of the item."""
     found = []
     for finding in findings:
@@ -72,20 +72,20 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
     here = (fault.location.line, fault.location.column)
     stops = (twin.findings[0].line, twin.findings[0].column) if twin.stopped else None
     if fault.code in HIDDEN:
-        # One quote too few turns all behind it inside out: told is its own line.
+        # One quote too few turns all behind it inside out: reported is its own line.
         return stops is not None and (stops <= here or fault.code in ("empty-file", "unclosed-string"))
     if (
         "stands before 'goto'" in fault.message
         or "a type's name" in fault.message
         or fault.fix.startswith("Write 'not'")
     ):
-        # Of a condition behind its `goto`, a ROS type with its package and a `NOT`, all is told.
+        # Of a condition behind its `goto`, a ROS type with its package and a `NOT`, all is reported.
         return stops is not None and stops > here
     if fault.fix == "Write '->' instead of '=>'.":
-        # Only what follows tells that it ends a condition.
+        # Only what follows shows that it ends a condition.
         return stops is not None and stops > here
     if fault.fix == "Write '{' before it." and fault.message.endswith("expected '{'"):
-        # The sign behind the name tells that it is the first of several, or the name of a property.
+        # The sign behind the name shows that it is the first of several, or the name of a property.
         return stops is not None and stops >= here
     if UNFIT.search(fault.message) or fault.fix == "Write 'eventually' before it.":
         # A word of goals and assumptions that does not fit is told of, not the begin of the expression behind it; of a
@@ -107,12 +107,12 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
         return False
     token, following = tokens.texts[at : at + 2]
     if token in OPTIONS:
-        # The grammar does not tell that an option stands once.
+        # The grammar does not say that an option stands once.
         return True
     if token == "if" and tokens.texts[at - 1] == "not":
         # Without its end it is no conditional, so that `not` is a name.
         return True
-    # What follows tells that `3 needs x` wants a name, and `integer < x` something else than this word; and that an
+    # What follows shows that `3 needs x` wants a name, and `integer < x` something else than this word; and that an
     # item begins behind a name `not`.
     is_next = offset(text, *stops) == tokens.starts[at + 1]
     is_item = token in ("goal", "assume") and tokens.texts[at - 1] == "not"

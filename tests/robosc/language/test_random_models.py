@@ -41,7 +41,7 @@ def test_blanks_and_comments_mean_nothing(seed: int, goals: bool) -> None:
     assert trees[0] == trees[1] != "None"
 
 
-def assert_told_well(bundle: Bundle) -> None:
+def assert_well_reported(bundle: Bundle) -> None:
     """Check for any text: it is checked, and every finding is one that a user can work with."""
     parsed, checked = parse(bundle.main), check(bundle)
     assert (parsed.tree is None) == bool(parsed.diagnostics)
@@ -67,7 +67,7 @@ def assert_told_well(bundle: Bundle) -> None:
 @given(st.sampled_from(TEXTS), st.integers(0, 2**32 - 1))
 def test_damaged_examples(text: str, seed: int) -> None:
     damaged = mutated(text, TEXTS, Random(seed))
-    assert_told_well(Bundle(SourceFile("model.rscd", damaged)))
+    assert_well_reported(Bundle(SourceFile("model.rscd", damaged)))
 
 
 @settings(max_examples=examples(60))
@@ -75,4 +75,4 @@ def test_damaged_examples(text: str, seed: int) -> None:
 def test_damaged_random_models(seed: int) -> None:
     bundle, dice = random_bundle(seed, goals=seed % 2 == 0), Random(seed)
     files = [SourceFile(file.name, mutated(file.text, TEXTS, dice)) for file in bundle.files]
-    assert_told_well(Bundle(files[0], tuple(files[1:])))
+    assert_well_reported(Bundle(files[0], tuple(files[1:])))

@@ -1,4 +1,4 @@
-"""One mistake is told once, in its place, with the word that was meant; what stands behind it is still read."""
+"""One mistake is reported once, in its place, with the word that was meant; what stands behind it is still read."""
 
 import pytest
 
@@ -27,7 +27,7 @@ def faults(text: str) -> tuple[Diagnostic, ...]:
 
 
 @pytest.mark.parametrize(
-    ("sound", "broken", "place", "told"),
+    ("sound", "broken", "place", "expected"),
     [
         ("initial marked state s", "initial marked satte s", (5, 28), "Did you mean 'state'?"),
         ("initial marked state s", "initial marked s", (5, 28), "expected 'state'"),
@@ -46,14 +46,14 @@ def faults(text: str) -> tuple[Diagnostic, ...]:
         ("C.t\n}", "C.t\n}}", (10, 2), "one '}' too many"),
     ],
 )
-def test_one_mistake_is_one_error(sound: str, broken: str, place: tuple[int, int], told: str) -> None:
+def test_one_mistake_is_one_error(sound: str, broken: str, place: tuple[int, int], expected: str) -> None:
     assert faults(ROBOT) == ()
     text = ROBOT.replace(sound, broken, 1)
     assert text != ROBOT
     (found,) = faults(text)
     assert found.location is not None
     assert (found.location.line, found.location.column) == place
-    assert told in f"{found.message} {found.fix} {' '.join(item.message for item in found.related)}"
+    assert expected in f"{found.message} {found.fix} {' '.join(item.message for item in found.related)}"
 
 
 @pytest.mark.parametrize(

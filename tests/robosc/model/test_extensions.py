@@ -113,7 +113,7 @@ def test_functions(condition: str, expected: tuple[str, bool]) -> None:
     assert classified(condition, {"r": [0.5], "n": 5, "items": []}) == expected
 
 
-def test_what_is_unknown_inside_elements_is_told() -> None:
+def test_what_is_unknown_inside_elements_is_reported() -> None:
     data = {"r": [], "n": 0, "items": [{"size": 12, "kind": "box"}, {"size": 3, "kind": 7}]}
     assert classified("any(x in value.items: x.size = 9 and x.kind = box)", data) == ("yes", True)
     assert classified("any(x in value.items: x.size = 3 and x.kind = box)", data) == ("no", True)

@@ -229,7 +229,7 @@ MODEL = """robot R {{
         ),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_told_where_it_is(type_: str, properties: str, inner: str, message: str, fix: str) -> None:
+def test_what_is_wrong_is_reported_where_it_is(type_: str, properties: str, inner: str, message: str, fix: str) -> None:
     name, _, package = type_.partition(" from ")
     marked = MODEL.format(name, package, properties, inner)
     text, line, column = marked_place(marked)
@@ -382,12 +382,12 @@ def test_headers_that_nodes_stamp_are_those_that_the_check_knows() -> None:
 
 def test_a_type_is_compared_with_a_message_once_however_often_it_crosses(monkeypatch: pytest.MonkeyPatch) -> None:
     count = 0
-    told = message_fields._unknown_field
+    original = message_fields._unknown_field
 
     def counted(*arguments: Any) -> Fault:
         nonlocal count
         count += 1
-        return told(*arguments)
+        return original(*arguments)
 
     monkeypatch.setattr(message_fields, "_unknown_field", counted)
     number = 20
@@ -401,7 +401,7 @@ def test_a_type_is_compared_with_a_message_once_however_often_it_crosses(monkeyp
     assert count == number * len(DISTRIBUTIONS) * len(message_fields.Language)
 
 
-def test_of_very_many_faults_the_first_are_told() -> None:
+def test_of_very_many_faults_the_first_are_reported() -> None:
     properties = " ".join(f"nothing{index}: double" for index in range(message_fields.MAXIMUM_FAULTS + 5))
     text = MODEL.format("BatteryState", "sensor_msgs", properties, "")
     assert len(checked(text).diagnostics) == message_fields.MAXIMUM_FAULTS

@@ -38,6 +38,15 @@ def test_headers_that_nothing_stamps(option: str, provide: str, code: str | None
     assert places == ([(code, line, column)] if code else [])
 
 
+def assert_empty_frame(marked: str) -> None:
+    """Check that the only finding is an empty frame at the marked place."""
+    text, line, column = marked_place(marked)
+    (found,) = checked(text).diagnostics
+    assert found.code == "empty-frame"
+    assert found.location is not None
+    assert (found.location.line, found.location.column) == (line, column)
+
+
 @pytest.mark.parametrize(
     ("option", "provide"),
     [
@@ -50,15 +59,11 @@ def test_headers_that_nothing_stamps(option: str, provide: str, code: str | None
     ],
 )
 def test_empty_frames(option: str, provide: str) -> None:
-    text, line, column = marked_place(STAMPED.replace("§go", "go").format(option, provide))
-    (found,) = checked(text).diagnostics
-    assert found.code == "empty-frame"
-    assert found.location is not None
-    assert (found.location.line, found.location.column) == (line, column)
+    assert_empty_frame(STAMPED.replace("§go", "go").format(option, provide))
 
 
 def test_an_empty_frame_of_an_unknown_package() -> None:
-    text, line, column = marked_place("""robot R {
+    assert_empty_frame("""robot R {
         interface travel use Travel from a_package_of_nobody
         datatype object Header { frame_id: string }
         datatype object Goal { header: Header }
@@ -66,10 +71,6 @@ def test_an_empty_frame_of_an_unknown_package() -> None:
         provide go with { header: { frame_id: "map" } } if true
         §provide go with { header: { frame_id: "" } }
     }""")
-    (found,) = checked(text).diagnostics
-    assert found.code == "empty-frame"
-    assert found.location is not None
-    assert (found.location.line, found.location.column) == (line, column)
 
 
 def test_a_layer_passes_headers_on() -> None:

@@ -155,7 +155,7 @@ def test_misspelt_names() -> None:
     assert "the end of the property" in faults("AG (A.G or")[0]
 
 
-def test_words_of_requirements_are_told_as_a_claim() -> None:
+def test_words_of_requirements_are_printed_as_a_claim() -> None:
     for written, meant in (("always A.G", "invariant A.G"), ("never A.G and A.X", "invariant !(A.G and A.X)")):
         with pytest.raises(LanguageError) as error:
             properties_of(MODEL, [SourceFile("p", written)], [])
@@ -187,7 +187,7 @@ def test_depth_and_size_are_bounded() -> None:
     assert len(read("AG (" + " or ".join(["A.n = 1"] * 10_000) + ")")) > 50_000
 
 
-def test_so_many_faults_are_told() -> None:
+def test_faults_are_reported_up_to_a_limit() -> None:
     with pytest.raises(LanguageError) as error:
         properties_of(MODEL, [], [SourceFile("f", "AG A.Y\n" * 10_000)])
     assert len(error.value.diagnostics) == MAXIMUM_SYNTAX_ERRORS

@@ -1,4 +1,4 @@
-"""Tests of abstractions that keep conflicts: composed with random others, before and after they tell the same."""
+"""Tests of abstractions that keep conflicts: composed with random others, the answers before and after are the same."""
 
 from collections import Counter
 from random import Random

@@ -109,14 +109,14 @@ def philosophers(count: int) -> System:
 def test_modules_that_block_each_other_become_one(count: int) -> None:
     system = philosophers(count)
     assert len(modules_of(partition(system), 0.0)) == count
-    told: list[str] = []
-    result = synthesize_modular(system, module_bits=0.0, on_progress=told.append)
+    reported: list[str] = []
+    result = synthesize_modular(system, module_bits=0.0, on_progress=reported.append)
     assert check(system, result)
     assert len(result.modules) == 1
-    assert any(text.startswith("2 modules become one") for text in told)
+    assert any(text.startswith("2 modules become one") for text in reported)
 
 
-def test_modules_that_are_too_large_to_tell_become_one() -> None:
+def test_modules_that_are_too_large_to_check_become_one() -> None:
     system = philosophers(3)
     result = synthesize_modular(system, module_bits=0.0, limit=2)
     assert len(result.modules) == 1
@@ -209,7 +209,7 @@ def test_a_system_of_nothing_is_one_module() -> None:
     assert (len(result.modules), result.states) == (1, 1)
 
 
-def test_the_module_to_blame_is_told() -> None:
+def test_the_module_to_blame_is_reported() -> None:
     system = philosophers(3)
     never = replace(system, invariants=(Unary("not", StateTest("P1", "t")),))
     lost = synthesize_modular(never, module_bits=0.0).unsolved
@@ -218,23 +218,18 @@ def test_the_module_to_blame_is_told() -> None:
     assert len(lost.automata) < len(system.automata)
 
 
-@pytest.mark.parametrize("family", ["machines in a row", "assembly tree"])
-def test_families_in_modules(family: str) -> None:
-    system = FAMILIES[family](4)
+@pytest.mark.parametrize(
+    ("family", "size", "modules"), [("machines in a row", 4, 3), ("assembly tree", 4, 3), ("inspection tree", 5, 4)]
+)
+def test_families_in_modules(family: str, size: int, modules: int) -> None:
+    system = FAMILIES[family](size)
     result = synthesize_modular(system, module_bits=0.0)
     assert check(system, result)
-    assert len(result.modules) == len(result.groups[0]) == 3
-
-
-def test_inspection_trees_in_modules() -> None:
-    system = FAMILIES["inspection tree"](5)
-    result = synthesize_modular(system, module_bits=0.0)
-    assert check(system, result)
-    assert len(result.modules) == len(result.groups[0]) == 4
+    assert len(result.modules) == len(result.groups[0]) == modules
 
 
 def test_what_branches_know_early_takes_the_rules_beyond_bisimulation(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Branches that hold other parts are not weakly bisimilar; as long as these are not told they block the same."""
+    """Branches that hold other parts are not weakly bisimilar; unless these are seen they block the same."""
     system = FAMILIES["inspection tree"](31)
     assert len(synthesize_modular(system, limit=300).modules) == 16
     monkeypatch.setattr(abstraction, "RULES", (abstraction.weak_bisimulation,))

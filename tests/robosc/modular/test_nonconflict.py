@@ -19,7 +19,7 @@ from support.graphs import LIMIT, cycle, drawn, is_nonblocking
     ("work", "limits"),
     [(abstraction.MAXIMUM_WORK, nonconflict.SMALL_LIMITS), (10, (1_000,)), (abstraction.MAXIMUM_WORK, (1, 3))],
 )
-def test_abstractions_tell_what_the_whole_composition_tells(
+def test_abstractions_agree_with_the_whole_composition(
     work: int, limits: tuple[int, ...], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     """With little work allowed, most are left as they are; with few states, larger ones are tried in the end."""

@@ -44,7 +44,7 @@ def test_imports_are_found_from_the_folder_of_a_text(tmp_path: Path, monkeypatch
     assert not robosc.check(model)
 
 
-def test_findings_are_told_with_their_lines() -> None:
+def test_findings_are_reported_with_their_lines() -> None:
     model = automata(WRONG)
     for found in (robosc.synthesize(model), robosc.explore(model), robosc.explain(model)):
         assert found.status is robosc.SynthesisStatus.MODEL_ERRORS
@@ -55,7 +55,7 @@ def test_findings_are_told_with_their_lines() -> None:
     assert (verified.status, verified.report["status"]) == (robosc.VerificationStatus.NO_SUPERVISOR, "model errors")
 
 
-def test_what_is_to_blame_is_told() -> None:
+def test_what_is_to_blame_is_reported() -> None:
     model = automata(EMPTY)
     assert isinstance(robosc.synthesize(model).explanation, EmptyExplanation)
     assert isinstance(robosc.generate(model, "cif").explanation, EmptyExplanation)

@@ -53,13 +53,13 @@ def through_json(values: object) -> Any:
 
 
 def reasons(result: robosc.Synthesis | robosc.Exploration) -> dict[str, Any]:
-    """The fields that tell why there is no supervisor."""
+    """The fields that say why there is no supervisor."""
     found = result.explanation
-    is_told = found is not None and not isinstance(found, robosc.NoSupervisor)
+    is_explained = found is not None and not isinstance(found, robosc.NoSupervisor)
     return {
         "status": str(result.status),
         "reason": result.reason,
-        "explanation": document(found) if found is not None and is_told else None,  # type: ignore[arg-type]
+        "explanation": document(found) if found is not None and is_explained else None,  # type: ignore[arg-type]
         **diagnostics_json(result.diagnostics),
     }
 
@@ -168,10 +168,10 @@ def test_a_supervisor(
             assert found.passed == (status == 0) == (supervisor is own or "navigation" in path.name)
         if "library" not in path.name:
             main(["verify", str(file), str(path)])
-            told = (
+            message = (
                 capsys.readouterr().out.replace(f"{file}: ", f"{supervisor.model.name}: ").replace(f"{path}", path.name)
             )
-            assert str(found).endswith(told.rstrip())
+            assert str(found).endswith(message.rstrip())
 
 
 def test_a_supervisor_alone_is_checked_against_its_model() -> None:

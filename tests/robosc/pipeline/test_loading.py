@@ -78,7 +78,7 @@ def test_a_bundle_of_the_core_is_taken_as_well() -> None:
         ("robot R { }", "this is the text of a model, not the path of one: load it with robosc.load(text=...)"),
     ],
 )
-def test_what_is_no_file_is_told(path: str | Path, message: str) -> None:
+def test_what_is_no_file_is_reported(path: str | Path, message: str) -> None:
     for use in (robosc.load, robosc.check, robosc.synthesize):
         with pytest.raises(robosc.FileAccessError) as caught:
             use(path)
@@ -86,13 +86,13 @@ def test_what_is_no_file_is_told(path: str | Path, message: str) -> None:
         assert isinstance(caught.value, OSError)
 
 
-def test_what_is_no_folder_is_told() -> None:
+def test_what_is_no_folder_is_reported() -> None:
     for name in ("library", "interface"):
         with pytest.raises(robosc.FileAccessError, match=f"there is no {name} folder nowhere"):
             robosc.load(NAVIGATION, **{f"{name}_paths": ["nowhere"]})  # type: ignore[arg-type]
 
 
-def test_a_file_that_cannot_be_read_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_file_that_cannot_be_read_is_reported(monkeypatch: pytest.MonkeyPatch) -> None:
     def refused(*arguments: object) -> object:
         raise PermissionError(errno.EACCES, "Permission denied", "secret.rscd")
 

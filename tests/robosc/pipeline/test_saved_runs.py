@@ -167,7 +167,7 @@ def test_lines_of_events(line: str, event: str, data: object) -> None:
         (b"x" * (1 << 24) + b"y", "events: more than 16777216 bytes"),
     ],
 )  # fmt: skip
-def test_what_is_no_event_is_told_with_its_line(run: robosc.Run, text: str | bytes, message: str) -> None:
+def test_what_is_no_event_is_reported_with_its_line(run: robosc.Run, text: str | bytes, message: str) -> None:
     with pytest.raises(ScriptError) as caught:
         script(text, run)
     assert message in str(caught.value)

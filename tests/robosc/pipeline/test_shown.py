@@ -73,11 +73,11 @@ def test_one_line_a_text_and_a_table_for_each() -> None:
                     assert "<b>" not in shown
 
 
-def test_a_supervisor_without_a_supervisor_tells_why() -> None:
+def test_a_result_without_a_supervisor_says_why() -> None:
     result = robosc.synthesize(robosc.load(text=FORGED))
-    told = str(result.explanation)
-    assert "model.rscd:1:75: error: unknown data type 'nothing' [unknown-name]\n  | robot R {" in told
-    assert str(result) == told
+    reported = str(result.explanation)
+    assert "model.rscd:1:75: error: unknown data type 'nothing' [unknown-name]\n  | robot R {" in reported
+    assert str(result) == reported
     empty = robosc.synthesize(robosc.load(text=EMPTY))
     assert str(empty).endswith(str(empty.explanation))
     assert "no supervisor exists: " in str(empty)
@@ -85,7 +85,7 @@ def test_a_supervisor_without_a_supervisor_tells_why() -> None:
     assert (library.supervisor, str(library.explanation)) == (None, "a library has no robot to make a supervisor for")
 
 
-def test_conditions_are_told_in_words(supervisor: robosc.Supervisor) -> None:
+def test_conditions_are_printed_in_words(supervisor: robosc.Supervisor) -> None:
     condition = supervisor.conditions["navigate.request"]
     assert (str(condition), condition.text, condition.lines) == ("Navigator.failures <= 2",) * 2 + ((),)
     assert condition.diagram == supervisor.added_condition("navigate.request")
@@ -97,7 +97,7 @@ def test_conditions_are_told_in_words(supervisor: robosc.Supervisor) -> None:
     assert supervisor.conditions.get("nothing") is None
 
 
-def test_a_condition_that_no_formula_tells_is_told_node_by_node(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_condition_without_a_formula_is_printed_node_by_node(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("robosc.conditions.rendering.Formulas.formula", lambda *arguments, **options: None)
     supervisor = robosc.synthesize(NAVIGATION).supervisor
     assert supervisor is not None
@@ -216,10 +216,10 @@ def test_files_that_somebody_changed_are_kept(supervisor: robosc.Supervisor, tmp
     assert file.read_text() == next(iter(generation.files.values())) if generation.files else False
 
 
-def test_progress_is_told_and_work_can_be_stopped() -> None:
-    told: list[robosc.Progress] = []
-    robosc.synthesize(NAVIGATION, on_progress=told.append)
-    assert [item.stage for item in told][:: len(told) - 1] == ["check", "controller"]
+def test_progress_is_reported_and_work_can_be_stopped() -> None:
+    reported: list[robosc.Progress] = []
+    robosc.synthesize(NAVIGATION, on_progress=reported.append)
+    assert [item.stage for item in reported][:: len(reported) - 1] == ["check", "controller"]
     for use in (robosc.synthesize, robosc.explore, robosc.explain):
         with pytest.raises(robosc.SynthesisCancelled):
             use(NAVIGATION, should_stop=lambda: True)

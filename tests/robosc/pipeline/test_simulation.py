@@ -184,7 +184,7 @@ def test_values_of_enums_are_given_by_name_or_by_what_they_are_made_of(run: robo
     assert run.state.variables["Sensor.back"] == "free"
 
 
-def test_what_lies_outside_its_range_is_moved_into_it_and_told(run: robosc.Run) -> None:
+def test_a_value_outside_its_range_is_moved_into_it_and_reported(run: robosc.Run) -> None:
     step = run.step("level.response", 9)
     assert run.state.variables["Sensor.number"] == 3
     assert step.unknown == ("value is 9, outside 0..3",)

@@ -20,18 +20,13 @@ from support.damaged_json import change_value
 from support.effort import examples
 from support.generated import example_supervisor
 from support.random_systems import any_system, system_seeds, wide_system
+from support.supervised_systems import supervised
 from support.systems import automaton, system
 
 MACHINE = system(
     automaton("M", ["idle -start-> busy", "busy -u_done-> idle"], marked=["idle"]),
     automaton("B", ["empty -u_done-> full", "full -u_done-> lost", "full -take-> empty"], marked=["empty"]),
 )
-
-
-def supervised(automata: System) -> robosc.SystemSupervisor:
-    supervisor = robosc.synthesize(automata).supervisor
-    assert supervisor is not None
-    return supervisor
 
 
 def document(automata: System = MACHINE) -> Any:

@@ -19,6 +19,7 @@ from robosc.pipeline.walking import WalkFindingKind
 from support.effort import examples
 from support.naive_system import NaiveSystem
 from support.random_systems import system_seeds, wide_system
+from support.supervised_systems import supervised
 from support.systems import automaton, edge, operation, read, received, system
 
 MAXIMUM_STATES = 40
@@ -46,21 +47,15 @@ CAMERA = system(
 )
 
 
-def supervised(automata: System) -> robosc.SystemSupervisor:
-    supervisor = robosc.synthesize(automata).supervisor
-    assert supervisor is not None
-    return supervisor
-
-
 def parts(automata: System, state: State) -> dict[str, Any]:
-    """A state as a run tells it: locations, then variables."""
-    told = {str(subject): value for subject, value in zip(NaiveSystem(automata).subjects, state, strict=True)}
-    return dict(sorted(told.items(), key=lambda item: item[0] not in {other.name for other in automata.automata}))
+    """A state as a run shows it: locations, then variables."""
+    given = {str(subject): value for subject, value in zip(NaiveSystem(automata).subjects, state, strict=True)}
+    return dict(sorted(given.items(), key=lambda item: item[0] not in {other.name for other in automata.automata}))
 
 
-def by_name(told: Iterable[dict[str, Any]]) -> list[list[tuple[str, Any]]]:
+def by_name(given: Iterable[dict[str, Any]]) -> list[list[tuple[str, Any]]]:
     """States in an order of their own."""
-    return sorted((list(state.items()) for state in told), key=repr)
+    return sorted((list(state.items()) for state in given), key=repr)
 
 
 @settings(max_examples=examples(15))
@@ -149,19 +144,19 @@ def _lead(
         data = dice.choice(list(naive.data(event)))
         if data:
             known = tuple(pair for pair in data.items() if dice.random() < 0.7)
-            told: dict[Any, Any] = {}
+            given: dict[Any, Any] = {}
             for path, value in known:
-                inside = told
+                inside = given
                 for step in ("all", *path)[:-1]:
                     inside = inside.setdefault(step, {})
                 inside[("all", *path)[-1]] = value
             narrowed = naive.step(now, event, known)[0]
-            assert by_name(item.parts for item in run.choices(event, *told.values())) == by_name(
+            assert by_name(item.parts for item in run.choices(event, *given.values())) == by_name(
                 parts(drawn, item) for item in narrowed
             )
             if narrowed:
                 target = dice.choice(sorted(narrowed))
-                taken = run.step(event, *told.values(), to=parts(drawn, target))
+                taken = run.step(event, *given.values(), to=parts(drawn, target))
                 assert len(taken.data) == len(known)
                 assert run.undo() == taken
         assert run.step(event, to=parts(drawn, target)).state.parts == parts(drawn, target)
@@ -378,7 +373,7 @@ def test_a_graph_is_written_as_its_name_says(tmp_path: Path, monkeypatch: pytest
     assert found._repr_svg_() is None
     with pytest.raises(robosc.DrawingUnavailableError, match="'dot' is not installed"):
         found.write(tmp_path / "g.svg")
-    # A program that draws what it is given as it is told: the graph, then the format.
+    # A program that draws what it is given by its arguments: the graph, then the format.
     dot = tmp_path / "dot"
     script = """#!/bin/sh
 while IFS= read -r line; do printf '%s\\n' "$line"; done

@@ -81,7 +81,7 @@ def test_random_automata(seed: int) -> None:
     assert few.status in (robosc.VerificationStatus.NOT_CHECKED, robosc.VerificationStatus.PASSED)
 
 
-def test_of_long_diagrams_the_size_is_told() -> None:
+def test_long_diagrams_are_given_by_their_size() -> None:
     domains: dict[Subject, SubjectDomain] = {(name, None): SubjectDomain(("off", "on"), None) for name in "ABCDEFG"}
     # An odd number of them is on: a chain of two nodes a place.
     nodes = [DecisionNode("G", None, (0, 1), (0, 1)), DecisionNode("G", None, (0, 1), (1, 0))]
@@ -102,7 +102,7 @@ def test_of_long_diagrams_the_size_is_told() -> None:
     with patch.object(summary, "_NODES", 10):
         short = str(conditions)
     assert f"e0 needs {size}; --json lists its nodes\ne1 needs one of 2, to be read from [1] on:\n[1]" in short
-    # Asked for by itself it is told whole.
+    # Asked for by itself it is printed whole.
     assert str(conditions["e0"]).startswith(f"{size}, to be read from [1] on:\n[1]")
 
 
@@ -114,9 +114,9 @@ def test_a_synthesis_in_modules(tmp_path: Path) -> None:
     assert whole.supervisor is not None
     assert (supervisor.states, len(supervisor.modules), {item.group for item in supervisor.modules}) == (0, 3, {1})
     assert repr(supervisor) == "<supervisor of family: 3 modules, conditions added to 5 events>"
-    told = str(result).splitlines()
-    assert told[0] == "family: a supervisor exists (3 modules)"
-    assert told[-2:] == [
+    lines = str(result).splitlines()
+    assert lines[0] == "family: a supervisor exists (3 modules)"
+    assert lines[-2:] == [
         "module 3, 18 states: M3, M4, M5, B3, B4",
         "nonblocking together, as found on abstractions: modules 1, 2, 3",
     ]

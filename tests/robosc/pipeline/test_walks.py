@@ -183,12 +183,12 @@ DOOR = """robot R {
 def test_a_walk_reports_each_finding_once_and_goes_on() -> None:
     run = robosc.simulate(supervisor_of(DOOR))
     first = run.walk_until_finding(100, 3)
-    told = [first]
-    while told[-1] is not None and len(told) < 50:
-        told.append(run.walk_until_finding(100, 3))
-    texts = [str(item) for item in told[:-1] if item is not None]
-    assert told[-1] is None
-    waiting = [item for item in told if item is not None and item.kind is WalkFindingKind.WAITING]
+    reported = [first]
+    while reported[-1] is not None and len(reported) < 50:
+        reported.append(run.walk_until_finding(100, 3))
+    texts = [str(item) for item in reported[:-1] if item is not None]
+    assert reported[-1] is None
+    waiting = [item for item in reported if item is not None and item.kind is WalkFindingKind.WAITING]
     (only,) = waiting
     assert "it can only wait for seen.response" in str(only)
     assert any(text.startswith("blocked at shut.request after ") and "Light.n is" in text for text in texts)
@@ -196,7 +196,7 @@ def test_a_walk_reports_each_finding_once_and_goes_on() -> None:
     assert run.walk_until_finding(100, 3) == first
 
 
-def test_only_the_kinds_that_are_asked_for_are_told() -> None:
+def test_only_the_kinds_that_are_asked_for_are_reported() -> None:
     run = robosc.simulate(supervisor_of(DOOR))
     found = run.walk_until_finding(100, 0, {WalkFindingKind.BLOCKED})
     assert found is not None

@@ -39,7 +39,7 @@ def test_supervisors_are_those_of_libfaudes(tmp_path: Path) -> None:
         write_problem(random_plain(Random(seed)), folder)
     asked = "".join(f"{folder}\n" for folder in folders)
     done = subprocess.run([sys.executable, str(PEER)], input=asked, capture_output=True, text=True, check=True)
-    # It also tells of libraries that it would draw with.
+    # It also prints which libraries it would draw with.
     verdicts = [line for line in done.stdout.splitlines() if line in VERDICTS]
     assert len(verdicts) == len(folders), done.stdout + done.stderr
     differing = [

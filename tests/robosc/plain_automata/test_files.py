@@ -1,4 +1,4 @@
-"""Files of libFAUDES and Supremica: what is read is what was written, and what is wrong is told at its place."""
+"""Files of libFAUDES and Supremica: what is read is what was written, and what is wrong is reported at its place."""
 
 from dataclasses import replace
 from random import Random

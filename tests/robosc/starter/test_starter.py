@@ -115,5 +115,5 @@ def test_the_files_show_every_word_of_the_language() -> None:
 def test_the_readme_names_every_topic() -> None:
     starter = make_starter("Courier")
     model = check(bundle_of(starter)).model_or_raise()
-    told = set(re.findall(r"^\| `(/\w+)`", starter.files["README.md"], re.MULTILINE))
-    assert told == {item.identifier for item in model.communications}
+    listed = set(re.findall(r"^\| `(/\w+)`", starter.files["README.md"], re.MULTILINE))
+    assert listed == {item.identifier for item in model.communications}

@@ -96,7 +96,7 @@ def _holds(diagram: DecisionDiagram, state: dict[Subject, int]) -> bool:
     return evaluate(diagram, lambda automaton, variable: state[automaton, variable])
 
 
-def test_only_so_many_lines_are_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_long_conditions_are_given_by_their_size(monkeypatch: pytest.MonkeyPatch) -> None:
     supervisor, system = made(FOLDER / "parity.rscd")
     monkeypatch.setattr("robosc.conditions.summary._NODES", 10)
     assert words(supervisor, system).splitlines()[-1] == (
@@ -114,20 +114,20 @@ def what_is_printed_is_what_is_stored(path: Path, supervisor: Supervisor, system
     request = next(item.name for item in supervisor.model.communications if item.request is not None)
     diagrams = summary_json(supervisor)["diagrams"]
     assert isinstance(diagrams, dict)
-    for event, told in added_texts(supervisor, system).items():
+    for event, words in added_texts(supervisor, system).items():
         diagram = supervisor.added_condition(event) or DecisionDiagram((), 1)
         if event in diagrams:
-            assert told == f"a decision diagram of {len(diagram.nodes)} nodes"
+            assert words == f"a decision diagram of {len(diagram.nodes)} nodes"
             assert len(diagrams[event]) == len(diagram.nodes)
             continue
         if any(" " in node.automaton for node in diagram.nodes):
             # No requirement can name where a service stands.
             formula = Formulas(diagram_domains(system)).formula(diagram)
             assert formula is not None
-            assert in_words(formula, ()) == told
+            assert in_words(formula, ()) == words
             same_everywhere(system, formula, diagram)
             continue
-        needs = f"requirement {request} needs {told.replace('not ', '!')}\n}}"
+        needs = f"requirement {request} needs {words.replace('not ', '!')}\n}}"
         model = check(bundle_of(text.rstrip().removesuffix("}") + needs)).model_or_raise()
         same_everywhere(system, model.requirements[-1].expression, diagram)
 

@@ -112,13 +112,6 @@ def test_data_belong_to_what_they_are_compared_with_or_written_to() -> None:
     assert blocks_of(with_data(operation(received(), "*", b))).data == {}
 
 
-@pytest.fixture(params=["cudd", "autoref"])
-def engine(request: pytest.FixtureRequest) -> str:
-    if request.param == "cudd":
-        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
-    return str(request.param)
-
-
 def test_bits_of_equal_weight_stand_side_by_side(engine: str) -> None:
     made = with_data(received(), condition=operation(a, "<=", b))
     encoding = Encoding(made, make_manager(engine))
@@ -169,7 +162,7 @@ def test_a_million_values_are_compared_and_added(engine: str, relation: Expressi
     assert result.statistics.peak_nodes < 500
 
 
-def test_a_relation_that_no_list_of_values_can_tell_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_relation_that_no_list_of_values_describes_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     """Check an event's need that is small over bits, while the supervisor's diagram has a branch for each value."""
     monkeypatch.setattr(diagrams, "MAXIMUM_BRANCHES", 5000)
     pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")

@@ -131,7 +131,7 @@ def test_saturation_stays_below_what_a_step_is_about() -> None:
 
 
 class States(frozenset[State]):
-    """A set of states with what progress is told of a predicate."""
+    """A set of states with what progress reports of a predicate."""
 
     @property
     def dag_size(self) -> int:
@@ -213,14 +213,14 @@ def test_diagrams_may_be_deeper_than_python_goes_by_itself() -> None:
         sys.setrecursionlimit(max(before, sys.getrecursionlimit()))
 
 
-def test_chaining_stops_when_told() -> None:
+def test_chaining_stops_on_request() -> None:
     step, asked = counting(1000)
     with pytest.raises(SynthesisCancelled):
         chaining(step, ProgressMonitor(lambda: len(asked) >= 20, lambda progress: None)).of(States({(True,)}), "test")
     assert len(asked) == 20
 
 
-def test_saturation_stops_when_told() -> None:
+def test_saturation_stops_on_request() -> None:
     sets = Sets(make_manager("autoref"))
     asked: list[None] = []
 
@@ -236,14 +236,14 @@ def test_saturation_stops_when_told() -> None:
     assert len(asked) == 7
 
 
-def test_progress_is_told_at_the_end_at_least() -> None:
+def test_progress_is_reported_at_the_end_at_least() -> None:
     step, _ = counting(3)
-    told: list[SynthesisProgress] = []
-    chaining(step, ProgressMonitor(lambda: False, told.append)).of(States({(True,)}), "test")
+    reported: list[SynthesisProgress] = []
+    chaining(step, ProgressMonitor(lambda: False, reported.append)).of(States({(True,)}), "test")
     sets = Sets(make_manager("autoref"))
-    monitor = ProgressMonitor(lambda: False, told.append)
+    monitor = ProgressMonitor(lambda: False, reported.append)
     found = Saturation(sets.manager, LEVELS, [counter(sets)], sets.manager.true, monitor).of(
         sets.predicate({(True, True, True, True, False)}), "test"
     )
-    assert {progress.phase for progress in told} == {"test"}
-    assert [told[0].nodes, told[-1].nodes] == [3, found.dag_size]
+    assert {progress.phase for progress in reported} == {"test"}
+    assert [reported[0].nodes, reported[-1].nodes] == [3, found.dag_size]

@@ -30,6 +30,7 @@ from robosc.synthesis import (
 )
 from robosc.verification import ExplicitSupervisor
 from support.effort import seeds
+from support.engines import needs_cudd
 from support.random_systems import explicit_supervisor, random_system
 from support.systems import automaton, edge, operation, read
 from support.systems import system as system_of
@@ -37,15 +38,7 @@ from support.systems import system as system_of
 ENGINES = ("cudd", "autoref")
 LIMIT = 50_000
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _needs_cudd() -> None:
-    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
-
-
-@pytest.fixture(params=ENGINES)
-def engine(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
+pytestmark = needs_cudd
 
 
 # The twin: every state by itself
@@ -428,7 +421,7 @@ def test_an_update_that_always_leaves_its_range_is_the_plants_own_fault(engine: 
     assert answers.never == (NeverEnabled("go", Cause.PLANT, False),)
 
 
-def test_many_rivals_are_told_by_the_first_hundred_pairs(engine: str) -> None:
+def test_of_many_rivals_the_first_hundred_pairs_are_reported(engine: str) -> None:
     names = tuple(f"e{number:02}" for number in range(40))
     plant = automaton("A", [f"l -{name}-> l" for name in names])
     answers = synthesize(system_of(plant), engine=engine, questions=Questions(rivals=(names,))).answers

@@ -26,13 +26,6 @@ from support.systems import automaton, operation, read, system
 _without_data = conditions.filter(lambda condition: not any(isinstance(leaf, Received) for leaf in leaves(condition)))
 
 
-@pytest.fixture(scope="module", params=["cudd", "autoref"])
-def engine(request: pytest.FixtureRequest) -> str:
-    if request.param == "cudd":
-        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
-    return str(request.param)
-
-
 def diagram_of(condition: Expression, engine: str) -> DecisionDiagram:
     encoding = Encoding(SYSTEM, make_manager(engine))
     return extract(encoding, ExpressionEncoder(encoding).holds(condition))

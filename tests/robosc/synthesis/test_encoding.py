@@ -12,13 +12,6 @@ from robosc.synthesis.nodes import count_models
 from support.systems import automaton, edge, operation, read, received, system
 
 
-@pytest.fixture(params=["cudd", "autoref"])
-def engine(request: pytest.FixtureRequest) -> str:
-    if request.param == "cudd":
-        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
-    return str(request.param)
-
-
 def integer(count: int) -> System:
     """One variable with `count` values."""
     variable = DiscreteVariable("x", IntegerType(3, 2 + count), (3,))

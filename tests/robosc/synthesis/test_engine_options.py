@@ -18,13 +18,6 @@ from support.random_systems import system_seeds, wide_system
 from support.systems import automaton, edge, system
 
 
-@pytest.fixture(scope="module", params=["cudd", "autoref"])
-def engine(request: pytest.FixtureRequest) -> str:
-    if request.param == "cudd":
-        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
-    return str(request.param)
-
-
 def test_a_synthesis_beyond_its_nodes_is_given_up(engine: str) -> None:
     made = FAMILIES["dining philosophers"](8)
     for maximum in (1, 50, 300):
@@ -83,7 +76,7 @@ def test_an_expression_is_broken_off_in_the_middle(engine: str) -> None:
         synthesize(_product(), engine=EngineOptions(engine, maximum_nodes=20_000))
 
 
-def test_memory_that_cudd_is_refused_is_told_as_such() -> None:
+def test_memory_that_cudd_is_refused_is_reported_as_such() -> None:
     """Messages are those of dd, far below what the limit of nodes leaves to it."""
     pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
     manager = make_manager("cudd")

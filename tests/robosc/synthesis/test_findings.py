@@ -20,7 +20,7 @@ from robosc.source import Location
 from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisStatus, findings, questions_about, synthesize
 from robosc.verification import ExplicitSupervisor, synthesize_explicit
-from support.models import EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle, marked_place
+from support.models import DOOR, EXAMPLE_DEPLOYMENTS, bundle_of, example_bundle, marked_place
 from support.random_supervisors import random_supervisor
 
 LIMIT = 5_000
@@ -30,16 +30,6 @@ OF_LOOPS = ("unprompted-request",)
 CODES = OF_EVENTS + OF_STATES
 
 INTERFACES = "interface i use S from p"
-DOOR = """component Door {
-    incoming message open with type: none
-    incoming message shut with type: none
-    behaviour {
-        initial marked state closed { on request to open goto opened }
-        marked state opened { on request to shut goto closed }
-    }
-}"""
-"""A door that opens and shuts."""
-
 SWITCH = """component Switch {
     outgoing message up with type: none
     outgoing message down with type: none
@@ -93,7 +83,7 @@ def found(
 ) -> tuple[Diagnostic, ...]:
     """The findings of a model that has a supervisor; the two engines agree on them.
 
-    What never happens leaves states unreached: those are told as well, and are looked at by themselves.
+    What never happens leaves states unreached: those are reported as well, and are looked at by themselves.
     """
     made = [make_supervisor(bundle_of(text), deployment=deployment, engine=name) for name in ("auto", "autoref")]
     assert made[0].status is OutcomeStatus.SUPERVISOR
@@ -214,7 +204,7 @@ def test_a_request_in_states_that_synthesis_keeps_from() -> None:
     assert "robosc explain-synthesis" in smash.fix
 
 
-def test_of_a_call_that_is_never_made_only_the_request_is_told() -> None:
+def test_of_a_call_that_is_never_made_only_the_request_is_reported() -> None:
     motor = MOTOR.replace("action drive", "action §drive")
     assert only(robot(motor, SWITCH, "requirement drive needs Switch.off and Switch.on_")).code == "never-enabled"
     service = SERVICE.replace("service ask", "service §ask")
@@ -252,7 +242,7 @@ def test_a_tau_that_can_never_be_taken() -> None:
     assert found(robot(lamp.replace("n > 1", "n > 0").replace("§", ""))) == ()
 
 
-def test_a_tau_of_the_whole_behaviour_is_told_once() -> None:
+def test_a_tau_of_the_whole_behaviour_is_reported_once() -> None:
     lamp = """component Lamp {
         outgoing message glow with type: none
         behaviour {
@@ -417,7 +407,7 @@ def test_an_action_ends_with_its_supply() -> None:
     assert len(loops(robot(SWITCH, filled.replace("left - 1", "left"), "requirement drive needs Motor.left >= 1"))) == 1
 
 
-def test_one_loop_is_told_once() -> None:
+def test_one_loop_is_reported_once() -> None:
     clerk = SERVICE.replace("behaviour", "service §tell with request: none, response: none links i behaviour")
     clerk = clerk.replace("on request to ask", "on request to ask goto gone")
     clerk = clerk.replace("state gone { }", "state gone { on request to tell goto there }")
@@ -479,7 +469,7 @@ def test_the_examples_have_none_of_these(name: str, deployment: Deployment) -> N
     assert not [item for item in made.diagnostics if item.code in CODES]
 
 
-def test_without_a_supervisor_there_is_nothing_to_tell() -> None:
+def test_without_a_supervisor_there_are_no_findings() -> None:
     text = robot(
         LIGHTS, "component C { behaviour { initial state a { transition if false goto b } marked state b { } } }"
     )
@@ -502,7 +492,7 @@ def test_findings_stand_among_the_others_by_place() -> None:
 
 
 def places_of(model: Model) -> Places:
-    """A place of its own for every part of a model; lines tell which part."""
+    """A place of its own for every part of a model; lines say which part."""
     places = Places(Location("m", 1, 1))
     places.communications.update({item.name: Location("c", n + 1, 1) for n, item in enumerate(model.communications)})
     places.requirements.extend(Location("r", n + 1, 1) for n in range(len(model.requirements)))
@@ -616,7 +606,7 @@ class Twin:
             for row, transition in reversed(list(enumerate(item.behaviour.transitions)))
         }
         events = {event for event, _ in written}
-        told = {
+        reported = {
             places.communications[item.name]
             for item in self.model.communications
             for event in item.events
@@ -624,8 +614,8 @@ class Twin:
             and (not event.endswith(".cancel") or event in events or item.event(EventKind.REQUEST) in never)
         }
         for event in {name for name in never if ".tau_" in name}:
-            told.add(min(place for name, place in written if name == event))
-        return told
+            reported.add(min(place for name, place in written if name == event))
+        return reported
 
     def _unused(self, deployment: Deployment) -> list[int]:
         """One after the other is left out for good if nothing changes, later ones first."""
@@ -680,18 +670,18 @@ def test_random_models(record_property: Callable[[str, object], None]) -> None:
         if result.status is SynthesisStatus.EMPTY:
             continue
         places = places_of(model)
-        told = findings(model, places, result.answers)
+        reported = findings(model, places, result.answers)
         try:
             twin = Twin(model, system)
             expected = twin.findings(places, deployment)
         except TooLargeError:
             continue
-        assert {(item.code, item.location) for item in told if item.code in CODES} == expected, seed
-        # A loop is told once: it names all that are requested in it.
-        in_loops = [item for item in told if item.code not in CODES]
+        assert {(item.code, item.location) for item in reported if item.code in CODES} == expected, seed
+        # A loop is reported once: it names all that are requested in it.
+        in_loops = [item for item in reported if item.code not in CODES]
         named = {place for item in in_loops for place in (item.location, *(each.location for each in item.related))}
         assert named == (twin.repeated(places) if deployment is Deployment.CONTROLLER else set()), seed
-        met.update(item.code for item in told)
+        met.update(item.code for item in reported)
         met["models"] += 1
     record_property("findings compared with enumerated states", ", ".join(f"{k} {met[k]}" for k in sorted(met)))
     assert met["models"] >= 100

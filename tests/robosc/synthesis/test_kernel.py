@@ -88,15 +88,15 @@ def random_step(manager: Manager, dice: Random) -> Step:
         hidden=HIDDEN if dice.random() < 0.7 else (),
         outside=source,
     )
-    # Without hidden variables that are quantified, what comes of it would tell of them.
+    # Without hidden variables that are quantified, the result would depend on them.
     return Step(image, frozenset(names) | (frozenset() if image.hidden else frozenset(HIDDEN)))
 
 
-Told = list[tuple[int, int]]
+Reported = list[tuple[int, int]]
 
 
-def monitor_of(told: Told) -> ProgressMonitor:
-    return ProgressMonitor(lambda: False, lambda progress: told.append((progress.iteration, progress.nodes)))
+def monitor_of(reported: Reported) -> ProgressMonitor:
+    return ProgressMonitor(lambda: False, lambda progress: reported.append((progress.iteration, progress.nodes)))
 
 
 @settings(max_examples=examples(90))
@@ -109,10 +109,10 @@ def test_it_saturates_as_python_does(seed: int) -> None:
     within = random_predicate(manager, dice, PLACES) if dice.random() < 0.7 else manager.true
     begin = within & random_predicate(manager, dice, PLACES, 3)
     until = random_predicate(manager, dice, PLACES, 2) if dice.random() < 0.3 else None
-    expected_told: Told = []
-    told: Told = []
+    expected_reported: Reported = []
+    reported: Reported = []
     limit = dice.randint(1, 60) if dice.random() < 0.5 else None
-    around, expected_around = (BoundedMonitor(monitor_of(item)) for item in (told, expected_told))
+    around, expected_around = (BoundedMonitor(monitor_of(item)) for item in (reported, expected_reported))
     inner, expected_inner = (BoundedMonitor(item, limit) for item in (around, expected_around))
     expected = Saturation(manager, LEVELS, steps, within, expected_inner)
     found = saturation(manager, LEVELS, steps, within, inner)
@@ -121,7 +121,7 @@ def test_it_saturates_as_python_does(seed: int) -> None:
     assert states == expected_inner.result_of(lambda: expected.of(begin, "test", until))
     assert (inner.steps, around.steps) == (expected_inner.steps, expected_around.steps)
     if states is not None:
-        assert told == expected_told
+        assert reported == expected_reported
 
 
 @settings(max_examples=examples(120))
@@ -137,7 +137,7 @@ def test_it_restricts_as_python_does(seed: int) -> None:
 
 @settings(max_examples=examples(60))
 @given(seed=st.integers(0, 2**32))
-def test_it_tells_as_python_does_whether_one_implies_another(seed: int) -> None:
+def test_implication_agrees_with_python(seed: int) -> None:
     dice = Random(seed)
     manager = manager_with(PLACES)
     predicate, other = (random_predicate(manager, dice, PLACES, 2) for _ in range(2))
@@ -218,13 +218,13 @@ def closed(manager: Manager, monitor: ProgressMonitor, bits: int = 8) -> int:
 
 
 def test_it_counts(manager: Manager) -> None:
-    told: list[SynthesisProgress] = []
-    assert closed(manager, ProgressMonitor(lambda: False, told.append)) == 256
-    assert {progress.phase for progress in told} == {"test"}
-    assert [progress.iteration for progress in told] == list(range(1, len(told) + 1))
+    reported: list[SynthesisProgress] = []
+    assert closed(manager, ProgressMonitor(lambda: False, reported.append)) == 256
+    assert {progress.phase for progress in reported} == {"test"}
+    assert [progress.iteration for progress in reported] == list(range(1, len(reported) + 1))
 
 
-def test_the_figures_tell_of_it() -> None:
+def test_the_figures_count_its_nodes() -> None:
     system = FAMILIES["token ring"](2)
     engines = (EngineOptions("cudd"), EngineOptions("autoref"), EngineOptions("cudd", is_reordering=True))
     found = [synthesize(system, engine=engine).statistics.closure for engine in engines]
@@ -239,7 +239,7 @@ def test_sets_that_are_told_apart_leave_nothing_behind(manager: Manager) -> None
     assert nodes.without(manager, a & b, [a, c]) == b
 
 
-def test_it_stops_when_told(manager: Manager) -> None:
+def test_it_stops_on_request(manager: Manager) -> None:
     asked: list[None] = []
 
     def should_stop() -> bool:
@@ -253,16 +253,16 @@ def test_it_stops_when_told(manager: Manager) -> None:
 
 @pytest.mark.parametrize("error", [KeyboardInterrupt, ZeroDivisionError])
 def test_what_progress_raises_ends_it(manager: Manager, error: type[BaseException]) -> None:
-    told: list[None] = []
+    reported: list[None] = []
 
-    def tell(progress: SynthesisProgress) -> None:
-        told.append(None)
-        if len(told) == 9:
+    def report(progress: SynthesisProgress) -> None:
+        reported.append(None)
+        if len(reported) == 9:
             raise error
 
     with pytest.raises(error):
-        closed(manager, ProgressMonitor(lambda: False, tell))
-    assert len(told) == 9
+        closed(manager, ProgressMonitor(lambda: False, report))
+    assert len(reported) == 9
 
 
 def test_an_operation_that_cudd_gives_up_is_a_limit_of_nodes() -> None:
@@ -380,21 +380,21 @@ def test_it_is_made_without_a_warning(build: ModuleType, tmp_path: Path) -> None
     subprocess.run([compiler, *warnings, f"-I{include}", *sources], check=True)
 
 
-def test_what_does_not_compile_is_told(build: ModuleType, tmp_path: Path) -> None:
+def test_what_does_not_compile_is_reported(build: ModuleType, tmp_path: Path) -> None:
     source = tmp_path / "kernel.c"
     source.write_text("int main(void) { return nothing; }\n", "utf-8")
     assert "nothing" in build.make_kernel(tmp_path, tmp_path / build.MODULE)
     assert not (tmp_path / build.MODULE).exists()
 
 
-def test_without_a_compiler_it_is_told_which_package_has_one(
+def test_without_a_compiler_the_message_names_a_package_with_one(
     build: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setenv("PATH", str(tmp_path))
     assert "apt install gcc" in build.make_kernel(kernel.FOLDER, tmp_path / build.MODULE)
 
 
-def test_without_the_headers_of_python_it_is_told_which_package_has_them(
+def test_without_the_headers_of_python_the_message_names_their_package(
     build: ModuleType, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(build, "include_folder", lambda: tmp_path)

@@ -183,8 +183,8 @@ def test_tokens_counted_place_by_place(seed: int) -> None:
     check_conditions(system_, synthesize(system_).added)
 
 
-def test_of_places_that_tell_the_same_few_are_tested() -> None:
-    """Tests of all other rooms would tell, too, where the mouse is, but in many words."""
+def test_of_places_with_the_same_information_few_are_tested() -> None:
+    """Tests of all other rooms would show, too, where the mouse is, but in many words."""
     system_ = rooms(50, 2)
     formulas = Formulas(diagram_domains(system_))
     for item in synthesize(system_).added:

@@ -28,6 +28,7 @@ from robosc.synthesis.result import Search
 from robosc.verification import CheckOutcome, verify_explicitly
 from robosc.verification.symbolic import verify_symbolically
 from support.effort import seeds
+from support.engines import needs_cudd
 from support.models import EXAMPLE_NAMES, example_model
 from support.random_systems import explicit_supervisor, kind, random_system, wide_system
 
@@ -37,10 +38,7 @@ PARTS = 4
 
 LIMIT = 50_000
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _needs_cudd() -> None:
-    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+pytestmark = needs_cudd
 
 
 def agree(system: System, engines: tuple[str, ...] = ENGINES) -> str:
@@ -123,11 +121,6 @@ def test_states_that_no_run_reaches_do_not_hold_up_synthesis() -> None:
 def test_the_example_robots(name: str, deployment: Deployment) -> None:
     found = agree(to_automata(example_model(name), deployment))
     assert found == ("disables" if name.startswith("navigation") else "free")
-
-
-@pytest.fixture(params=ENGINES)
-def engine(request: pytest.FixtureRequest) -> str:
-    return str(request.param)
 
 
 def counter(high: int, *, controllable: bool = True) -> System:
@@ -227,16 +220,16 @@ def test_cancelling(engine: str) -> None:
     assert asked == 4
 
 
-def test_progress_is_told(engine: str) -> None:
-    told: list[SynthesisProgress] = []
-    synthesize(counter(3), engine=engine, on_progress=told.append)
-    assert list(dict.fromkeys(progress.phase for progress in told)) == [
+def test_progress_is_reported(engine: str) -> None:
+    reported: list[SynthesisProgress] = []
+    synthesize(counter(3), engine=engine, on_progress=reported.append)
+    assert list(dict.fromkeys(progress.phase for progress in reported)) == [
         "encoding",
         "coreachability",
         "fixed point",
         "reachability",
     ]
-    assert all(progress.nodes > 0 for progress in told)
+    assert all(progress.nodes > 0 for progress in reported)
 
 
 def test_an_unknown_engine_is_refused() -> None:

@@ -5,7 +5,6 @@ from dataclasses import replace
 from itertools import islice, product
 from typing import Any
 
-import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
@@ -19,13 +18,6 @@ from robosc.synthesis.transitions import Steps, transition_of
 from support.effort import examples
 from support.random_systems import any_systems, any_wide_systems
 from support.systems import automaton, edge, operation, read, system
-
-
-@pytest.fixture(scope="module", params=["cudd", "autoref"])
-def engine(request: pytest.FixtureRequest) -> str:
-    if request.param == "cudd":
-        pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
-    return str(request.param)
 
 
 def states_of(encoding: Encoding, states: Iterable[State]) -> Any:

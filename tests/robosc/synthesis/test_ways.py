@@ -18,15 +18,13 @@ from robosc.synthesis.runs import SystemRun
 from robosc.synthesis.transitions import Steps, transition_of
 from robosc.synthesis.ways import WayNotFoundError, Ways
 from support.effort import seeds
+from support.engines import needs_cudd
 from support.random_systems import random_system
 
 EXAMPLES = 60
 ENGINES = ("cudd", "autoref")
 
-
-@pytest.fixture(scope="module", autouse=True)
-def _needs_cudd() -> None:
-    pytest.importorskip("dd.cudd", reason="dd's C extension is not installed")
+pytestmark = needs_cudd
 
 
 class Twin:

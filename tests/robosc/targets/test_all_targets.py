@@ -1,4 +1,4 @@
-"""All targets at once: what each gives alone, in folders, and what refuses is told."""
+"""All targets at once: what each gives alone, in folders, and what refuses is reported."""
 
 import json
 from pathlib import Path
@@ -40,9 +40,7 @@ SPACES = """robot Spaces {
 }"""
 
 
-@pytest.fixture(autouse=True)
-def own_registry(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "_registered", {})
+pytestmark = pytest.mark.usefixtures("own_registry")
 
 
 def outcome_of(text: str) -> SynthesisOutcome:
@@ -105,7 +103,7 @@ STRICT = """robot Strict {
 
 
 @pytest.mark.parametrize("name", [info.name for info in available_targets() if info.name not in ("cif", "ros2-msgs")])
-def test_every_target_tells_every_requirement(name: str) -> None:
+def test_every_target_writes_every_requirement(name: str) -> None:
     """Only in CIF they are no words but statements of the model itself, and messages are of no model."""
     files = files_of(outcome_of(STRICT), name)
     requirements = [line.strip() for line in STRICT.splitlines() if line.strip().startswith("requirement ")]
@@ -122,7 +120,7 @@ def test_the_same_supervisor_gives_the_same_bytes(name: str, robot: str) -> None
     assert generate(example_supervisor(robot), name) == generate(again, name)
 
 
-def test_what_refuses_is_left_out_and_told() -> None:
+def test_a_target_that_refuses_is_left_out_and_reported() -> None:
     refusing("cobol")
     files = files_of(outcome_of(MAZE.read_text(encoding="utf-8")), ALL)
     assert targets_left_out(files, ALL) == ("cobol",)
@@ -168,7 +166,7 @@ def test_without_a_supervisor_there_are_no_files() -> None:
     assert generate_or_refuse(outcome.supervisor, outcome.diagnostics, ALL) is None
 
 
-def test_the_command_tells_what_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_command_reports_what_is_left_out(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     refusing("cobol")
     assert main(["generate", str(MAZE), "--target", "all", "-o", str(tmp_path)]) == 0
     out, err = capsys.readouterr()

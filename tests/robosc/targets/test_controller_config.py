@@ -109,7 +109,7 @@ def test_everything_that_it_may_say(tmp_path: Path) -> None:
         (" " * (MAXIMUM_BYTES + 1), "more than"),
     ],
 )
-def test_what_is_wrong_is_told_with_its_place(tmp_path: Path, content: Any, problem: str) -> None:
+def test_what_is_wrong_is_reported_with_its_place(tmp_path: Path, content: Any, problem: str) -> None:
     with pytest.raises(ControllerConfigError) as raised:
         read_controller_config(written(tmp_path, content))
     assert problem in str(raised.value)
@@ -207,7 +207,7 @@ class TestCommand:
         assert "<depend>robosc_msgs</depend>" in (tmp_path / "here/package.xml").read_text()
 
     @pytest.mark.parametrize(
-        ("target", "chosen", "is_told"),
+        ("target", "chosen", "is_reported"),
         [
             ("ros2", (), True),
             ("all", (), True),
@@ -216,12 +216,12 @@ class TestCommand:
             ("python", (), False),
         ],
     )
-    def test_a_placeholder_for_the_maintainer_is_told(
-        self, model: Path, capsys: pytest.CaptureFixture[str], target: str, chosen: tuple[str, ...], is_told: bool
+    def test_a_placeholder_for_the_maintainer_is_reported(
+        self, model: Path, capsys: pytest.CaptureFixture[str], target: str, chosen: tuple[str, ...], is_reported: bool
     ) -> None:
         folder = str(model.parent / "here")
         assert main(["generate", str(model), "--target", target, "-o", folder, *chosen]) == 0
-        assert ("note: package.xml has a placeholder for its maintainer" in capsys.readouterr().err) is is_told
+        assert ("note: package.xml has a placeholder for its maintainer" in capsys.readouterr().err) is is_reported
         assert main(["generate", str(model), "--target", target, "-o", folder, "--json", *chosen]) == 0
         assert capsys.readouterr().err == ""
 
@@ -262,7 +262,7 @@ class TestCommand:
         assert main(["generate", str(model), "--target", "python", "-o", str(model.parent / "out")]) == 2
         assert capsys.readouterr().err.count("\n") == 1
 
-    def test_what_is_not_known_is_told(self, model: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def test_what_is_not_known_is_reported(self, model: Path, capsys: pytest.CaptureFixture[str]) -> None:
         written(model.parent, {"nonsense": 1})
         assert main(["generate", str(model), "--target", "python", "-o", str(model.parent / "out")]) == 0
         assert "warning: " in capsys.readouterr().err

@@ -161,7 +161,7 @@ WIDE = ("w", IntegerType(2**31 - 4, 2**31 - 1), 2**31 - 3)
         by_value({"n": operation(FIRST, "-", X), "b": Binary("=", FLAG, MAYBE)}, SMALL, ("b", BooleanType(), 0)),
         by_value({"b": Binary("implies", MAYBE, Binary("<", FIRST, X))}, ("b", BooleanType(), 0)),
         by_value({"b": Binary("<", operation(1, "/", X), Constant(0.7)), "n": X}, SMALL, ("b", BooleanType(), 1)),
-        # 3 stands for never known: which of them are 3 together tells where each is unknown.
+        # 3 stands for never known: which of them are 3 together shows where each is unknown.
         by_value(
             {
                 "n": Conditional(Binary("=", FLAG, MAYBE), Constant(1), Constant(0)),
@@ -192,7 +192,7 @@ def test_diagrams_over_negative_numbers(tmp_path: Path) -> None:
 
 
 @needs_spin
-def test_a_range_that_is_left_is_told(tmp_path: Path) -> None:
+def test_a_range_that_is_left_is_reported(tmp_path: Path) -> None:
     given = by_value({"n": operation(read("C.n"), "+", X)}, SMALL)
     assert ask_spin(promela_model(given, ()), {}, tmp_path).errors
 

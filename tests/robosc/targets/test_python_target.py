@@ -38,11 +38,12 @@ from robosc.supervisor import Supervisor, decode, encode
 from robosc.targets import GenerateOptions, generate, write_files
 from robosc.targets.code.python import changes
 from support.effort import examples
+from support.execution import supervisor_of, unsupervised
 from support.generated import example_supervisor, imported, load_system, python_text, same
 from support.layers import BothSides
 from support.models import EXAMPLE_DEPLOYMENTS, EXAMPLE_NAMES, model_of
 from support.random_models import random_bundle
-from support.random_supervisors import CERTIFICATE, random_data, random_supervisor
+from support.random_supervisors import random_data, random_supervisor
 
 STEPS = 25
 FULL_SCAN = {"ranges": [1.0] * 360}
@@ -134,10 +135,10 @@ class Twins:
         """A random walk that takes what is enabled more often than not."""
         identifiers = list(batches(self.generated.description.communications))
         names = tuple(self.events)
-        telling = [item.events[0] for item in self.model.communications if item.request is None] * 3
+        responses = [item.events[0] for item in self.model.communications if item.request is None] * 3
         for _ in range(steps if names else 0):
             self.compare()
-            event = dice.choice([*names, *telling])
+            event = dice.choice([*names, *responses])
             if event in self.issued and dice.random() < 0.8:
                 enabled = [name for name in self.issued if self.interpreted.enabled(name)]
                 event = dice.choice(enabled) if enabled else event
@@ -446,7 +447,7 @@ robot class {
 
 
 def test_names_that_are_python_words_work() -> None:
-    supervisor = Supervisor(model_of(HOSTILE), Deployment.CONTROLLER, (), CERTIFICATE)
+    supervisor = unsupervised(HOSTILE)
     twins = Twins(supervisor)
     twins.run(Random(3), 200)
     assert twins.seen["enabled"] and twins.seen["taken"]
@@ -460,7 +461,7 @@ def _boolean_model(expression: Any) -> Supervisor:
     behaviour = Behaviour((Variable("b", BooleanType(), False, False),), (State("s", True, True),), (transition,))
     message = Communication("m", "C", CommunicationKind.OUTGOING_MESSAGE, "m", response=DoubleType())
     model = Model("Deep", (Component("C", behaviour),), (message,), (), (), (), (), ())
-    return Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE)
+    return supervisor_of(model)
 
 
 def test_a_long_chain_of_operators_is_no_problem() -> None:
@@ -504,7 +505,7 @@ def test_all_updates_of_a_step_read_the_state_before_it() -> None:
             }
         }
     """)
-    twins = Twins(Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE))
+    twins = Twins(supervisor_of(model))
     found = []
     for _ in range(4):
         twins.compare()
@@ -568,7 +569,7 @@ RECEIVED = """
     ],
 )
 def test_what_is_received_is_converted_once_and_for_all(event: str, data: Any, value: Any, unknown: Any) -> None:
-    twins = Twins(Supervisor(model_of(RECEIVED), Deployment.CONTROLLER, (), CERTIFICATE))
+    twins = Twins(unsupervised(RECEIVED))
     twins.step("level.response", 2)
     assert twins.generated.read(f"{event}.response", data).unknown == unknown
     twins.step(f"{event}.response", data)
@@ -585,7 +586,7 @@ def test_names_that_would_meet_stay_apart() -> None:
             component ^state { behaviour { initial marked state s { } } }
         }
     """
-    twins = Twins(Supervisor(model_of(text), Deployment.CONTROLLER, (), CERTIFICATE))
+    twins = Twins(unsupervised(text))
     twins.compare()
     assert len(set(vars(twins.generated))) == len(list(itertools.chain(vars(twins.generated))))
     assert {"A__b__c", "A__b__c_2"} <= vars(twins.generated).keys()

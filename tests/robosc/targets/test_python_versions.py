@@ -83,7 +83,7 @@ def runs() -> list[tuple[str, Supervisor, Scenario, list[Observation]]]:
 
 
 def packages(folder: Path) -> list[dict[str, Any]]:
-    """Write the packages of all robots, and return what the other Python is told of each."""
+    """Write the packages of all robots, and return what the other Python is given of each."""
     found = []
     for name, supervisor, scenario, _ in runs():
         events, servers = shown(supervisor.model)

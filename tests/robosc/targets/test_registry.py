@@ -21,9 +21,7 @@ from support.generated import example_supervisor
 BUILT_IN = ["c99", "cif", "promela", "python", "ros1", "ros1-cpp", "ros2", "ros2-cpp", "ros2-msgs"]
 
 
-@pytest.fixture(autouse=True)
-def own_registry(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(registry, "_registered", {})
+pytestmark = pytest.mark.usefixtures("own_registry")
 
 
 def test_the_built_in_targets_are_listed_without_importing_them() -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from robosc.errors import UnsupportedModelError
-from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_files
+from robosc.targets import GeneratedFiles, GenerateOptions, generate
 from robosc.targets.registry import SupervisedController
 from robosc.targets.ros1.runtime.remapping import remapped, remapping_arguments
 from support.porter_ros1 import PACKAGE, model
@@ -20,12 +20,6 @@ pytest.importorskip("yaml", reason="PyYAML, a part of ROS 2, is not installed")
 @pytest.fixture(scope="module")
 def files() -> GeneratedFiles:
     return generate(layer_of(model()), "ros1")
-
-
-@pytest.fixture
-def folder(files: GeneratedFiles, tmp_path: Path) -> Path:
-    write_files(files, tmp_path)
-    return tmp_path
 
 
 def test_the_packages_own_tests_pass_without_pytest(folder: Path) -> None:

@@ -4,7 +4,6 @@ Covered are the inbox, timers, service calls, goals, and fields of genpy.
 """
 
 import threading
-from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any, ClassVar
 
@@ -27,6 +26,7 @@ from robosc.targets.ros1.runtime.goals import (
 from robosc.targets.ros1.runtime.inbox import Action, Inbox
 from robosc.targets.ros1.runtime.services import MAXIMUM_PENDING, MAXIMUM_THREADS, ServiceCalls
 from robosc.targets.ros1.runtime.timers import Timers
+from support.executor_log import ExecutorLog
 
 LIMIT_S = 20.0
 PENDING, ACTIVE = 1, 2
@@ -93,16 +93,6 @@ def test_timers_follow_the_clock_and_make_up_for_nothing() -> None:
 # Services.
 
 
-class ExecutorLog:
-    """Remembers what it was told."""
-
-    def __init__(self) -> None:
-        self.told: list[tuple[Any, ...]] = []
-
-    def __getattr__(self, name: str) -> Callable[..., None]:
-        return lambda *arguments: self.told.append((name, *arguments))
-
-
 class Connection:
     """A call that waits until the test says how it ends."""
 
@@ -146,7 +136,7 @@ class Calls:
         self.connections[index].end.set()
 
     def turn(self, count: int) -> list[Any]:
-        """Let the results of so many calls in: what the executor is told."""
+        """Let the results of so many calls in: what the executor receives."""
         done = 0
         while done < count:
             found = self.inbox.take(LIMIT_S)
@@ -155,8 +145,8 @@ class Calls:
                 action()
             done += len(found)
         self.reports.deliver(self.executor)
-        told, self.executor.told = self.executor.told, []
-        return list(told)
+        reported, self.executor.reported = self.executor.reported, []
+        return list(reported)
 
 
 def test_replies_and_failures_reach_the_executor_in_its_own_thread() -> None:
@@ -175,7 +165,7 @@ def test_calls_that_never_end_are_given_up_one_by_one() -> None:
     for number in range(MAXIMUM_PENDING + 1):
         calls.calls.call(number, "m")
     assert [item.is_closed for item in calls.connections] == [True] + MAXIMUM_PENDING * [False]
-    # Its thread has ended, and nobody is told.
+    # Its thread has ended, and nobody hears of it.
     assert calls.turn(1) == []
     for number in range(1, MAXIMUM_PENDING + 1):
         calls.end(number, number)
@@ -248,7 +238,7 @@ class Goals:
         handle = self.handles[index]
         handle.state, handle.status, handle.result = state, status, result
         self.callbacks[index][0](handle)
-        return self.told()
+        return self.reported()
 
     def passes(self, seconds: float, hears: bool = True) -> list[Any]:
         """Time passes, looked at often; the server may send status messages meanwhile."""
@@ -257,14 +247,14 @@ class Goals:
             if hears:
                 self.last_status_msg = object()
             self.goals.check(self.now_s)
-        return self.told()
+        return self.reported()
 
-    def told(self) -> list[Any]:
+    def reported(self) -> list[Any]:
         while self.waiting:
             self.waiting.pop(0)()
         self.reports.deliver(self.executor)
-        told, self.executor.told = self.executor.told, []
-        return list(told)
+        reported, self.executor.reported = self.executor.reported, []
+        return list(reported)
 
 
 @pytest.fixture
@@ -278,17 +268,17 @@ def test_a_goal_is_accepted_once_and_succeeds(goals: Goals) -> None:
     assert goals.changes(PENDING, 0) == [("on_goal_accepted", 1)]
     assert goals.changes(ACTIVE, ACTIVE_STATUS) == []
     goals.callbacks[0][1](None, "half")
-    assert goals.told() == [("on_feedback", 1, "half")]
+    assert goals.reported() == [("on_feedback", 1, "half")]
     assert goals.changes(WAITING_FOR_RESULT, SUCCEEDED) == []
     assert goals.changes(DONE, SUCCEEDED, "all") == [("on_goal_ended", 1, "succeeded", "all")]
     goals.callbacks[0][1](None, "late")
-    assert goals.told() == goals.passes(10.0) == []
+    assert goals.reported() == goals.passes(10.0) == []
 
 
 @pytest.mark.parametrize(
     ("status", "outcome"), [(2, "cancelled"), (4, "aborted"), (5, "rejected"), (8, "cancelled"), (9, "lost")]
 )
-def test_every_other_end_has_a_result_if_its_server_told_it(goals: Goals, status: int, outcome: str) -> None:
+def test_every_other_end_has_a_result_if_its_server_sent_one(goals: Goals, status: int, outcome: str) -> None:
     result = None if outcome == "lost" else "partly"
     assert goals.changes(DONE, status, "partly") == [("on_goal_ended", 1, outcome, result)]
 
@@ -301,7 +291,7 @@ def test_without_a_server_a_goal_is_lost_at_once() -> None:
     goals = Goals()
     goals.is_there = False
     goals.goals.send(1, "goal")
-    assert goals.told() == [("on_goal_ended", 1, "lost", None)]
+    assert goals.reported() == [("on_goal_ended", 1, "lost", None)]
     assert goals.handles == []
 
 
@@ -375,7 +365,7 @@ def test_a_cancel_that_is_heard_may_take_its_time(goals: Goals) -> None:
     assert goals.handles[0].cancels == 1
 
 
-# Fields of genpy's classes, as the real ones tell them.
+# Fields of genpy's classes, as the real ones declare them.
 
 
 class Time:
@@ -410,7 +400,7 @@ class Odd:
         self.late, self.old, self.small, self.wide = Time(), 0, 0, 0.0
 
 
-def test_genpys_types_are_told_in_the_words_of_ros_2() -> None:
+def test_genpys_types_are_named_in_the_words_of_ros_2() -> None:
     assert (
         fields_of(Odd)
         == fields_of(Odd())

@@ -21,11 +21,11 @@ class Calls:
 
     def __init__(self) -> None:
         self.inbox: queue.Queue[Callable[[], None]] = queue.Queue()
-        self.told: list[tuple[int, Any]] = []
+        self.reported: list[tuple[int, Any]] = []
         self.threads: list[threading.Thread] = []
         self.answers: list[Any] = []
         self.service = CalledService(
-            lambda: "default", self.inbox.put, lambda number, request: self.told.append((number, request))
+            lambda: "default", self.inbox.put, lambda number, request: self.reported.append((number, request))
         )
 
     def call(self, request: str) -> threading.Thread:
@@ -62,7 +62,7 @@ def test_a_call_waits_in_its_thread_until_it_is_answered(calls: Calls) -> None:
     calls.turn()
     second = calls.call("b")
     calls.turn()
-    assert calls.told == [(1, "a"), (2, "b")]
+    assert calls.reported == [(1, "a"), (2, "b")]
     assert calls.service.is_busy
     calls.service.answer(2, "for b")
     second.join(LIMIT_S)
@@ -85,7 +85,7 @@ def test_whoever_waits_at_the_end_gets_the_default(calls: Calls) -> None:
     waiting()
     calls.service.take_leave()
     assert calls.end() == ["default"] * 3
-    assert [request for _, request in calls.told] == ["a", "b"]
+    assert [request for _, request in calls.reported] == ["a", "b"]
 
 
 # Goals.
@@ -96,7 +96,7 @@ class Handle:
 
     def __init__(self, name: str) -> None:
         self.id = name
-        self.told: list[Any] = []
+        self.reported: list[Any] = []
 
     def get_goal_id(self) -> Any:
         # A goal's id has itself an id.
@@ -106,23 +106,23 @@ class Handle:
         return f"goal {self.id}"
 
     def __getattr__(self, name: str) -> Any:
-        return lambda *arguments: self.told.append((name, *arguments))
+        return lambda *arguments: self.reported.append((name, *arguments))
 
 
 class Goals:
-    """An action, with an executor that does as it is told."""
+    """An action, with an executor that obeys."""
 
     def __init__(self) -> None:
         self.inbox: list[Callable[[], None]] = []
-        self.told: list[Any] = []
+        self.reported: list[Any] = []
         self.warnings: list[str] = []
         self.is_allowed = True
         self.action = ServedAction(
-            "/count", self.inbox.append, self.judge, lambda number: self.told.append(number), self.warnings.append
+            "/count", self.inbox.append, self.judge, lambda number: self.reported.append(number), self.warnings.append
         )
 
     def judge(self, number: int, goal: Any) -> None:
-        self.told.append((number, goal))
+        self.reported.append((number, goal))
         (self.action.accept if self.is_allowed else self.action.reject)(number)
 
     def turn(self) -> None:
@@ -139,45 +139,45 @@ class Goals:
 def test_nothing_is_decided_in_the_thread_that_a_goal_comes_in() -> None:
     goals, handle = Goals(), Handle("x")
     goals.action.goal_came(handle)
-    assert handle.told == goals.told == []
+    assert handle.reported == goals.reported == []
     goals.turn()
-    assert goals.told == [(1, "goal x")]
-    assert handle.told == [("set_accepted",)]
+    assert goals.reported == [(1, "goal x")]
+    assert handle.reported == [("set_accepted",)]
 
 
 @pytest.mark.parametrize(
     ("outcome", "method"), [("succeeded", "set_succeeded"), ("aborted", "set_aborted"), ("cancelled", "set_canceled")]
 )
-def test_a_goal_ends_as_it_is_told_with_what_is_told(outcome: str, method: str) -> None:
+def test_a_goal_ends_with_the_given_outcome_and_result(outcome: str, method: str) -> None:
     goals = Goals()
     handle = goals.come("x")
     goals.action.feedback(1, "half")
     goals.action.end(1, outcome, "result")
-    assert handle.told == [("set_accepted",), ("publish_feedback", "half"), (method, "result")]
+    assert handle.reported == [("set_accepted",), ("publish_feedback", "half"), (method, "result")]
 
 
 def test_a_goal_that_is_held_back_is_rejected_and_forgotten() -> None:
     goals = Goals()
     goals.is_allowed = False
     handle = goals.come("x")
-    assert handle.told == [("set_rejected",)]
+    assert handle.reported == [("set_rejected",)]
     goals.action.cancel_came(handle)
     goals.turn()
-    assert goals.told == [(1, "goal x")]
+    assert goals.reported == [(1, "goal x")]
 
 
-def test_a_cancel_is_told_of_its_goal_until_that_has_ended() -> None:
+def test_a_cancel_is_handed_over_with_its_goal_until_that_has_ended() -> None:
     goals = Goals()
     goals.come("x")
     goals.come("y")
     # actionlib makes a new handle for a cancel.
     goals.action.cancel_came(Handle("y"))
     goals.turn()
-    assert goals.told[-1] == 2
+    assert goals.reported[-1] == 2
     goals.action.end(2, "cancelled", None)
     goals.action.cancel_came(Handle("y"))
     goals.turn()
-    assert goals.told == [(1, "goal x"), (2, "goal y"), 2]
+    assert goals.reported == [(1, "goal x"), (2, "goal y"), 2]
 
 
 def test_goals_that_run_at_the_end_are_aborted_and_new_ones_rejected() -> None:
@@ -187,11 +187,11 @@ def test_goals_that_run_at_the_end_are_aborted_and_new_ones_rejected() -> None:
     goals.action.goal_came(late)
     goals.action.take_leave()
     assert goals.inbox == []
-    assert late.told == [("set_rejected",)]
-    assert handle.told[-1] == ("set_aborted", None)
+    assert late.reported == [("set_rejected",)]
+    assert handle.reported[-1] == ("set_aborted", None)
 
 
-def test_a_caller_that_cannot_be_told_is_a_warning() -> None:
+def test_a_caller_that_cannot_be_reached_is_a_warning() -> None:
     class Gone(Handle):
         def set_accepted(self) -> None:
             raise OSError("no way")

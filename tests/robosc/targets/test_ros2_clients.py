@@ -9,6 +9,7 @@ import pytest
 from robosc.targets.ros.runtime.presence import LOST_S
 from robosc.targets.ros.runtime.reports import Reports
 from robosc.targets.ros2.runtime.clients import MAXIMUM_PENDING, REFUSAL_S, ActionGoals, ServiceCalls
+from support.executor_log import ExecutorLog
 
 SUCCEEDED, CANCELED, ABORTED, UNKNOWN = 4, 5, 6, 0
 NONE, REJECTED, UNKNOWN_GOAL, TERMINATED = 0, 1, 2, 3
@@ -35,16 +36,6 @@ class Future:
         self._result, self._exception = result, exception
         for callback in self._callbacks:
             callback(self)
-
-
-class ExecutorLog:
-    """Remembers what it was told."""
-
-    def __init__(self) -> None:
-        self.told: list[tuple[Any, ...]] = []
-
-    def __getattr__(self, name: str) -> Callable[..., None]:
-        return lambda *arguments: self.told.append((name, *arguments))
 
 
 class Client:
@@ -101,10 +92,10 @@ class World:
         self.calls = ServiceCalls(self.client, "/s", self.reports, lambda: self.now_s, timeout_s)
         self.goals = ActionGoals(self.client, "/a", self.reports, lambda: self.now_s)
 
-    def told(self) -> list[tuple[Any, ...]]:
+    def reported(self) -> list[tuple[Any, ...]]:
         executor: Any = ExecutorLog()
         self.reports.deliver(executor)
-        return list(executor.told)
+        return list(executor.reported)
 
     def pass_time(self, seconds: float) -> None:
         """Let time pass as a node does: checked now and again."""
@@ -119,7 +110,7 @@ class World:
         self.goals.send(number, None)
         handle = Handle()
         self.client.futures[-1].done(handle)
-        assert self.told() == [("on_goal_accepted", number)]
+        assert self.reported() == [("on_goal_accepted", number)]
         return handle
 
 
@@ -148,18 +139,18 @@ def test_reports_wait_until_they_are_delivered_and_what_they_cause_waits_again()
 def test_a_call_and_its_reply() -> None:
     world = World()
     world.calls.call(7, "message")
-    assert world.told() == []
+    assert world.reported() == []
     world.client.futures[0].done("reply")
-    assert world.told() == [("on_reply", 7, "reply")]
+    assert world.reported() == [("on_reply", 7, "reply")]
 
 
-def test_a_missing_server_is_told_later_and_nothing_is_sent() -> None:
+def test_a_missing_server_is_reported_later_and_nothing_is_sent() -> None:
     world = World()
     world.client.is_there = False
     world.calls.call(1, None)
     world.goals.send(2, None)
     assert world.client.futures == []
-    assert world.told() == [
+    assert world.reported() == [
         ("on_call_failed", 1, "there is no server of /s"),
         ("on_goal_ended", 2, "lost", None),
     ]
@@ -169,7 +160,7 @@ def test_a_call_that_fails_in_the_client() -> None:
     world = World()
     world.calls.call(1, None)
     world.client.futures[0].done(exception=ValueError("no"))
-    assert world.told() == [("on_call_failed", 1, "the call of /s failed: no")]
+    assert world.reported() == [("on_call_failed", 1, "the call of /s failed: no")]
 
 
 def test_a_server_out_of_sight_for_a_moment_is_not_lost() -> None:
@@ -180,10 +171,10 @@ def test_a_server_out_of_sight_for_a_moment_is_not_lost() -> None:
         world.pass_time(0.9 * LOST_S)
         world.client.is_there = True
         world.pass_time(0.1)
-    assert world.told() == []
+    assert world.reported() == []
     world.client.is_there = False
     world.pass_time(LOST_S + 0.1)
-    assert world.told() == [("on_call_failed", 1, "the server of /s is lost")]
+    assert world.reported() == [("on_call_failed", 1, "the server of /s is lost")]
     assert world.client.removed == world.client.futures
 
 
@@ -192,7 +183,7 @@ def test_the_loss_of_a_call_that_is_over_its_time_is_no_news() -> None:
     world.calls.call(1, None)
     world.client.is_there = False
     world.pass_time(LOST_S + 0.1)
-    assert world.told() == []
+    assert world.reported() == []
     assert world.client.removed == world.client.futures
 
 
@@ -207,7 +198,7 @@ def test_the_time_without_calls_does_not_count_for_the_next_one() -> None:
     world.calls.call(2, None)
     world.client.is_there = False
     world.pass_time(0.5 * LOST_S)
-    assert world.told() == [("on_reply", 1, "reply")]
+    assert world.reported() == [("on_reply", 1, "reply")]
 
 
 def test_unanswered_calls_do_not_pile_up() -> None:
@@ -230,14 +221,14 @@ def test_how_a_goal_ends(status: int, outcome: str) -> None:
     world.client.feedback(SimpleNamespace(feedback="near"))
     handle.result_future.done(SimpleNamespace(status=status, result="there"))
     result = None if outcome == "lost" else "there"
-    assert world.told() == [("on_feedback", 3, "near"), ("on_goal_ended", 3, outcome, result)]
+    assert world.reported() == [("on_feedback", 3, "near"), ("on_goal_ended", 3, outcome, result)]
 
 
 def test_a_rejected_goal_leaves_nothing_behind() -> None:
     world = World()
     world.goals.send(1, None)
     world.client.futures[0].done(Handle(accepted=False))
-    assert world.told() == [("on_goal_ended", 1, "rejected", None)]
+    assert world.reported() == [("on_goal_ended", 1, "rejected", None)]
     assert world.client._feedback_callbacks == {}
 
 
@@ -245,10 +236,10 @@ def test_failures_in_the_client_are_losses() -> None:
     world = World()
     world.goals.send(1, None)
     world.client.futures[0].done(exception=ValueError("no"))
-    assert world.told() == [("on_goal_ended", 1, "lost", None)]
+    assert world.reported() == [("on_goal_ended", 1, "lost", None)]
     handle = world.accepted(2)
     handle.result_future.done(exception=ValueError("no"))
-    assert world.told() == [("on_goal_ended", 2, "lost", None)]
+    assert world.reported() == [("on_goal_ended", 2, "lost", None)]
     world.pass_time(0.1)
     assert len(handle.cancel_futures) == 1
 
@@ -258,11 +249,11 @@ def test_a_goal_that_is_accepted_after_its_loss_is_cancelled() -> None:
     world.goals.send(1, None)
     world.client.is_there = False
     world.pass_time(LOST_S + 0.1)
-    assert world.told() == [("on_goal_ended", 1, "lost", None)]
+    assert world.reported() == [("on_goal_ended", 1, "lost", None)]
     handle = Handle()
     world.client.futures[0].done(handle)
     assert len(handle.cancel_futures) == 1
-    assert world.told() == []
+    assert world.reported() == []
 
 
 @pytest.mark.parametrize("late", ["error", "rejection"])
@@ -271,21 +262,21 @@ def test_no_goal_ends_twice(late: str) -> None:
     world.goals.send(1, None)
     world.client.is_there = False
     world.pass_time(LOST_S + 0.1)
-    assert world.told() == [("on_goal_ended", 1, "lost", None)]
+    assert world.reported() == [("on_goal_ended", 1, "lost", None)]
     if late == "error":
         world.client.futures[0].done(exception=ValueError("no"))
     else:
         world.client.futures[0].done(Handle(accepted=False))
-    assert world.told() == []
+    assert world.reported() == []
     assert not world.goals.has_abandoned
 
 
 def lost(world: World) -> Handle:
-    """An accepted goal that was told to be lost."""
+    """An accepted goal that was reported lost."""
     handle = world.accepted()
     world.client.is_there = False
     world.pass_time(LOST_S + 0.1)
-    assert world.told() == [("on_goal_ended", 1, "lost", None)]
+    assert world.reported() == [("on_goal_ended", 1, "lost", None)]
     assert handle.cancel_futures == []
     assert world.goals.has_abandoned
     return handle
@@ -301,7 +292,7 @@ def test_a_lost_goal_is_cancelled_when_its_server_is_back() -> None:
     assert not world.goals.has_abandoned
     world.client.feedback(SimpleNamespace(feedback="near"))
     handle.result_future.done(SimpleNamespace(status=CANCELED, result=None))
-    assert world.told() == []
+    assert world.reported() == []
 
 
 def test_the_cancel_of_a_lost_goal_is_asked_for_again_if_it_got_no_answer() -> None:
@@ -327,7 +318,7 @@ def test_a_stop_cancels_a_lost_goal_although_its_server_is_not_seen() -> None:
     assert len(handle.cancel_futures) == 1
     handle.cancel_futures[0].done(answer(REJECTED))
     assert not world.goals.has_abandoned
-    assert world.told() == []
+    assert world.reported() == []
 
 
 def test_a_lost_goal_that_ends_is_not_cancelled() -> None:
@@ -338,7 +329,7 @@ def test_a_lost_goal_that_ends_is_not_cancelled() -> None:
     world.client.is_there = True
     world.pass_time(1.0)
     assert handle.cancel_futures == []
-    assert world.told() == []
+    assert world.reported() == []
 
 
 def test_a_cancel_that_is_granted_waits_for_the_result() -> None:
@@ -347,9 +338,9 @@ def test_a_cancel_that_is_granted_waits_for_the_result() -> None:
     world.goals.cancel(1)
     handle.cancel_futures[0].done(answer(NONE, "the goal"))
     world.pass_time(2 * REFUSAL_S)
-    assert world.told() == []
+    assert world.reported() == []
     handle.result_future.done(SimpleNamespace(status=CANCELED, result=None))
-    assert world.told() == [("on_goal_ended", 1, "cancelled", None)]
+    assert world.reported() == [("on_goal_ended", 1, "cancelled", None)]
 
 
 def test_a_cancel_of_a_goal_that_had_ended_means_nothing() -> None:
@@ -357,21 +348,29 @@ def test_a_cancel_of_a_goal_that_had_ended_means_nothing() -> None:
     handle = world.accepted()
     world.goals.cancel(1)
     handle.cancel_futures[0].done(answer(TERMINATED))
-    assert world.told() == [("on_cancel_refused", 1, True)]
+    assert world.reported() == [("on_cancel_refused", 1, True)]
 
 
-@pytest.mark.parametrize("code", [NONE, REJECTED])
-def test_a_refused_cancel_of_a_running_goal_is_told_when_no_result_follows(code: int) -> None:
+@pytest.mark.parametrize(
+    ("code", "report"),
+    [
+        (NONE, ("on_cancel_refused", 1, False)),
+        (REJECTED, ("on_cancel_refused", 1, False)),
+        (UNKNOWN_GOAL, ("on_goal_ended", 1, "lost", None)),
+    ],
+)
+def test_a_refused_cancel_is_reported_when_no_result_follows(code: int, report: tuple[Any, ...]) -> None:
+    """A goal that its server does not know is lost; another one runs on."""
     world = World()
     handle = world.accepted()
     world.goals.cancel(1)
     handle.cancel_futures[0].done(answer(code))
     world.pass_time(0.8 * REFUSAL_S)
-    assert world.told() == []
+    assert world.reported() == []
     world.pass_time(REFUSAL_S)
-    assert world.told() == [("on_cancel_refused", 1, False)]
+    assert world.reported() == [report]
     world.pass_time(2 * REFUSAL_S)
-    assert world.told() == []
+    assert world.reported() == []
 
 
 @pytest.mark.parametrize("code", [NONE, REJECTED, UNKNOWN_GOAL])
@@ -382,20 +381,7 @@ def test_a_refused_cancel_of_a_goal_that_ends_at_that_moment_means_nothing(code:
     handle.cancel_futures[0].done(answer(code))
     handle.result_future.done(SimpleNamespace(status=SUCCEEDED, result="there"))
     world.pass_time(2 * REFUSAL_S)
-    assert world.told() == [("on_goal_ended", 1, "succeeded", "there")]
-
-
-def test_a_goal_that_its_server_does_not_know_is_lost_when_no_result_follows() -> None:
-    world = World()
-    handle = world.accepted()
-    world.goals.cancel(1)
-    handle.cancel_futures[0].done(answer(UNKNOWN_GOAL))
-    world.pass_time(0.8 * REFUSAL_S)
-    assert world.told() == []
-    world.pass_time(REFUSAL_S)
-    assert world.told() == [("on_goal_ended", 1, "lost", None)]
-    world.pass_time(2 * REFUSAL_S)
-    assert world.told() == []
+    assert world.reported() == [("on_goal_ended", 1, "succeeded", "there")]
 
 
 def test_cancels_and_their_answers_after_the_end_mean_nothing() -> None:
@@ -406,7 +392,7 @@ def test_cancels_and_their_answers_after_the_end_mean_nothing() -> None:
     handle.cancel_futures[0].done(answer(REJECTED))
     world.goals.cancel(1)
     assert len(handle.cancel_futures) == 1
-    assert world.told() == [("on_goal_ended", 1, "aborted", None)]
+    assert world.reported() == [("on_goal_ended", 1, "aborted", None)]
 
 
 def test_a_cancel_that_fails_in_the_client_waits_for_the_loss() -> None:
@@ -416,4 +402,4 @@ def test_a_cancel_that_fails_in_the_client_waits_for_the_loss() -> None:
     handle.cancel_futures[0].done(exception=ValueError("no"))
     world.client.is_there = False
     world.pass_time(LOST_S + 0.1)
-    assert world.told() == [("on_goal_ended", 1, "lost", None)]
+    assert world.reported() == [("on_goal_ended", 1, "lost", None)]

@@ -1,4 +1,4 @@
-"""Tests that tell which messages are the all-default one."""
+"""Tests that find which messages are the all-default one."""
 
 import warnings
 from typing import Any

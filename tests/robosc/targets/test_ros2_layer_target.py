@@ -23,12 +23,6 @@ def files() -> GeneratedFiles:
     return generate(layer_of(MODEL), "ros2")
 
 
-@pytest.fixture
-def folder(files: GeneratedFiles, tmp_path: Path) -> Path:
-    write_files(files, tmp_path)
-    return tmp_path
-
-
 def test_its_program_is_installed(files: GeneratedFiles) -> None:
     assert "'layer = ' + PACKAGE + '.node:main'" in files["setup.py"]
 

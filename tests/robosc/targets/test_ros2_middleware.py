@@ -10,12 +10,9 @@ from typing import Any
 
 import pytest
 
-from robosc.model.structure import Deployment
-from robosc.supervisor import Supervisor
 from robosc.targets import generate
+from support.execution import unsupervised
 from support.generated import imported
-from support.models import model_of
-from support.random_supervisors import CERTIFICATE
 
 pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
 
@@ -66,7 +63,7 @@ def test_every_stamped_field_of_a_goal_gets_time_and_frame(monkeypatch: pytest.M
     module.Plan = SimpleNamespace(Goal=GetPlan.Request, Result=GetPlan.Response, Feedback=Empty)
     monkeypatch.setitem(sys.modules, "plan_msgs", types.ModuleType("plan_msgs"))
     monkeypatch.setitem(sys.modules, "plan_msgs.action", module)
-    supervisor = Supervisor(model_of(MODEL), Deployment.CONTROLLER, (), CERTIFICATE)
+    supervisor = unsupervised(MODEL)
     now = SimpleNamespace(to_msg=lambda: Time(sec=7))
     node: Any = SimpleNamespace(clients=[], get_clock=lambda: SimpleNamespace(now=lambda: now))
     settings = SimpleNamespace(service_timeout_s=None)

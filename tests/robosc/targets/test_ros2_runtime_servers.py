@@ -26,13 +26,13 @@ class Calls:
 
     def __init__(self) -> None:
         self.service = Service()
-        self.told: list[tuple[int, Any]] = []
+        self.given: list[tuple[int, Any]] = []
         self.warnings: list[str] = []
-        self.calls = CalledService("/s", lambda: "default", self._tell, self.warnings.append)
+        self.calls = CalledService("/s", lambda: "default", self._hand_over, self.warnings.append)
         self.calls.attach(self.service)
 
-    def _tell(self, number: int, request: Any) -> None:
-        self.told.append((number, request))
+    def _hand_over(self, number: int, request: Any) -> None:
+        self.given.append((number, request))
         if request == "held":
             self.calls.answer_default(number)
 
@@ -100,10 +100,10 @@ class Goals:
         self.cancelled: list[int] = []
         self.warnings: list[str] = []
         self.ends: list[tuple[Any, Any]] = []
-        self.goals = ServedAction("/a", lambda: "default", self._tell, self.cancelled.append, self.warnings.append)
+        self.goals = ServedAction("/a", lambda: "default", self._hand_over, self.cancelled.append, self.warnings.append)
         self.goals.attach(self)
 
-    def _tell(self, number: int, goal: Any) -> None:
+    def _hand_over(self, number: int, goal: Any) -> None:
         if goal != "held":
             self.goals.accept(number)
         if goal == "fails":
@@ -125,7 +125,7 @@ class Goals:
 
 
 @pytest.mark.parametrize("outcome", ["succeeded", "aborted", "cancelled"])
-def test_a_goal_ends_as_it_is_told_with_its_result(outcome: str) -> None:
+def test_a_goal_ends_with_the_given_outcome_and_result(outcome: str) -> None:
     world = Goals()
     handle = world.accepted(1)
     world.goals.feedback(1, "near")

@@ -12,20 +12,17 @@ from typing import Any
 import pytest
 
 from robosc.errors import UnsupportedModelError
-from robosc.execution.interpreter import InterpretedSystem, describe
-from robosc.model.structure import Deployment
+from robosc.execution.interpreter import describe
 from robosc.supervisor import Supervisor
-from robosc.targets import GeneratedFiles, GenerateOptions, generate, write_files
+from robosc.targets import GeneratedFiles, GenerateOptions, generate
 from robosc.targets.registry import PackageMetadata
 from robosc.targets.ros.runtime.parameters import USE_SIM_TIME, ParameterError, declarations, prefixed, validate
 from robosc.targets.ros.state_topic import state_topic
 from robosc.targets.ros2.runtime.lifecycle import AUTOSTART
 from robosc.targets.ros2.runtime.state import STATE_MESSAGE
-from support.generated import example_supervisor, imported, require_sound_python
+from support.execution import unsupervised
+from support.generated import example_supervisor
 from support.launch_stub import launch_actions
-from support.models import model_of
-from support.own_tests import own_tests
-from support.random_supervisors import CERTIFICATE
 
 yaml = pytest.importorskip("yaml", reason="PyYAML, a part of ROS 2, is not installed")
 
@@ -35,24 +32,13 @@ MAZE = "maze_solver/maze_solver"
 NAVIGATION = "navigation/navigation"
 
 
-def supervisor_of(text: str) -> Supervisor:
-    """A supervisor that adds nothing to a model's text."""
-    return Supervisor(model_of(text), Deployment.CONTROLLER, (), CERTIFICATE)
-
-
 def robot(body: str, name: str = "Robot") -> Supervisor:
-    return supervisor_of(f"robot {name} {{ {body} }}")
+    return unsupervised(f"robot {name} {{ {body} }}")
 
 
 @pytest.fixture(scope="module")
 def files() -> GeneratedFiles:
     return generate(example_supervisor(FOLLOWER), "ros2")
-
-
-@pytest.fixture
-def folder(files: GeneratedFiles, tmp_path: Path) -> Path:
-    write_files(files, tmp_path)
-    return tmp_path
 
 
 def test_everything_that_a_package_needs_is_there(files: GeneratedFiles) -> None:
@@ -73,12 +59,6 @@ def test_everything_that_a_package_needs_is_there(files: GeneratedFiles) -> None
         f"{PACKAGE}/supervisor.py",
         f"{PACKAGE}/runtime/startup.py",
     } <= set(files)
-
-
-@pytest.mark.parametrize("name", [FOLLOWER, MAZE, NAVIGATION])
-def test_python_files_run_on_3_8_and_name_nothing_undefined(name: str, tmp_path: Path) -> None:
-    write_files(generate(example_supervisor(name), "ros2"), tmp_path)
-    require_sound_python(tmp_path)
 
 
 def test_package_xml(files: GeneratedFiles) -> None:
@@ -155,7 +135,7 @@ def test_the_readme_names_every_topic_and_parameter(files: GeneratedFiles) -> No
         assert f"| `{parameter.name}` |" in readme
 
 
-def test_the_readme_tells_how_messages_travel() -> None:
+def test_the_readme_says_how_messages_travel() -> None:
     model = robot(
         "interface t use TwistStamped from geometry_msgs interface s use LaserScan from sensor_msgs "
         "component C { "
@@ -179,23 +159,6 @@ def test_services_and_actions_stand_in_the_package() -> None:
     assert "start_navigation = " in files["setup.py"]
 
 
-@pytest.mark.parametrize("name", [FOLLOWER, MAZE, NAVIGATION])
-def test_the_packages_own_tests_pass_without_ros(name: str, tmp_path: Path) -> None:
-    write_files(generate(example_supervisor(name), "ros2"), tmp_path)
-    result = own_tests(tmp_path)
-    assert result.returncode == 0, result.stdout
-    assert "3 passed" in result.stdout
-
-
-def test_the_packages_own_tests_can_fail(tmp_path: Path) -> None:
-    write_files(generate(example_supervisor(FOLLOWER), "ros2"), tmp_path)
-    supervisor = tmp_path / PACKAGE / "supervisor.py"
-    text = supervisor.read_text()
-    begin = text.index("def allow_move_request")
-    supervisor.write_text(text[:begin] + text[begin:].replace("== 'safe'", "== 'unsafe'", 1))
-    assert own_tests(tmp_path).returncode == 1
-
-
 @pytest.mark.parametrize(
     ("name", "package"),
     [
@@ -212,12 +175,6 @@ def test_the_package_has_a_valid_name(name: str, package: str) -> None:
     files = generate(robot("", name), "ros2")
     assert f"{package}/node.py" in files
     assert re.fullmatch(r"[a-z][a-z0-9]*(_[a-z0-9]+)*", package)
-
-
-def test_a_package_may_be_called_as_one_likes() -> None:
-    files = generate(robot(""), "ros2", GenerateOptions(package="my_robot"))
-    assert ElementTree.fromstring(files["package.xml"]).findtext("name") == "my_robot"
-    assert "my_robot/node.py" in files
 
 
 def test_a_package_says_who_maintains_it_under_which_licence() -> None:
@@ -240,128 +197,11 @@ def test_a_package_says_who_maintains_it_under_which_licence() -> None:
 # What is refused.
 
 
-@pytest.mark.parametrize(
-    ("body", "problem"),
-    [
-        (
-            'component C { outgoing message m with identifier: "/a b", type: none }',
-            "the identifier '/a b' of 'm' is no ROS name",
-        ),
-        ('component C { outgoing message m with identifier: "/1", type: none }', "identifier '/1' of 'm'"),
-        ('component C { outgoing message m with identifier: "/a/", type: none }', "identifier '/a/' of 'm'"),
-        ('component C { outgoing message m with identifier: "/a//b", type: none }', "identifier '/a//b' of 'm'"),
-        ('component C { outgoing message m with identifier: "/a b", type: none }', "identifier '/a b' of 'm'"),
-        ('component C { outgoing message m with identifier: "{x}", type: none }', "identifier '{x}' of 'm'"),
-        ('component C { outgoing message m with identifier: "/' + "x" * 220 + '", type: none }', "no ROS name"),
-        (
-            'component C { outgoing message m with identifier: "/t", type: none'
-            '              outgoing message n with identifier: "/t", type: double }',
-            "the topic /t has two types: std_msgs/Empty for 'm' and std_msgs/Float32 for 'n'",
-        ),
-        (
-            "interface i use Twist from geometry_msgs component C {"
-            '  outgoing message m with identifier: "/t", type: none'
-            '  incoming message n with identifier: "/t", type: none links i }',
-            "the topic /t has two types: std_msgs/Empty for 'm' and geometry_msgs/Twist for 'n'",
-        ),
-        (
-            "interface i use twist from geometry_msgs component C { outgoing message m with type: none links i }",
-            "twist from geometry_msgs, linked by 'm', is not a name of a ROS type",
-        ),
-        (
-            "interface i use Twist from Geometry_Msgs component C { outgoing message m with type: none links i }",
-            "Twist from Geometry_Msgs, linked by 'm', is not a name",
-        ),
-        (
-            "datatype enum E from double to { value > 1.0 -> a default -> b }"
-            "component C { incoming message m with type: E }",
-            "'m' sends the enum E, which is made from received data",
-        ),
-        (
-            "interface s use S from x_srvs interface t use T from x_srvs component C {"
-            '  service a with identifier: "/s", request: none, response: none links s'
-            '  service b with identifier: "/s", request: none, response: none links t }',
-            "the service /s has two types: x_srvs/S for 'a' and x_srvs/T for 'b'",
-        ),
-        (
-            "interface i use Go from x_msgs component C {"
-            '  action a with identifier: "/a b", request: none, response: none, feedback: none links i }',
-            "the identifier '/a b' of 'a' is no ROS name",
-        ),
-        (
-            "datatype enum E from double to { value > 1.0 -> a default -> b } datatype object O { e: E }"
-            "interface i use Go from x_msgs component C {"
-            "  action go with request: O, response: none, feedback: none links i }",
-            "'go' sends the enum E, which is made from received data",
-        ),
-        (
-            'component C { outgoing message m with identifier: "/diagnostics", type: string }',
-            "the topic /diagnostics is of the type std_msgs/String, but every generated node publishes",
-        ),
-        (
-            "interface i use X from robot_controller component C {"
-            "  service s with request: none, response: none links i }",
-            "the generated package would be called robot_controller, like a package whose types it uses",
-        ),
-        (
-            "interface i use X from robot_controller component C { outgoing message m with type: none links i }",
-            "the generated package would be called robot_controller, like a package whose types it uses",
-        ),
-    ],
-)
-def test_what_it_cannot_do_is_refused_with_its_name(body: str, problem: str) -> None:
-    with pytest.raises(UnsupportedModelError) as raised:
-        generate(robot(body), "ros2")
-    message = str(raised.value)
-    assert message.startswith("target ros2: ")
-    assert problem in message
-    assert "\n" not in message
-
-
 @pytest.mark.parametrize(("target", "package"), [("ros2", "rclpy"), ("ros2", "robosc_msgs"), ("ros1", "rospy")])
 def test_a_package_cannot_be_called_like_one_that_it_needs(target: str, package: str) -> None:
     body = "component C { incoming message m with type: none }"
     with pytest.raises(UnsupportedModelError, match=f"would be called {package}, like a package that it needs"):
         generate(robot(body), target, GenerateOptions(package=package))
-
-
-# Hostile texts.
-
-HOSTILE = r"""
-robot None {
-    datatype object class { x: double }
-    datatype enum continue from string to { value = "{{ 1 }} --> `|` \" ' \\ </name>" -> break default -> global }
-    interface i use Vector3 from geometry_msgs
-    component def {
-        incoming message lambda with identifier: "/a", type: string
-        incoming message raise with identifier: "/b", type: class links i
-        outgoing message yield with identifier: "/c", type: continue
-        behaviour {
-            variable y: continue = break
-            on response from yield do y := value
-            variable x: string = "\" ' \\ ${x} {{ x }} {% raw %} </name> <!-- --> \u0022 é"
-            initial marked state in { on request to lambda on request to raise }
-        }
-    }
-    requirement lambda needs def.y = break
-    provide lambda with "{{ 1 }} {% if %} \" ' \\ é"
-}
-""".replace("state in", "state s")
-
-
-def test_texts_of_the_model_stay_texts(tmp_path: Path) -> None:
-    files = generate(supervisor_of(HOSTILE), "ros2")
-    for path, text in files.items():
-        if path.endswith(".py"):
-            ast.parse(text, filename=path, feature_version=(3, 8))
-    ElementTree.fromstring(files["package.xml"])
-    yaml.safe_load(files["config/parameters.yaml"])
-    with imported(files, tmp_path, "none_controller.supervisor") as module:
-        system = module.Supervisor()
-        interpreted = InterpretedSystem(supervisor_of(HOSTILE))
-        assert system.provide("lambda") == interpreted.provide("lambda")
-        assert system.enabled("lambda.request")
-        assert system.state() == interpreted.state()
 
 
 # Parameters.

@@ -37,7 +37,7 @@ def test_a_paused_simulation_stands() -> None:
     assert {clock.monotonic() for _ in range(3)} == {0.0}
 
 
-def test_a_jump_back_is_told_once_and_time_goes_on() -> None:
+def test_a_jump_back_is_reported_once_and_time_goes_on() -> None:
     world = World()
     world.now_ns = 10_000_000_000
     clock = SimulatedClock(world.read)
@@ -55,10 +55,10 @@ def test_a_jump_back_is_told_once_and_time_goes_on() -> None:
 def test_it_never_goes_back_and_counts_every_step_forward(readings: list[int]) -> None:
     world = World()
     clock = SimulatedClock(world.read)
-    told = []
+    times = []
     for world.now_ns in readings:
-        told.append(clock.monotonic())
-    assert told == sorted(told)
+        times.append(clock.monotonic())
+    assert times == sorted(times)
     steps = [after - before for before, after in pairwise(reading for reading in readings if reading)]
     assert clock.monotonic() == sum(step for step in steps if step > 0) * 1e-9
     assert clock.take_jump() == -sum(step for step in steps if step < 0) * 1e-9

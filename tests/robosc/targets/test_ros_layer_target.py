@@ -58,12 +58,6 @@ def files(ros: Ros) -> GeneratedFiles:
     return generate(layer_of(ros.model), ros.target)
 
 
-@pytest.fixture
-def folder(files: GeneratedFiles, tmp_path: Path) -> Path:
-    write_files(files, tmp_path)
-    return tmp_path
-
-
 def robot(body: str) -> Supervisor:
     return layer_of(f"robot Robot {{ {body} }}")
 

@@ -12,16 +12,13 @@ from robosc.execution.runtime.clock import ManualClock
 from robosc.execution.runtime.runner import Status
 from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import Deployment
-from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from robosc.targets.ros.runtime.startup import HeldMessages
 from robosc.targets.ros.runtime.startup_controller import StartupBufferingExecutor
 from robosc.targets.ros.runtime.startup_layer import StartupBufferingLayer
-from support.execution import RecordingMiddleware, system_of
+from support.execution import RecordingMiddleware, system_of, unsupervised
 from support.generated import imported
 from support.layers import BothSides
-from support.models import model_of
-from support.random_supervisors import CERTIFICATE
 
 MODEL = """
 robot Guarded {
@@ -132,7 +129,7 @@ class Node:
         self._parameter_overrides: dict[str, Any] = {}
 
     def __getattr__(self, name: str) -> Any:
-        nothing = dict.fromkeys(("publish", "warning", "info"), lambda told: None)
+        nothing = dict.fromkeys(("publish", "warning", "info"), lambda message: None)
         return lambda *arguments, **named: SimpleNamespace(**nothing)
 
     def has_parameter(self, name: str) -> bool:
@@ -160,7 +157,7 @@ def test_a_node_that_waits_for_its_servers_loses_nothing_and_its_stop_reaches_lo
     missing: list[str] = ["/ask"]
     published: list[str] = []
     cancelled: list[str] = []
-    supervisor = Supervisor(model_of(MODEL), Deployment.CONTROLLER, (), CERTIFICATE)
+    supervisor = unsupervised(MODEL)
     with imported(generate(supervisor, "ros2"), tmp_path, "guarded_controller.node") as generated:
         callbacks: dict[str, Any] = {}
 

@@ -144,7 +144,7 @@ def test_an_unknown_event_is_refused() -> None:
         verify_explicitly(WALK, {"fly": lambda at: True})
 
 
-def test_it_stops_when_told() -> None:
+def test_it_stops_on_request() -> None:
     with pytest.raises(SynthesisCancelled):
         verify_explicitly(WALK, RIGHT, should_stop=lambda: True)
 

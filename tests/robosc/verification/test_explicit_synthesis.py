@@ -135,7 +135,7 @@ def test_beyond_the_limit_there_is_no_answer() -> None:
     assert synthesize_explicit(made, limit=3) is not None
 
 
-def test_it_stops_when_told() -> None:
+def test_it_stops_on_request() -> None:
     made = system(automaton("A", ["a -go-> b", "b -go-> c"]))
     with pytest.raises(SynthesisCancelled):
         synthesize_explicit(made, limit=10, should_stop=lambda: True)

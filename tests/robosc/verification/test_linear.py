@@ -51,7 +51,7 @@ class Dice:
         self.random = Random(seed)
 
     def integer(self, depth: int) -> Expression:
-        """An integer of wide variables, as linear as the forms can tell."""
+        """An integer of wide variables, as linear as the forms show."""
         if depth == 0 or self.random.random() < 0.15:
             leaves: list[Expression] = [*(read(f"A.{name}") for name in RANGES), Received(("d",)), self.number()]
             return self.random.choice(leaves)

@@ -182,12 +182,12 @@ def test_a_range_too_wide_to_list_is_packed() -> None:
     assert len(searched(made, {}).codes) == 3
 
 
-def test_progress_is_told_and_the_search_stops(monkeypatch: pytest.MonkeyPatch) -> None:
-    made, told = FAMILIES["dining philosophers"](8), list[str]()
-    search(Packing(Semantics(made)), {}, Effort(50_000, lambda: False, told.append, "states"))
-    assert told == []
+def test_progress_is_reported_and_the_search_stops(monkeypatch: pytest.MonkeyPatch) -> None:
+    made, reported = FAMILIES["dining philosophers"](8), list[str]()
+    search(Packing(Semantics(made)), {}, Effort(50_000, lambda: False, reported.append, "states"))
+    assert reported == []
     monkeypatch.setattr(search_module, "PROGRESS_INTERVAL", 1024)
-    search(Packing(Semantics(made)), {}, Effort(50_000, lambda: False, told.append, "states"))
-    assert told[:1] == ["1024 states"]
+    search(Packing(Semantics(made)), {}, Effort(50_000, lambda: False, reported.append, "states"))
+    assert reported[:1] == ["1024 states"]
     with pytest.raises(SynthesisCancelled):
-        search(Packing(Semantics(made)), {}, Effort(50_000, lambda: bool(told), told.append, "states"))
+        search(Packing(Semantics(made)), {}, Effort(50_000, lambda: bool(reported), reported.append, "states"))

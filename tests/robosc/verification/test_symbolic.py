@@ -118,7 +118,7 @@ def test_families(family: str, size: int) -> None:
     assert (found.states, _three(found)) == (result.statistics.states, (PASSED, PASSED, PASSED))
 
 
-def test_a_large_robot_without_its_supervisor_is_told_from_one_with_it() -> None:
+def test_a_large_robot_fails_without_its_supervisor_and_passes_with_it() -> None:
     """Far too large for any explicit search: forks are taken until nobody can eat."""
     made = FAMILIES["dining philosophers"](12)
     found = verify_symbolically(made, {})
@@ -155,10 +155,10 @@ def test_beyond_its_work_nothing_is_claimed() -> None:
     assert {(NOT_CHECKED,) * 3, (PASSED, PASSED, NOT_CHECKED), (PASSED, PASSED, PASSED)} == outcomes
 
 
-def test_it_stops_when_told_and_tells_of_progress() -> None:
-    told: list[str] = []
-    verify_symbolically(FAMILIES["random robot"](5), {}, on_progress=told.append)
-    assert told[0].startswith("symbolic search, ")
+def test_it_stops_on_request_and_reports_progress() -> None:
+    reported: list[str] = []
+    verify_symbolically(FAMILIES["random robot"](5), {}, on_progress=reported.append)
+    assert reported[0].startswith("symbolic search, ")
     with pytest.raises(SynthesisCancelled):
         verify_symbolically(FAMILIES["random robot"](5), {}, should_stop=lambda: True)
 

@@ -9,6 +9,7 @@ import grpc
 import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 
+from robosc_api.connection_watch import Arrivals, CallsSince
 from robosc_api.failures import reason_of
 from robosc_api.security import Quota, Scope, make_token
 from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc, synthesis_pb2_grpc
@@ -143,20 +144,38 @@ def test_health_has_places_for_each_host(small: str) -> None:
         assert is_answered(small)
 
 
+class Call:
+    """Context of a call that never ends."""
+
+    def __init__(self, host: str) -> None:
+        self._host = host
+
+    def peer(self) -> str:
+        return f"ipv6:[{self._host}]:1"
+
+    def auth_context(self) -> dict[str, object]:
+        return {}
+
+    def add_done_callback(self, callback: object) -> None:
+        """Do nothing."""
+
+
+@pytest.mark.parametrize("limits", [CallLimits(9, 1), CallLimits(1, 9)], ids=["of the caller", "of the server"])
+def test_refused_calls_explain_the_bytes_of_their_connection_and_health_checks_do_not(limits: CallLimits) -> None:
+    arrivals = Arrivals()
+    calls = OpenCalls(limits, health=limits, arrivals=arrivals)
+    handler: Any = grpc.unary_unary_rpc_method_handler(lambda request, context: None)
+    for method in (GET_VERSION, HEALTH):
+        layered = calls.wrap(handler, method)
+        layered.unary_unary(None, Call("2001:db8::1"))
+        for _ in range(3):
+            with pytest.raises(RefusedError):
+                layered.unary_unary(None, Call("2001:db8::1"))
+    peer = "ipv6:[2001:db8::1]:1"
+    assert arrivals.take() == CallsSince(ended={peer: 3}, open={peer: 2})
+
+
 def test_nobody_from_elsewhere_takes_the_places_of_this_machines_health_checks() -> None:
-    class Call:
-        def __init__(self, host: str) -> None:
-            self._host = host
-
-        def peer(self) -> str:
-            return f"ipv6:[{self._host}]:1"
-
-        def auth_context(self) -> dict[str, object]:
-            return {}
-
-        def add_done_callback(self, callback: object) -> None:
-            """Do nothing: the call never ends."""
-
     calls = OpenCalls(CallLimits(1, 1), health=CallLimits(3, 1))
     layered = calls.wrap(grpc.unary_unary_rpc_method_handler(lambda request, context: None), HEALTH)
     # One machine with many addresses of its network, then others.

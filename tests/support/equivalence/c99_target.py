@@ -1,4 +1,4 @@
-"""Generated C99, compiled with sanitizers, as a process that is told what happens."""
+"""Generated C99, compiled with sanitizers, as a process that reads what happens."""
 
 import subprocess
 from collections.abc import Mapping
@@ -39,7 +39,7 @@ class C99Target:
     """
 
     name = "c99"
-    # Its callback for a log tells kind and event, or the topic of a release.
+    # Its callback for a log gives kind and event, or the topic of a release.
     sight = Sight(log_keys=frozenset({"kind", "event", "identifier"}))
     _commands: Mapping[str, str] = {"tick": "t", "wait": "w", "restart": "R"}
 
@@ -63,8 +63,8 @@ class C99Target:
     def start(self, scenario: Scenario, awaited: Observation | None = None) -> Observation:
         """Begin."""
         settings = settings_for(scenario.all_settings(), describe(self._supervisor))
-        self._tell(self._settings(settings))
-        return self._tell(["s", microseconds(self._now_s)])
+        self._order(self._settings(settings))
+        return self._order(["s", microseconds(self._now_s)])
 
     def _settings(self, settings: Settings) -> list[object]:
         return settings_words(self._layout, settings)
@@ -75,34 +75,34 @@ class C99Target:
         now, name, ids = microseconds(self._now_s), action.subject, self._ids
         match action.do:
             case "tick" | "wait" | "restart":
-                return self._tell([self._commands[action.do], now])
+                return self._order([self._commands[action.do], now])
             case "stop":
-                return self._tell(["S", now, 0])
+                return self._order(["S", now, 0])
             case "message":
                 place = list(self._layout.received_topics).index(name)
                 words: list[object] = ["m", now, place, *self._handed(action.data)]
                 for type_ in batch_types(self._layout, name):
                     words += data_words(self._layout, type_, action.data, is_root=True)
-                return self._tell(words)
+                return self._order(words)
             case "reply":
                 return self._back(f"{name}.response", ids.end(name), action.data)
             case "feedback":
                 return self._back(f"{name}.feedback", ids.last(name), action.data)
             case "fail":
-                return self._tell(["f", now, ids.end(name)])
+                return self._order(["f", now, ids.end(name)])
             case "accept":
-                return self._tell(["a", now, ids.last(name)])
+                return self._order(["a", now, ids.last(name)])
             case "end" if action.how == "succeeded":
                 return self._back(f"{name}.response", ids.end(name), action.data)
             case "end":
-                return self._tell(["e", now, ids.end(name), *self._ended(action)])
+                return self._order(["e", now, ids.end(name), *self._ended(action)])
         raise ValueError(action.do)
 
     def _back(self, event: str, number: int, data: Any) -> Observation:
         place = events_back(self._layout).index(event)
         words: list[object] = ["b", microseconds(self._now_s), place, number, *self._handed(data)]
         type_ = event_data(self._layout.model, event)
-        return self._tell(words + ([] if type_ is None else data_words(self._layout, type_, data, is_root=True)))
+        return self._order(words + ([] if type_ is None else data_words(self._layout, type_, data, is_root=True)))
 
     def _handed(self, data: Any) -> list[object]:
         """Return the words that hand the program the message itself, which a controller does not need."""
@@ -112,7 +112,7 @@ class C99Target:
         """Return the words for how a goal ended without success, which a controller does not need."""
         return []
 
-    def _tell(self, words: list[object]) -> Observation:
+    def _order(self, words: list[object]) -> Observation:
         _pipe(self._process.stdin).write(" ".join(map(str, words)) + "\n")
         _pipe(self._process.stdin).flush()
         issued: list[Issued] = []
@@ -190,7 +190,7 @@ class C99Target:
 
 
 class C99Layer(C99Target):
-    """A compiled test program around a generated C layer, which tells each message by the number that it came with."""
+    """A compiled test program around a generated C layer, which knows each message by the number that it came with."""
 
     name = "c99 layer"
     _commands: Mapping[str, str] = {"tick": "w", "wait": "w", "restart": "R"}  # It decides nothing.
@@ -229,7 +229,7 @@ class C99Layer(C99Target):
         return super().do(action, awaited)
 
     def _ask(self, action: Action, place: int, words: list[object]) -> Observation:
-        return self._tell(["q", microseconds(self._now_s), place, *words])
+        return self._order(["q", microseconds(self._now_s), place, *words])
 
     def _sent(self, data: Any) -> list[object]:
         return [*self._handed(data), int(is_finite(data)), int(not any(flat(data).values()))]

@@ -61,7 +61,7 @@ class TickingSurroundings(Surroundings, Protocol):
     """Those of a node that decides by its own timer."""
 
     def wait_for_tick(self) -> None:
-        """Wait until the timer has ticked after this call: what had ticked before may still be told."""
+        """Wait until the timer has ticked after this call: what had ticked before may still be reported."""
 
 
 def timed_log(surroundings: TickingSurroundings, scenario: Scenario, folder: Path, model: Model) -> list[Entry]:

@@ -95,7 +95,7 @@ def difference(target: str, number: int, what: str, expected: Observation, found
         ("what it asks for", _seen(expected.issued, sight), _seen(found.issued, sight)),
     ]
     if sight.has_log:
-        pairs.append(("the event log", _told(expected.log, sight), _told(found.log, sight)))
+        pairs.append(("the event log", _visible(expected.log, sight), _visible(found.log, sight)))
     for name in ("state", "locations", "enabled", "status", "counters"):
         if getattr(found, name) is not None:
             pairs.append((name, getattr(expected, name), getattr(found, name)))
@@ -121,7 +121,7 @@ def _seen(issued: Sequence[Issued], sight: Sight) -> list[Any]:
             kind = "answer" if kind == "no answer" else kind
             subject = sight.topics.get(name, name) if kind == "publish" else name
             found.append([kind, subject, {path: part for path, value in data.items() if (part := _on_wire(value))}])
-    # A middleware keeps the order on each topic; between topics, the event log tells it.
+    # A middleware keeps the order on each topic; between topics, the event log keeps it.
     return sorted(found, key=lambda item: item[:2])
 
 
@@ -131,9 +131,9 @@ def _on_wire(value: Any) -> Any:
     return struct.unpack("f", struct.pack("f", value))[0]
 
 
-def _told(log: Sequence[Entry], sight: Sight) -> list[Entry]:
-    for is_controllable, is_told in ((False, sight.has_readings), (True, sight.has_requests)):
-        if not is_told:
+def _visible(log: Sequence[Entry], sight: Sight) -> list[Entry]:
+    for is_controllable, is_shown in ((False, sight.has_readings), (True, sight.has_requests)):
+        if not is_shown:
             log = [{**item, "data": None} if item.get("controllable") is is_controllable else item for item in log]
     if sight.log_keys is None:
         return list(log)

@@ -76,7 +76,7 @@ class Callers:
 
 
 class World:
-    """A middleware and the caller of a layer, which remember what they are asked for and told.
+    """A middleware and the caller of a layer, which remember what they are asked for and given.
 
     Args:
         ids: Keeps the calls and goals under way.

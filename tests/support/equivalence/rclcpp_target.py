@@ -1,4 +1,4 @@
-"""Generated ROS 2 nodes in C++ on the stand-in for rclcpp, as processes that are told what happens line by line."""
+"""Generated ROS 2 nodes in C++ on the stand-in for rclcpp, as processes that read what happens line by line."""
 
 import os
 import signal
@@ -64,9 +64,9 @@ class StandInSurroundings:
                 env={"PATH": os.environ["PATH"]},
             )
         for name in self._servers:
-            self._tell("server", name, "1")
+            self._order("server", name, "1")
 
-    def _tell(self, *words: str) -> None:
+    def _order(self, *words: str) -> None:
         self._input.write(" ".join(words) + "\n")
         self._input.flush()
 
@@ -77,22 +77,22 @@ class StandInSurroundings:
 
     def send(self, topic: str, data: Any) -> None:
         """Publish."""
-        self._tell("message", topic, _line(data))
+        self._order("message", topic, _line(data))
 
     def answer(self, action: Action) -> None:
         """Let a server do it."""
         name = next(item.identifier for item in self._servers.values() if item.name == action.subject)
         match action.do:
             case "reply":
-                self._tell("answer", name, _line(action.data))
+                self._order("answer", name, _line(action.data))
             case "accept":
-                self._tell("accept", name)
+                self._order("accept", name)
             case "feedback":
-                self._tell("feedback", name, _line(action.data))
+                self._order("feedback", name, _line(action.data))
             case "end":
                 if action.how == "cancelled":
-                    self._tell("refuse", name, "0")  # The cancel is accepted.
-                self._tell("result", name, str(_ENDS[action.how]), _line(action.data))
+                    self._order("refuse", name, "0")  # The cancel is accepted.
+                self._order("result", name, str(_ENDS[action.how]), _line(action.data))
             case _:
                 raise ValueError(action.do)
 
@@ -129,7 +129,7 @@ class StandInSurroundings:
 
     def stop(self) -> None:
         """Stop by a signal; the node does not wait long for the ends of goals."""
-        self._tell("signal", str(int(signal.SIGTERM)))
+        self._order("signal", str(int(signal.SIGTERM)))
         assert self._process.wait(LIMIT_S) == 0, self._errors.read_text(errors="replace")
 
     def close(self) -> None:
@@ -140,7 +140,7 @@ class StandInSurroundings:
 
 
 class SteppedSurroundings(StandInSurroundings):
-    """A node on simulated time, which tells its state as a typed message each period.
+    """A node on simulated time, which publishes its state as a typed message each period.
 
     Args:
         supervisor: Supervisor that the node was generated from.
@@ -162,10 +162,10 @@ class SteppedSurroundings(StandInSurroundings):
         self._wait(lambda: self._count >= count, f"the node does not issue {count} requests")
 
     def next_state(self) -> dict[str, Any]:
-        """Let a period pass, and return the state that the node tells then."""
+        """Let a period pass, and return the state that the node publishes then."""
         self._periods += 1
-        self._tell("clock", str(1.0 + self._periods * PERIOD_S))
-        self._wait(lambda: bool(self._states), "the node tells no state")
+        self._order("clock", str(1.0 + self._periods * PERIOD_S))
+        self._wait(lambda: bool(self._states), "the node publishes no state")
         return self._states.pop()
 
     def _wait(self, is_done: Callable[[], bool], problem: str) -> None:
@@ -183,7 +183,7 @@ class SteppedSurroundings(StandInSurroundings):
 
     def first_state(self) -> dict[str, Any]:
         """Let periods pass until the node has begun, and return the first state after that."""
-        self._tell("clock", "1.0")
+        self._order("clock", "1.0")
         while (state := self.next_state())["status"] == "new":
             pass
         return state

@@ -14,7 +14,7 @@ FOLDER = Path(__file__).parents[2] / "equivalence" / "recorded"
 def recorded_text(scenario: Scenario, seen: list[Observation]) -> str:
     """A run as text: its settings, then each action (`do`) before the entries of the log (`kind`) that it led to.
 
-    Of the state that stands in entries of the log, a component is told when it is not as in the entry before.
+    Of the state that stands in entries of the log, a component is recorded when it is not as in the entry before.
     """
     return "".join(json.dumps(line, separators=(",", ":")) + "\n" for line in _lines(scenario, seen))
 

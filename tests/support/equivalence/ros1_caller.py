@@ -1,4 +1,4 @@
-"""An existing controller on ROS 1 before a supervision layer: asks what a test says, remembers what it is told."""
+"""An existing controller on ROS 1 before a supervision layer: asks what a test says, remembers what it receives."""
 
 from typing import Any
 
@@ -92,7 +92,7 @@ class Ros1Caller:
             found.append(("answer", name, {"caller": number, **set_parts(reply.get("reply") or reply)}))
         for goal, (name, number) in self._goals.items():
             for heard in self._new(goal, peer.sent[goal]):
-                for kind, data in _told(heard):
+                for kind, data in _contents(heard):
                     parts = dict.fromkeys([""], *data.values()) if kind == "told" and name in self._basic else data
                     found.append((kind, name, {"caller": number, **parts}))
         return found
@@ -103,7 +103,7 @@ class Ros1Caller:
         return values[before:]
 
 
-def _told(heard: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
+def _contents(heard: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
     """Express what a client of an action hears in the words of the suite."""
     if "feedback" in heard:
         return [("told", set_parts(heard["feedback"]))]

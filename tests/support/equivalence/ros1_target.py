@@ -89,7 +89,7 @@ class Ros1Surroundings:
                 self._peer.serve(name, type_name)
             else:
                 type_name = type_name.removesuffix("Action")
-                # What a layer is told of the end of a cancelled goal is a step of its own.
+                # What a layer hears of the end of a cancelled goal is a step of its own.
                 self._peer.act(name, type_name, ends_on_cancel=not self._is_layer)
             types[item.name] = type_name
         if self._is_layer:

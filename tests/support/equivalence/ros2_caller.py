@@ -1,4 +1,4 @@
-"""An existing controller on ROS 2 before a supervision layer: asks what a test says, remembers what it is told."""
+"""An existing controller on ROS 2 before a supervision layer: asks what a test says, remembers what it receives."""
 
 from collections.abc import Callable
 from typing import Any
@@ -96,30 +96,30 @@ class Ros2Caller:
             case _:
                 raise ValueError(action.do)
 
-    def _tell(self, kind: str, name: str, number: int, data: dict[str, Any]) -> None:
+    def _report(self, kind: str, name: str, number: int, data: dict[str, Any]) -> None:
         self.issued.append((kind, name, {"caller": number, **data}))
 
     def _call(self, name: str, number: int, data: Any) -> None:
         future = self._clients[name].call_async(self._filled(self._types[name].Request, data))
-        future.add_done_callback(lambda done: self._tell("answer", name, number, self._given(done.result())))
+        future.add_done_callback(lambda done: self._report("answer", name, number, self._given(done.result())))
 
     def _send(self, name: str, number: int, data: Any) -> None:
-        def told(message: Any) -> None:
-            self._tell("told", name, number, self._given(message.feedback))
+        def on_feedback(message: Any) -> None:
+            self._report("told", name, number, self._given(message.feedback))
 
         def ended(done: Any) -> None:
             found = done.result()
-            self._tell("ended", name, number, {"how": _OUTCOMES[found.status], **self._given(found.result)})
+            self._report("ended", name, number, {"how": _OUTCOMES[found.status], **self._given(found.result)})
 
         def answered(done: Any) -> None:
             handle = done.result()
-            self._tell("accept" if handle.accepted else "reject", name, number, {})
+            self._report("accept" if handle.accepted else "reject", name, number, {})
             if handle.accepted:
                 self._handles[name] = handle
                 handle.get_result_async().add_done_callback(ended)
 
         goal = self._filled(self._types[name].Goal, data)
-        self._clients[name].send_goal_async(goal, told).add_done_callback(answered)
+        self._clients[name].send_goal_async(goal, on_feedback).add_done_callback(answered)
 
 
 # action_msgs/msg/GoalStatus

@@ -76,7 +76,7 @@ class Ros2Surroundings:
         )
         self._peer.wait_for_peers([item.identifier for item in topics(self._model)])
         self._peer.spin_until(
-            # Only the node tells when it no longer waits for its servers.
+            # Only the node knows when it no longer waits for its servers.
             lambda: any(status.message.startswith(_RUNNING) for report in reports for status in report.status),
             LIMIT_S,
             "the node to run",
@@ -100,7 +100,7 @@ class Ros2Surroundings:
             type_ = load_server(_ServerType(is_action, str(info.package), str(info.interface)))  # type: ignore[arg-type]
             self._seen[item.name] = 0
             if is_action:
-                # What a layer is told of the end of a cancelled goal is a step of its own.
+                # What a layer hears of the end of a cancelled goal is a step of its own.
                 self._actions[item.name] = HeldAction(host, type_, item.identifier, ends_on_cancel=not self._is_layer)
             else:
                 self._services[item.name] = HeldService(host, type_, item.identifier)
@@ -132,7 +132,7 @@ class Ros2Surroundings:
         self._ticked_ns = information["source_timestamp"]
 
     def wait_for_tick(self) -> None:
-        """Wait until the node's own timer has ticked: it tells its state each time, and the middleware when it did."""
+        """Wait until the node's own timer has ticked: it then publishes its state, as the middleware notices."""
         now_ns = time.time_ns()
         self._peer.spin_until(lambda: self._ticked_ns > now_ns, LIMIT_S, "a tick of the node", self._node)
 

@@ -1,4 +1,4 @@
-"""Small simulated surroundings of the example robots: each tells what comes before the next period.
+"""Small simulated surroundings of the example robots: each decides what comes before the next period.
 
 Nothing in them is random, and every number is one that a float of 32 bits holds.
 """
@@ -119,7 +119,7 @@ def _maze_solver() -> Run:
 
 
 def _navigation() -> Run:
-    """Calibrates at the second try; drives, meets a person, fails three times, is told to go on, and struggles."""
+    """Calibrates at the second try; drives, meets a person, fails three times, is asked to go on, and struggles."""
     goals = calls = 0
     since_goal: int | None = None
     issued = yield []
@@ -165,7 +165,7 @@ def _point(x: float, y: float, z: float = 1.0) -> dict[str, float]:
 
 
 def _object_finder() -> Run:
-    """Turns until it sees the object, goes there past somebody, tells about it at the second try."""
+    """Turns until it sees the object, goes there past somebody, reports it at the second try."""
     angle, way, velocity = -3.0, 0.0, (0.0, 0.0)
     calls = 0
     issued = yield []

@@ -52,7 +52,9 @@ static bool print_publish(void *context, const {prefix}_request_t *request)
     printf("publish %s\\n", {prefix}_communication_name((int)request->communication));
     return true;
 }}
+"""
 
+PUBLISH_DEFAULT = """\
 static bool print_default(void *context, {prefix}_topic_t topic)
 {{
     (void)context;
@@ -86,7 +88,7 @@ def example_file(unit: Unit) -> str:
     texts: list[str] = []
     settings: list[str] = []
     if unit.layout.of_kind(CommunicationKind.INCOMING_MESSAGE):
-        texts.append(_PUBLISH)
+        texts += [_PUBLISH, PUBLISH_DEFAULT]
         settings += ["publish = print_publish", "publish_default = print_default"]
     if unit.layout.of_kind(CommunicationKind.SERVICE):
         texts.append(_SEND.replace("{kind}", "call"))

@@ -1,7 +1,7 @@
 """The generated `main.c` of a supervision layer: a caller that makes every request, and a robot that sends nothing."""
 
 from robosc.model.structure import CommunicationKind
-from robosc.targets.code.c.example import CANCEL, main_text
+from robosc.targets.code.c.example import CANCEL, PUBLISH_DEFAULT, main_text
 from robosc.targets.code.c.layer import request_parameters
 from robosc.targets.code.c.layout import Layout
 from robosc.targets.code.c.received import unknown_name
@@ -33,13 +33,6 @@ static bool print_publish(void *context, {prefix}_topic_t topic, const void *mes
     (void)context;
     (void)message;
     printf("publish on %s\\n", {prefix}_topic_name((int)topic));
-    return true;
-}}
-
-static bool print_default(void *context, {prefix}_topic_t topic)
-{{
-    (void)context;
-    printf("default message on %s\\n", {prefix}_topic_name((int)topic));
     return true;
 }}
 """
@@ -98,7 +91,7 @@ def layer_example_file(unit: Unit) -> str:
         texts.append(_PASS_ON)
         settings.append("pass_on = print_pass_on")
     if layout.topics:
-        texts.append(_PUBLISH)
+        texts += [_PUBLISH, PUBLISH_DEFAULT]
         settings += ["publish = print_publish", "publish_default = print_default"]
     if layout.of_kind(CommunicationKind.SERVICE):
         texts += [_SEND.replace("{kind}", "call"), _HAND_ON.replace("{kind}", "answer")]

@@ -37,6 +37,7 @@ def _lines(statement: Statement) -> list[str]:
             return [code_text(code)]
         case Return(value):
             return [f"return {code_text(value)}"]
+        # The printer of C goes the same way; brackets, indentation and the words between differ in every line.
         case If(branches, otherwise):
             lines: list[str] = []
             for condition, body in branches:

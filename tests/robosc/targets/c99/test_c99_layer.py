@@ -20,10 +20,12 @@ from support.c99 import GCC, SANITIZERS, WARNINGS, lonely_end, replay
 from support.c99_layer import LayerReference, compare_layer, compiled_layer
 from support.c99_main import events_back
 from support.effort import examples
+from support.execution import supervisor_of
 from support.generated import example_supervisor
 from support.models import model_of
 from support.random_layers import random_layer
-from support.random_supervisors import CERTIFICATE, random_supervisor
+from support.random_supervisors import random_supervisor
+from support.ros_layers import layer_of
 
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
 
@@ -104,13 +106,9 @@ robot Everything {
 """
 
 
-def layer_of_text(text: str) -> Supervisor:
-    return Supervisor(model_of(text), Deployment.LAYER, (), CERTIFICATE)
-
-
 @pytest.fixture(scope="module")
 def everything(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return compiled_layer(layer_of_text(EVERYTHING), tmp_path_factory.mktemp("everything"))
+    return compiled_layer(layer_of(EVERYTHING), tmp_path_factory.mktemp("everything"))
 
 
 def _kinds(lines: list[str]) -> Counter[str]:
@@ -136,7 +134,7 @@ def test_an_example_behaves_as_the_reference(name: str, tmp_path: Path) -> None:
 
 @needs_gcc
 def test_requests_of_every_kind_behave_as_the_reference(everything: Path) -> None:
-    seen = _kinds(compare_layer(layer_of_text(EVERYTHING), everything, Random(7), 50, 150))
+    seen = _kinds(compare_layer(layer_of(EVERYTHING), everything, Random(7), 50, 150))
     for what in "release stop resume restart fault unknown unexpected event blocked".split():
         assert seen[f"log {what}"] > 5, seen
     for what in "publish default call goal cancel pass blocked answer no_answer accept reject feedback end".split():
@@ -151,7 +149,7 @@ def test_requests_of_every_kind_behave_as_the_reference(everything: Path) -> Non
 @settings(max_examples=examples(12))
 @given(st.integers(0, 2**32))
 def test_any_sequence_behaves_as_the_reference(everything: Path, seed: int) -> None:
-    compare_layer(layer_of_text(EVERYTHING), everything, Random(seed), 2, 100)
+    compare_layer(layer_of(EVERYTHING), everything, Random(seed), 2, 100)
 
 
 @needs_gcc
@@ -183,14 +181,14 @@ def test_random_robots_behave_as_the_reference(tmp_path: Path) -> None:
 
 @needs_gcc
 def test_sanitizers_find_nothing(tmp_path: Path) -> None:
-    for number, supervisor in enumerate((layer_of_text(EVERYTHING), random_layer(Random(3)))):
+    for number, supervisor in enumerate((layer_of(EVERYTHING), random_layer(Random(3)))):
         program = compiled_layer(supervisor, tmp_path / str(number), *SANITIZERS)
         compare_layer(supervisor, program, Random(number), 4, 80)
 
 
 @needs_gcc
 def test_optimized_code_behaves_alike(tmp_path: Path) -> None:
-    supervisor = layer_of_text(EVERYTHING)
+    supervisor = layer_of(EVERYTHING)
     compare_layer(supervisor, compiled_layer(supervisor, tmp_path, "-O2"), Random(5), 4, 100)
 
 
@@ -226,41 +224,41 @@ class _Caller:
     """
 
     def __init__(self, text: str = TWO_GOALS, **named: object) -> None:
-        self.supervisor = layer_of_text(text)
+        self.supervisor = layer_of(text)
         self.reference = LayerReference(self.supervisor, Random(1), Settings(**named))  # type: ignore[arg-type]
         self.executor = self.reference.executor
         self.executor.start()
-        self.reference.tell("s")
+        self.reference.command("s")
 
     def goal(self, name: str, caller: int) -> None:
         message = {"x": 1.0}
         sent = self.reference._sent(name, message)
         self.executor.on_goal(name, caller, message)
-        self.reference.tell("q", self.reference._place(f"goal_{name}"), caller, *sent)
+        self.reference.command("q", self.reference._place(f"goal_{name}"), caller, *sent)
 
     def cancel(self, name: str, caller: int) -> None:
         self.executor.on_cancel(name, caller)
-        self.reference.tell("q", self.reference._place(f"cancel_{name}"), caller)
+        self.reference.command("q", self.reference._place(f"cancel_{name}"), caller)
 
     def accept(self, number: int) -> None:
         self.executor.on_goal_accepted(number)
-        self.reference.tell("a", number)
+        self.reference.command("a", number)
 
     def go(self) -> None:
         message = {"x": 1.0}
         sent = self.reference._sent("go", message)
         self.executor.on_request("go", message)
-        self.reference.tell("q", 0, *sent)
+        self.reference.command("q", 0, *sent)
 
     def receive(self, identifier: str) -> None:
         number = self.reference.remember(None)
         self.executor.receive(identifier, None)
-        self.reference.tell("m", list(self.reference.layout.received_topics).index(identifier), number)
+        self.reference.command("m", list(self.reference.layout.received_topics).index(identifier), number)
 
     def watch(self, seconds: float) -> None:
         self.reference.clock.advance(seconds)
         self.executor.watch()
-        self.reference.tell("w")
+        self.reference.command("w")
 
     def lines(self) -> list[str]:
         return [line for line in self.reference.lines if not line.startswith(("state", "log"))]
@@ -376,7 +374,7 @@ def test_the_example_program_runs(name: str, tmp_path: Path) -> None:
 
 @needs_gcc
 def test_the_example_program_asks_for_everything(tmp_path: Path) -> None:
-    done = _run_example(layer_of_text(EVERYTHING), tmp_path)
+    done = _run_example(layer_of(EVERYTHING), tmp_path)
     for words in ("publish on /cmd_vel", "publish on bell", "call calibrate", "send_goal move", "accept_goal turn"):
         assert words in done, done
 
@@ -393,7 +391,7 @@ def _run_example(supervisor: Supervisor, folder: Path) -> str:
 
 @needs_gcc
 def test_nothing_allocates_and_nothing_is_global(tmp_path: Path) -> None:
-    compiled_layer(layer_of_text(EVERYTHING), tmp_path, "-fno-pie", "-no-pie")
+    compiled_layer(layer_of(EVERYTHING), tmp_path, "-fno-pie", "-no-pie")
     symbols = subprocess.run(["nm", "unit.o"], cwd=tmp_path, capture_output=True, text=True, check=True).stdout
     kinds = {line.split()[-1]: line.split()[-2] for line in symbols.splitlines()}
     assert {name for name, kind in kinds.items() if kind == "U"} <= {"memset", "memcpy", "strcmp", "__stack_chk_fail"}
@@ -403,7 +401,7 @@ def test_nothing_allocates_and_nothing_is_global(tmp_path: Path) -> None:
 
 @needs_gcc
 def test_a_layer_without_one_of_its_callbacks_is_refused(tmp_path: Path) -> None:
-    files = generate(layer_of_text(EVERYTHING), "c99")
+    files = generate(layer_of(EVERYTHING), "c99")
     for path, text in files.items():
         (tmp_path / path).write_text(text, encoding="utf-8")
     settings_ = re.findall(r"\n    callbacks\.(\w+) = ", files["main.c"])
@@ -420,7 +418,7 @@ def test_a_layer_without_one_of_its_callbacks_is_refused(tmp_path: Path) -> None
 
 
 def test_a_layer_has_nothing_that_decides() -> None:
-    files = generate(layer_of_text(EVERYTHING), "c99")
+    files = generate(layer_of(EVERYTHING), "c99")
     assert set(files) == {
         *("CMakeLists.txt", "README.md", "main.c"),
         *("everything_supervisor.c", "everything_supervisor.h"),
@@ -431,13 +429,13 @@ def test_a_layer_has_nothing_that_decides() -> None:
 
 
 def test_the_header_says_where_data_tells_messages_apart() -> None:
-    text = generate(layer_of_text(EVERYTHING), "c99")["everything_supervisor.h"]
+    text = generate(layer_of(EVERYTHING), "c99")["everything_supervisor.h"]
     # Comments go over lines that begin with an asterisk.
     header = " ".join(word for word in text.split() if word != "*")
-    told = "Its data says which of them; what is not known of it is unknown."
-    assert f"The caller sends a message on /beep: loud, quiet. {told}" in header
+    sentence = "Its data says which of them; what is not known of it is unknown."
+    assert f"The caller sends a message on /beep: loud, quiet. {sentence}" in header
     assert "The caller sends a message on bell: bell." in header
-    assert f"on bell: bell. {told}" not in header
+    assert f"on bell: bell. {sentence}" not in header
 
 
 HOSTILE = """
@@ -476,7 +474,7 @@ robot Class {
 
 @needs_gcc
 def test_names_that_are_words_of_c_work(tmp_path: Path) -> None:
-    supervisor = layer_of_text(HOSTILE)
+    supervisor = layer_of(HOSTILE)
     lines = compare_layer(supervisor, compiled_layer(supervisor, tmp_path), Random(3), 5, 100)
     assert any(line.startswith("publish") for line in lines)
     _run_example(supervisor, tmp_path)
@@ -488,7 +486,7 @@ def test_a_model_without_one_kind_of_communication_works(tmp_path: Path) -> None
     model = model_of(EVERYTHING)
     for kind in CommunicationKind:
         only = model_of(_ONLY[kind])
-        supervisor = Supervisor(only, Deployment.LAYER, (), CERTIFICATE)
+        supervisor = supervisor_of(only, Deployment.LAYER)
         folder = tmp_path / kind.name
         compare_layer(supervisor, compiled_layer(supervisor, folder), Random(2), 4, 60)
         _run_example(supervisor, folder)
@@ -512,6 +510,6 @@ _ONLY = {
 
 
 def test_the_same_supervisor_gives_the_same_bytes() -> None:
-    first, second = layer_of_text(EVERYTHING), layer_of_text(EVERYTHING)
+    first, second = layer_of(EVERYTHING), layer_of(EVERYTHING)
     assert generate(first, "c99") == generate(second, "c99")
     assert events_back(LayerReference(first, Random(1)).layout)

@@ -30,16 +30,13 @@ from robosc.targets.code.c.naming import member_name, prefix_for
 from robosc.targets.code.c.text import safe, string_literal
 from support.c99 import GCC, SANITIZERS, WARNINGS, Reference, compare, compiled, lonely_end, replay
 from support.c99_main import events_back
+from support.execution import supervisor_of, unsupervised
 from support.generated import example_supervisor
-from support.models import EXAMPLE_NAMES, model_of
+from support.models import EXAMPLE_NAMES
 from support.random_controllers import random_robot
-from support.random_supervisors import CERTIFICATE, random_supervisor
+from support.random_supervisors import random_supervisor
 
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
-
-
-def supervisor_of_text(text: str, deployment: Deployment = Deployment.CONTROLLER) -> Supervisor:
-    return Supervisor(model_of(text), deployment, (), CERTIFICATE)
 
 
 def _controller(seed: int) -> Supervisor:
@@ -156,7 +153,7 @@ robot Everything {
 
 @needs_gcc
 def test_requests_of_every_kind_behave_as_the_reference(tmp_path: Path) -> None:
-    supervisor = supervisor_of_text(EVERYTHING)
+    supervisor = unsupervised(EVERYTHING)
     seen = Counter(_kinds(compare(supervisor, compiled(supervisor, tmp_path), Random(7), 60, 150)))
     for what in "release stop resume restart fault unknown unexpected event".split():
         assert seen[f"log {what}"] > 5, seen
@@ -194,17 +191,17 @@ robot TwoGoals {
 
 @needs_gcc
 def test_goals_that_time_out_together_are_not_ended_twice(tmp_path: Path) -> None:
-    supervisor = supervisor_of_text(TWO_GOALS)
+    supervisor = unsupervised(TWO_GOALS)
     reference = Reference(supervisor, Random(1), Settings(action_timeout_s=2.0, release_identifiers=()))
     executor = reference.executor
     executor.start()
-    reference.tell("s")
+    reference.command("s")
     for _ in range(2):
         executor.tick()
-        reference.tell("t")
+        reference.command("t")
     reference.clock.advance(3.0)
     executor.watch()
-    reference.tell("w")
+    reference.command("w")
     assert sum(line.startswith("goal") for line in reference.lines) == 2
     assert executor.counters.unexpected == 0
     cancelled = f"log event {reference.events['two.cancel']}"
@@ -215,31 +212,31 @@ def test_goals_that_time_out_together_are_not_ended_twice(tmp_path: Path) -> Non
 @needs_gcc
 @pytest.mark.parametrize("outcome", ["succeeded", "aborted"])
 def test_the_end_of_a_goal_is_taken_whatever_else_is_over(outcome: str, tmp_path: Path) -> None:
-    supervisor = supervisor_of_text(TWO_GOALS)
+    supervisor = unsupervised(TWO_GOALS)
     settings = Settings(service_timeout_s=2.0, release_identifiers=("go",))
     reference = Reference(supervisor, Random(1), settings)
     executor = reference.executor
     executor.start()
-    reference.tell("s")
+    reference.command("s")
     for _ in range(4):
         executor.tick()
-        reference.tell("t")
+        reference.command("t")
     number = next(number for number, name in reference.goals.items() if name == "one")
     reference.clock.advance(2.0)
     # The call is over its time, which makes a release due, which fails.
     reference.let_fail("default")
     executor.on_goal_ended(number, outcome)
     if outcome == "succeeded":
-        reference.tell("b", events_back(reference.layout).index("one.response"), number)
+        reference.command("b", events_back(reference.layout).index("one.response"), number)
     else:
-        reference.tell("e", number)
+        reference.command("e", number)
     assert executor.is_faulty
     reference.let_fail()
     executor.restart()
-    reference.tell("R")
+    reference.command("R")
     for _ in range(4):
         executor.tick()
-        reference.tell("t")
+        reference.command("t")
     assert [name for number_, name in sorted(reference.goals.items())].count("one") == 2
     replay(compiled(supervisor, tmp_path), reference.commands, reference.lines)
 
@@ -307,13 +304,6 @@ robot Class {
 """
 
 
-@needs_gcc
-def test_names_that_are_words_of_c_work(tmp_path: Path) -> None:
-    supervisor = supervisor_of_text(HOSTILE)
-    lines = compare(supervisor, compiled(supervisor, tmp_path), Random(3), 5, 150)
-    assert any(line.startswith("publish") for line in lines)
-
-
 BELOW_ZERO = """
 robot BelowZero {
     component P {
@@ -339,7 +329,7 @@ robot BelowZero {
 @needs_gcc
 def test_a_word_of_a_comment_is_no_reading_of_the_old_state(tmp_path: Path) -> None:
     """A compiler warns about a copy that nothing reads."""
-    supervisor = supervisor_of_text("""robot R {
+    supervisor = unsupervised("""robot R {
         component Threshold {
             outgoing message tick with type: none
             behaviour {
@@ -354,9 +344,10 @@ def test_a_word_of_a_comment_is_no_reading_of_the_old_state(tmp_path: Path) -> N
 
 
 @needs_gcc
-def test_ranges_below_zero_are_kept(tmp_path: Path) -> None:
-    supervisor = supervisor_of_text(BELOW_ZERO)
-    lines = compare(supervisor, compiled(supervisor, tmp_path), Random(5), 5, 150)
+@pytest.mark.parametrize("text", [HOSTILE, BELOW_ZERO], ids=["words-of-c", "ranges-below-zero"])
+def test_hostile_names_and_ranges_below_zero_work(text: str, tmp_path: Path) -> None:
+    supervisor = unsupervised(text)
+    lines = compare(supervisor, compiled(supervisor, tmp_path), Random(3), 5, 150)
     assert any(line.startswith("publish") for line in lines)
 
 
@@ -370,7 +361,7 @@ CLASHING = """
 @needs_gcc
 def test_no_name_of_a_robot_clashes_with_anything(tmp_path: Path) -> None:
     for robot in CLASHING:
-        files = generate(supervisor_of_text(EVERYTHING.replace("robot Everything", f"robot {robot}")), "c99")
+        files = generate(unsupervised(EVERYTHING.replace("robot Everything", f"robot {robot}")), "c99")
         assert len(files) == 5
         folder = tmp_path / robot
         folder.mkdir()
@@ -398,7 +389,7 @@ def test_very_long_names_stay_apart(tmp_path: Path) -> None:
             }}
         }}
     """
-    supervisor = supervisor_of_text(text)
+    supervisor = unsupervised(text)
     compare(supervisor, compiled(supervisor, tmp_path), Random(3), 3, 50)
 
 
@@ -493,7 +484,7 @@ def test_what_is_not_done_is_refused() -> None:
         } }
     """
     with pytest.raises(UnsupportedModelError, match=r"received texts that are kept: the variable C\.v takes one"):
-        generate(supervisor_of_text(text), "c99")
+        generate(unsupervised(text), "c99")
 
 
 @needs_gcc
@@ -505,10 +496,10 @@ def test_texts_are_as_long_as_compilers_take_them(tmp_path: Path) -> None:
             provide m with "%s"
         }
     """
-    compiled(supervisor_of_text(text % ("x" * 4095, "é" * 2047)), tmp_path)
+    compiled(unsupervised(text % ("x" * 4095, "é" * 2047)), tmp_path)
     for variable, provided in (("x" * 4096, "x"), ("x", "x" * 4096), ("é" * 2048, "x")):
         with pytest.raises(UnsupportedModelError, match="does not do texts of more than 4095 bytes"):
-            generate(supervisor_of_text(text % (variable, provided)), "c99")
+            generate(unsupervised(text % (variable, provided)), "c99")
 
 
 def test_an_expression_too_deep_for_c_is_one_clear_error() -> None:
@@ -521,4 +512,4 @@ def test_an_expression_too_deep_for_c_is_one_clear_error() -> None:
         message = Communication("m", "C", CommunicationKind.OUTGOING_MESSAGE, "m", response=DoubleType())
         model = Model("Deep", (Component("C", behaviour),), (message,), (), (), (), (), ())
         with pytest.raises(UnsupportedModelError, match="the model Deep has an expression that is nested too deeply"):
-            generate(Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE), "c99")
+            generate(supervisor_of(model), "c99")

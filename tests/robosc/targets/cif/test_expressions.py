@@ -2,11 +2,9 @@
 
 import pytest
 
-from robosc.model.structure import Deployment
-from robosc.supervisor import Supervisor
 from support.cif_twin import assert_same_problem
+from support.execution import supervisor_of
 from support.models import model_of
-from support.random_supervisors import CERTIFICATE
 
 
 def assert_same(requirement: str = "true", update: str = "n := 1") -> None:
@@ -28,7 +26,7 @@ def assert_same(requirement: str = "true", update: str = "n := 1") -> None:
         requirement go needs C.flag or C.n = C.m
     }}"""
     )
-    assert assert_same_problem(Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE), reachable=0, others=60) > 10
+    assert assert_same_problem(supervisor_of(model), reachable=0, others=60) > 10
 
 
 @pytest.mark.parametrize(

@@ -23,10 +23,11 @@ from support.cif_parser import CifError
 from support.cif_system import CifSystem
 from support.cif_twin import assert_same_control, assert_same_problem
 from support.effort import examples
+from support.execution import unsupervised
 from support.generated import example_supervisor
-from support.models import EXAMPLE_DEPLOYMENTS, EXAMPLE_NAMES, EXAMPLES, bundle_of, example_bundle, model_of
+from support.models import EXAMPLE_DEPLOYMENTS, EXAMPLE_NAMES, EXAMPLES, bundle_of, example_bundle
 from support.random_models import models
-from support.random_supervisors import CERTIFICATE, random_supervisor
+from support.random_supervisors import random_supervisor
 
 
 def made(text: str, deployment: Deployment = Deployment.CONTROLLER, **libraries: str) -> Supervisor:
@@ -34,11 +35,6 @@ def made(text: str, deployment: Deployment = Deployment.CONTROLLER, **libraries:
     result = make_supervisor(bundle_of(text, **libraries), deployment=deployment)
     assert result.supervisor is not None, (result.reason, result.diagnostics)
     return result.supervisor
-
-
-def unsupervised(text: str) -> Supervisor:
-    """Return a supervisor made without synthesis: plants and requirements."""
-    return Supervisor(model_of(text), Deployment.CONTROLLER, (), CERTIFICATE)
 
 
 def layered(supervisor: Supervisor) -> Supervisor:
@@ -361,7 +357,7 @@ def test_a_file_without_any_one_of_its_lines_is_noticed(path: str, monkeypatch: 
     compare = assert_same_problem if path == "controller.cif" else assert_same_control
     unnoticed = []
     for number, line in enumerate(lines):
-        # Edges tell the supervisor's alphabet too: it is written for readers.
+        # Edges show the supervisor's alphabet too: it is written for readers.
         if not line or (line.startswith("//") and " = " not in line) or line.startswith("  alphabet"):
             continue
         text = "\n".join([*lines[:number], *lines[number + 1 :]]) + "\n"

@@ -1,4 +1,4 @@
-"""Statements are printed in both languages, and tell what they read."""
+"""Statements are printed in both languages, and list what they read."""
 
 from random import Random
 
@@ -96,7 +96,7 @@ def test_printed_python_does_what_the_statements_say() -> None:
     for _ in range(300):
         block = _random_block(dice, 2)
         names = {"a": dice.randrange(2), "b": dice.randrange(2), "n": dice.randrange(4), "m": dice.randrange(4)}
-        told, run = dict(names), dict(names)
-        _execute(block, told)
+        executed, run = dict(names), dict(names)
+        _execute(block, executed)
         exec("\n".join(python.statement_lines(block)), {}, run)
-        assert run == told
+        assert run == executed

@@ -156,7 +156,7 @@ def test_a_package_cannot_be_called_like_that_of_the_typed_state() -> None:
         generate(example_supervisor(FOLLOWER), "ros2-cpp", GenerateOptions(package="robosc_msgs"))
 
 
-def test_a_parameter_tells_its_range() -> None:
+def test_a_parameter_declares_its_range() -> None:
     text = generate(example_supervisor(FOLLOWER), "ros2-cpp")["src/node.cpp"]
     assert re.search(r'\{"period", .*, Range\{0\.0001, 3600\.0\}\},', text)
     assert re.search(r'\{"policy", .*, std::nullopt\},', text)

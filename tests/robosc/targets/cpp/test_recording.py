@@ -44,7 +44,7 @@ def test_servers_answer_in_every_way() -> None:
     assert "message.nested_field.float32_value = " in statements
 
 
-def test_the_package_tells_its_test() -> None:
+def test_the_package_declares_its_test() -> None:
     files = generate(example_supervisor("maze_solver/maze_solver"), "ros2-cpp")
     assert "ament_add_gtest(test_recorded_run test/test_recorded_run.cpp" in files["CMakeLists.txt"]
     assert "<test_depend>ament_cmake_gtest</test_depend>" in files["package.xml"]

@@ -3,6 +3,7 @@
 from alembic import op
 from sqlalchemy import BigInteger, Boolean, Column, ForeignKey, Integer, LargeBinary, Text, UniqueConstraint
 
+# Written out, and not taken from `schema.py`: that changes, and what version 1 was does not.
 revision = "1"
 down_revision = None
 

@@ -45,8 +45,9 @@ if TYPE_CHECKING:
     from robosc.pipeline.files import FileAccessError
     from robosc.pipeline.findings import Findings
     from robosc.pipeline.generating import generate
+    from robosc.pipeline.goals import Choice, GoalApproach, Goals
     from robosc.pipeline.loading import LoadedAutomata, LoadedModel, load
-    from robosc.pipeline.manual_run import EventNotPossibleError, UnknownEventError
+    from robosc.pipeline.manual_run import EventNotPossibleError, NoStrategyError, UnknownEventError
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.received_data import DataError
     from robosc.pipeline.results import (
@@ -71,6 +72,7 @@ if TYPE_CHECKING:
     from robosc.targets import GenerateOptions, OverwriteError, UnknownTargetError
 
 _HOMES = {
+    "Choice": "pipeline.goals",
     "ChoiceError": "pipeline.system_runs",
     "Condition": "pipeline.conditions",
     "Conditions": "pipeline.conditions",
@@ -85,12 +87,15 @@ _HOMES = {
     "Findings": "pipeline.findings",
     "GenerateOptions": "targets",
     "Generation": "pipeline.results",
+    "GoalApproach": "pipeline.goals",
+    "Goals": "pipeline.goals",
     "InternalError": "errors",
     "InvalidSupervisorError": "errors",
     "InvalidSystemError": "errors",
     "LanguageError": "errors",
     "LoadedAutomata": "pipeline.loading",
     "LoadedModel": "pipeline.loading",
+    "NoStrategyError": "pipeline.manual_run",
     "NoSupervisor": "pipeline.results",
     "NodeLimitError": "errors",
     "NothingGeneratedError": "pipeline.results",
@@ -131,6 +136,7 @@ _HOMES = {
 }
 
 __all__ = [
+    "Choice",
     "ChoiceError",
     "Condition",
     "Conditions",
@@ -145,12 +151,15 @@ __all__ = [
     "Findings",
     "GenerateOptions",
     "Generation",
+    "GoalApproach",
+    "Goals",
     "InternalError",
     "InvalidSupervisorError",
     "InvalidSystemError",
     "LanguageError",
     "LoadedAutomata",
     "LoadedModel",
+    "NoStrategyError",
     "NoSupervisor",
     "NodeLimitError",
     "NothingGeneratedError",

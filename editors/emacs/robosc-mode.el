@@ -33,6 +33,14 @@
    'symbols)
   "Words of the language.")
 
+(defconst robosc-mode-goal-words
+  '(("^[ \t]*\\(goal\\|assume\\)[ \t]+[^:,.= \t]" 1 'font-lock-keyword-face)
+    ("^[ \t]*goal[ \t]+\\(once\\)[ \t]+[a-zA-Z_(!^]" 1 'font-lock-keyword-face)
+    ("^[ \t]*assume[ \t]+\\(allow\\)[ \t]+[a-zA-Z_(!^]" 1 'font-lock-keyword-face)
+    ("\\_<always[ \t]+\\(eventually\\)\\_>" 1 'font-lock-keyword-face)
+    ("\\_<\\(leads\\)[ \t]+to\\_>" 1 'font-lock-keyword-face))
+  "Words of goals and assumptions, where they are no names.")
+
 (defconst robosc-mode-indentation 4 "Columns for each brace, as `eglot-format' has them.")
 
 (defun robosc-mode-indent-line ()
@@ -53,7 +61,7 @@
   (setq-local indent-tabs-mode nil)
   (setq-local indent-line-function #'robosc-mode-indent-line)
   (setq-local electric-indent-chars (append ")]}" electric-indent-chars))
-  (setq-local font-lock-defaults `(((,robosc-mode-keywords 0 'font-lock-keyword-face)))))
+  (setq-local font-lock-defaults `(((,robosc-mode-keywords 0 'font-lock-keyword-face) ,@robosc-mode-goal-words))))
 
 ;;;###autoload
 (add-to-list 'auto-mode-alist '("\\.rscd\\'" . robosc-mode))

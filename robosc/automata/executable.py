@@ -13,6 +13,7 @@ from functools import cached_property
 
 import msgspec
 
+from robosc.automata.goal_memory import Obligations, obligations, remembering
 from robosc.automata.lowering import cancel_condition, to_automata
 from robosc.automata.plants import PLANT_LOCATIONS, communication_plant, is_blocking
 from robosc.automata.structure import System
@@ -22,6 +23,7 @@ from robosc.model.structure import (
     ISSUED_KINDS,
     Behaviour,
     Communication,
+    CommunicationKind,
     Component,
     Deployment,
     EventKind,
@@ -139,6 +141,16 @@ class ExecutableSystem:
         return to_automata(msgspec.structs.replace(self.model, components=components), self.deployment)
 
     @cached_property
+    def obligations(self) -> Obligations:
+        """The goals and assumptions of the model, with the memory that judging them needs."""
+        return obligations(self)
+
+    @cached_property
+    def remembering_automata(self) -> System:
+        """The executed automata with that memory beside them."""
+        return remembering(self.executed_automata, self.obligations.places)
+
+    @cached_property
     def events(self) -> Mapping[str, ExecutableEvent]:
         """Every event by name: of the communications in source order, then the taus."""
         found: dict[str, ExecutableEvent] = {}
@@ -173,6 +185,25 @@ class ExecutableSystem:
     def received(self) -> tuple[str, ...]:
         """The events of the environment, in source order."""
         return tuple(event.name for event in self.events.values() if not event.is_issued)
+
+    @cached_property
+    def requests(self) -> tuple[str, ...]:
+        """The events of requests, in source order."""
+        return tuple(event.name for event in self.events.values() if event.kind is EventKind.REQUEST)
+
+    @cached_property
+    def batches(self) -> tuple[tuple[str, ...], ...]:
+        """The events of each step of the environment: messages on one identifier together, every other event alone."""
+        topics: dict[str, tuple[str, ...]] = {}
+        others: list[tuple[str, ...]] = []
+        uncontrollable = {event.name for event in self.automata.events if not event.is_controllable}
+        for event in self.events.values():
+            if event.communication and event.communication.kind is CommunicationKind.OUTGOING_MESSAGE:
+                identifier = event.communication.identifier
+                topics[identifier] = (*topics.get(identifier, ()), event.name)
+            elif event.name in uncontrollable:
+                others.append((event.name,))
+        return (*topics.values(), *others)
 
     @cached_property
     def behaviours(self) -> tuple[tuple[str, Behaviour], ...]:

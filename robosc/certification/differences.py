@@ -16,12 +16,15 @@ MAXIMUM_DIFFERENCES = 20
 _MAXIMUM_TEXT = 120
 
 _WORDS = {
+    "assumptions": "assumption",
     "behaviour": "",
     "communications": "communication",
     "components": "component",
     "enums": "enum",
+    "goals": "goal",
     "interface": "middleware type",
     "invariants": "invariant",
+    "is_allowed": "'allow'",
     "is_initial": "initial",
     "is_marked": "marked",
     "is_never": "'never'",

@@ -16,14 +16,15 @@ from robosc import explanation as explanations
 from robosc.automata import ExecutableSystem, Semantics
 from robosc.certification.certify import certify
 from robosc.certification.progress import Progress
-from robosc.controller_properties import check_controller, controller_findings
-from robosc.errors import Diagnostic, NodeLimitError, sorted_diagnostics
+from robosc.controller_properties import check_controller, check_strategy, controller_findings
+from robosc.errors import Diagnostic, InternalError, NodeLimitError, sorted_diagnostics
 from robosc.model.check import check
 from robosc.model.layers import layer_findings, without_controller_findings
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
-from robosc.supervisor import Supervisor
+from robosc.strategies import goal_findings, layer_goal_findings, synthesize_strategy
+from robosc.supervisor import CheckResult, Supervisor
 from robosc.synthesis import (
     EngineOptions,
     Statistics,
@@ -39,6 +40,9 @@ if TYPE_CHECKING:
     from robosc.explanation import EmptyExplanation
 
 LIVELOCK_REASON = "no supervisor is made, because silent steps never end (--allow-livelock overrides this)"
+
+
+GOALS_REASON = "no strategy is made for the goals"
 
 
 class OutcomeStatus(StrEnum):
@@ -104,6 +108,7 @@ def prepare(bundle: Bundle, deployment: Deployment) -> SynthesisProblem | Synthe
         ambiguous = layer_findings(checked.model, checked.places)
         if ambiguous:
             return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, sorted_diagnostics((*diagnostics, *ambiguous)))
+    diagnostics = sorted_diagnostics((*diagnostics, *layer_goal_findings(checked.model, checked.places, deployment)))
     system = ExecutableSystem(checked.model, deployment)
     # A model that synthesis cannot handle is refused here.
     _ = system.automata
@@ -195,5 +200,20 @@ def make_supervisor(
     if properties.livelock is not None and not allow_livelock:
         return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, LIVELOCK_REASON)
     certificate = msgspec.structs.replace(certificate, controller=properties.certified())
-    supervisor = Supervisor.supervising(problem.system, result.added, certificate)
+    strategy = None
+    if model.goals and deployment is Deployment.CONTROLLER:
+        on_progress(Progress("strategy", f"{len(model.goals)} goal{'s' if len(model.goals) > 1 else ''}"))
+        found = synthesize_strategy(
+            problem.system, result.added, engine=engine, should_stop=should_stop, on_progress=report
+        )
+        diagnostics = sorted_diagnostics((*diagnostics, *goal_findings(places, found)))
+        strategy = found.strategy
+        if strategy is None:
+            return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, GOALS_REASON)
+        check = check_strategy(problem.system, result.added, strategy, semantics=semantics, should_stop=should_stop)
+        if check.missed is not None:
+            raise InternalError(f"the strategy misses a goal after {', '.join(check.missed.trace)}")
+        outcome: CheckResult = "passed" if check.result == "passed" else "not checked"
+        certificate = msgspec.structs.replace(certificate, goals=outcome)
+    supervisor = Supervisor.supervising(problem.system, result.added, certificate, strategy)
     return SynthesisOutcome(OutcomeStatus.SUPERVISOR, supervisor, diagnostics, result.statistics)

@@ -15,7 +15,7 @@ from robosc.automata.compile import State
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import subjects
 from robosc.certification.differences import model_differences
-from robosc.controller_properties import check_controller
+from robosc.controller_properties import check_controller, check_strategy
 from robosc.errors import Diagnostic, sorted_diagnostics
 from robosc.expressions import Value
 from robosc.expressions.text import automaton_text
@@ -193,6 +193,12 @@ def verify_supervisor_file(
             should_stop=should_stop,
         ).certified()
         faults += [Fault("certificate", text) for text in _false_properties(claimed, properties)]
+    if supervisor.strategy is not None:
+        goals = check_strategy(
+            executable, supervisor.added, supervisor.strategy, semantics=semantics, should_stop=should_stop
+        )
+        if goals.missed is not None:
+            faults.append(Fault("goals", _missed(goals.missed.goal), goals.missed.trace, is_shortest=False))
     faults += [
         Fault(
             item.property.replace(" ", "_"),
@@ -204,6 +210,12 @@ def verify_supervisor_file(
         for item in found.failures
     ]
     return FileVerification((), tuple(faults), (*notes, *_beliefs(supervisor.certificate, found)), report)
+
+
+def _missed(goal: int | None) -> str:
+    if goal is None:
+        return "the strategy chooses a request that is not enabled, or silent steps do not end under it"
+    return f"under the strategy goal {goal + 1} may never come true again although every assumption does"
 
 
 def _notes(certificate: Certificate, bundle: Bundle | None) -> list[str]:

@@ -77,6 +77,11 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     group.add_argument(
         "--until-finding", type=_count, metavar="N", help="then events by chance, at most N, until there is a finding"
     )
+    group.add_argument(
+        "--strategy",
+        action="store_true",
+        help="let the controller follow its strategy in --random and --until-finding: only the world plays by chance",
+    )
     group.add_argument("--seed", type=int, default=0, metavar="SEED", help="seed of the chance (default: 0)")
     group.add_argument(
         "--finding",
@@ -124,6 +129,10 @@ def run(arguments: argparse.Namespace) -> int:
             raise UsageError(f"{file}: the name of a saved run ends in .jsonl (an event log) or .py (a test)")
     if arguments.finding and arguments.until_finding is None:
         raise UsageError("--finding says what --until-finding looks for: it needs that")
+    if arguments.strategy and not (arguments.random or arguments.until_finding):
+        raise UsageError(
+            "--strategy says how the controller plays in --random and --until-finding: it needs one of them"
+        )
     is_scripted = arguments.events is not None or arguments.random or arguments.until_finding
     if not is_scripted and (arguments.json or arguments.save):
         raise UsageError("--json and --save need events: --events, --random or --until-finding")
@@ -194,12 +203,14 @@ def _script(arguments: argparse.Namespace, run_: "Run | SystemRun") -> int:
         if arguments.events is not None:
             problem = _take_events(arguments.events, run_, report.step)
         if not problem and arguments.random:
-            for step in run_.walk(arguments.random, arguments.seed):
+            for step in run_.walk(arguments.random, arguments.seed, strategy=arguments.strategy):
                 report.step(step)
         if not problem and arguments.until_finding:
             kinds = frozenset(map(WalkFindingKind, arguments.finding or ())) or ALL_FINDINGS
             before = len(run_)
-            finding = run_.walk_until_finding(arguments.until_finding, arguments.seed, kinds)
+            finding = run_.walk_until_finding(
+                arguments.until_finding, arguments.seed, kinds, strategy=arguments.strategy
+            )
             for step in run_.history[before:]:
                 report.step(step)
         if isinstance(run_, Run):
@@ -287,6 +298,8 @@ class _JsonReport:
                 "provided": step.provided,
                 "skipped": list(step.skipped),
                 "unknown": list(step.unknown),
+                "reached": list(step.reached),
+                "strategy": step.chosen,
                 "state": state_json(step.state),
             }
         )
@@ -302,6 +315,8 @@ class _JsonReport:
                 "steps": self._count,
                 "state": state_json(run_.state),
                 "marked": run_.is_marked,
+                "goals": list(run_.reached),
+                "strategy": run_.chosen,
                 "enabled": list(run_.enabled),
                 "disabled": [{"event": event, "why": list(run_.reasons(event))} for event in disabled],
                 "possible": list(run_.possible),

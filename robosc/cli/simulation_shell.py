@@ -30,6 +30,7 @@ undo [N], redo [N]         take back the last events; take them again
 history                    the events so far
 restart                    begin again in the initial state
 random N [SEED]            N events by chance
+strategy N [SEED]          N events: the world's by chance, the controller's by the strategy that reaches its goals
 until-finding [N] [SEED]   events by chance until there is a finding: a deadlock, a blocked request, something unknown
 save FILE                  the events so far, as an event log (.jsonl) or a test for pytest (.py)
 help, quit
@@ -37,7 +38,7 @@ help, quit
 
 AUTOMATA_HELP = """\
 EVENT [DATA] [-> STATE]    an event: press, sensor true, take -> Buffer = full where it can lead to several states
-""" + "".join(line for line in HELP.splitlines(keepends=True)[1:] if not line.startswith("save"))
+""" + "".join(line for line in HELP.splitlines(keepends=True)[1:] if line.split()[0] not in ("save", "strategy"))
 
 _DEFAULT_STEPS = 1000
 _MOST = 1_000_000
@@ -70,6 +71,7 @@ class Shell:
             "history": self._history,
             "restart": self._restart,
             "random": self._random,
+            "strategy": self._strategy,
             "until-finding": self._until_finding,
             "save": self._save,
             "help": self._help,
@@ -179,10 +181,16 @@ class Shell:
         write_lines(state_lines(self._run))
 
     def _random(self, words: Sequence[str]) -> None:
-        count, seed = _numbers("random", words, (None, self._walks))
-        self._walks += 1
+        self._walk("random", words, strategy=False)
+
+    def _strategy(self, words: Sequence[str]) -> None:
+        self._walk("strategy", words, strategy=True)
+
+    def _walk(self, name: str, words: Sequence[str], *, strategy: bool) -> None:
+        count, seed = _numbers(name, words, (None, self._walks))
         before = len(self._run)
-        taken = self._run.walk(count, seed)
+        taken = self._run.walk(count, seed, strategy=strategy)
+        self._walks += 1
         self._print_walk(before)
         ended = ["nothing more can happen"] if len(taken) < count else []
         write_lines([*ended, f"seed {seed}", *state_lines(self._run)])

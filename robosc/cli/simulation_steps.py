@@ -60,6 +60,8 @@ def step_lines(number: int, step: "Step", before: "StateInWords") -> list[str]:
     lines = [f"{number:4}  {': '.join(filter(None, (event_text(step), changes_text(before, step.state))))}"]
     if step.provided is not None:
         lines.append(f"      sends {json.dumps(step.provided, default=str)}")
+    if step.reached:
+        lines.append(f"      reached: goal {', '.join(map(str, step.reached))}")
     lines += [f"      unknown: {item}" for item in step.unknown]
     lines += [f"      unknown: {item} keeps its value" for item in step.skipped]
     return lines
@@ -70,6 +72,15 @@ def state_lines(run_: "ManualRun") -> list[str]:
     others = [event for event in run_.possible if not run_.is_controllable(event)]
     return [
         f"now       {run_.state}{' (marked)' if run_.is_marked else ''}",
+        *_strategy_lines(run_),
         f"allowed   {', '.join(run_.enabled) or 'nothing'}",
         f"can come  {', '.join(others) or 'nothing'}",
     ]
+
+
+def _strategy_lines(run_: "ManualRun") -> list[str]:
+    """Return which goals are true and what the strategy chooses, in lines; nothing where there is no strategy."""
+    if not run_.has_strategy:
+        return []
+    goals = ", ".join(f"{number} {'true' if is_true else 'not yet'}" for number, is_true in enumerate(run_.reached, 1))
+    return [f"goals     {goals}", f"strategy  {run_.chosen or 'waits'}"]

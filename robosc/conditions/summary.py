@@ -1,11 +1,12 @@
 """A supervisor in figures and words: what `synth` prints, on this machine or from a service."""
 
 import textwrap
-from collections.abc import Iterable, Sequence
+from collections.abc import Collection, Iterable, Sequence
 
 import msgspec
 
 from robosc.automata import System
+from robosc.conditions.goals import GoalInWords, assumption_text, goals_in_words
 from robosc.conditions.literals import Vocabulary
 from robosc.conditions.rendering import Formulas, diagram_lines, in_words, size_in_words
 from robosc.expressions import TRUE, Expression
@@ -36,6 +37,7 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
     components = _components(supervisor)
     vocabulary = Vocabulary(diagram_domains(system), components)
     added = added_formulas(supervisor.added, system)
+    goals_vocabulary = Vocabulary(diagram_domains(supervisor.executable.remembering_automata), components)
     return {
         "model": supervisor.model.name,
         "deployment": str(supervisor.deployment),
@@ -51,11 +53,9 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
         "states": int(certificate.states),
         "transitions": None if certificate.transitions is None else int(certificate.transitions),
         "added": {event: condition_line(diagram, formula, components) for event, diagram, formula in added},
-        "diagrams": {
-            event: [line.json() for line in diagram_lines(diagram, vocabulary)]
-            for event, diagram, formula in added
-            if formula is None
-        },
+        "diagrams": {event: _diagram_json(diagram, vocabulary) for event, diagram, formula in added if formula is None},
+        "goals": [_goal_json(goal, goals_vocabulary, components) for goal in goals_in_words(supervisor)],
+        "assumptions": [assumption_text(item) for item in supervisor.model.assumptions],
         "certificate": {
             "engine_version": certificate.engine_version,
             "bundle_sha256": certificate.bundle_sha256,
@@ -63,6 +63,24 @@ def summary_json(supervisor: Supervisor) -> dict[str, object]:
             **_checks(certificate),
         },
         "controller": None if certificate.controller is None else msgspec.to_builtins(certificate.controller),
+    }
+
+
+def _diagram_json(diagram: DecisionDiagram, vocabulary: Vocabulary) -> list[dict[str, object]]:
+    return [line.json() for line in diagram_lines(diagram, vocabulary)]
+
+
+def _goal_json(goal: GoalInWords, vocabulary: Vocabulary, components: frozenset[str]) -> dict[str, object]:
+    return {
+        "goal": goal.text,
+        "choices": [
+            {
+                "event": event,
+                "condition": condition_line(diagram, formula, components),
+                **({} if formula is not None else {"diagram": _diagram_json(diagram, vocabulary)}),
+            }
+            for event, diagram, formula in goal.choices
+        ],
     }
 
 
@@ -83,6 +101,7 @@ def summary_text(supervisor: Supervisor) -> str:
     lines += [f"  {name:<13} {text}" for name, text in rows]
     lines.append("  the supervisor adds to each controllable event")
     lines += [f"    {line}" for line in added_lines(supervisor, system)]
+    lines += [f"  {line}" for line in strategy_lines(supervisor)]
     if certificate.controller is not None:
         found = certificate.controller
         lines.append("  controller")
@@ -139,16 +158,62 @@ def added_lines(supervisor: Supervisor, system: System) -> list[str]:
     components = _components(supervisor)
     vocabulary = Vocabulary(diagram_domains(system), components)
     added = added_formulas(supervisor.added, system)
-    width = max((len(event) for event, _, _ in added), default=0)
-    lines: list[str] = []
     short = short_diagrams(diagram for _, diagram, formula in added if formula is None)
-    for event, diagram, formula in added:
-        parts = [condition_line(diagram, formula, components) if formula != TRUE else "nothing"]
-        if formula is None and diagram in short:
-            parts = [f"{parts[0]}{FROM_THE_FIRST}", *map(str, diagram_lines(diagram, vocabulary))]
-        elif formula is None:
-            parts = [f"{parts[0]}{ELSEWHERE}"]
-        wrapped = [row for part in parts for row in _wrapped(part)]
+    rows = [
+        (event, ["nothing"] if formula == TRUE else _parts(diagram, formula, vocabulary, components, short))
+        for event, diagram, formula in added
+    ]
+    return _table(rows)
+
+
+def strategy_lines(supervisor: Supervisor) -> list[str]:
+    """Return the choices of the strategy for people, goal by goal, then what is assumed; nothing without a strategy."""
+    components = _components(supervisor)
+    goals = goals_in_words(supervisor)
+    if not goals:
+        return []
+    vocabulary = Vocabulary(diagram_domains(supervisor.executable.remembering_automata), components)
+    short = short_diagrams(diagram for goal in goals for _, diagram, formula in goal.choices if formula is None)
+    lines = ["the strategy approaches its goals in turn; it requests the first that applies"]
+    for number, goal in enumerate(goals, start=1):
+        lines += [f"  {row}" for row in _wrapped(f"for goal {number}, {goal.text}")]
+        rows: list[tuple[str, list[str]]] = []
+        for event, diagram, formula in goal.choices:
+            parts = _parts(diagram, formula, vocabulary, components, short)
+            always = "otherwise" if rows else "always"
+            rows.append((event, [always] if formula == TRUE else [f"where {parts[0]}", *parts[1:]]))
+        if not goal.choices or goal.choices[-1][2] != TRUE:
+            rows.append(("nothing", ["otherwise" if rows else "at all"]))
+        lines += [f"    {line}" for line in _table(rows)]
+    if supervisor.model.assumptions:
+        lines.append("it assumes of the surroundings")
+        for number, item in enumerate(supervisor.model.assumptions, start=1):
+            lines += [f"  {row}" for row in _wrapped(f"assumption {number}, {assumption_text(item)}")]
+    return lines
+
+
+def _parts(
+    diagram: DecisionDiagram,
+    formula: Expression | None,
+    vocabulary: Vocabulary,
+    components: frozenset[str],
+    short: Collection[DecisionDiagram],
+) -> list[str]:
+    """Return a condition in paragraphs: its formula, its diagram where that is short, or the diagram's size."""
+    line = condition_line(diagram, formula, components)
+    if formula is not None:
+        return [line]
+    if diagram in short:
+        return [f"{line}{FROM_THE_FIRST}", *map(str, diagram_lines(diagram, vocabulary))]
+    return [f"{line}{ELSEWHERE}"]
+
+
+def _table(rows: Sequence[tuple[str, Sequence[str]]]) -> list[str]:
+    """Return events in a column, with paragraphs about each beside it."""
+    width = max((len(event) for event, _ in rows), default=0)
+    lines: list[str] = []
+    for event, paragraphs in rows:
+        wrapped = [row for paragraph in paragraphs for row in _wrapped(paragraph)]
         lines += [f"{name:<{width}}  {row}" for name, row in zip([event, *[""] * len(wrapped)], wrapped, strict=False)]
     return lines
 
@@ -188,4 +253,5 @@ def _checks(certificate: Certificate) -> dict[str, str]:
         "controllable": certificate.controllable,
         "nonblocking": certificate.nonblocking,
         "maximally_permissive": certificate.maximally_permissive,
+        **({} if certificate.goals is None else {"goals": certificate.goals}),
     }

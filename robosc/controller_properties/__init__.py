@@ -8,6 +8,7 @@ silent steps only pass through it, because the robot has then completed its task
 
 from robosc.controller_properties.check import DEFAULT_LIMIT, check_controller
 from robosc.controller_properties.findings import controller_findings
+from robosc.controller_properties.goals import MissedGoal, StrategyCheck, StrategyRun, check_strategy
 from robosc.controller_properties.outcome import Blocking, Conflict, Livelock, Order, Properties
 
 __all__ = [
@@ -15,8 +16,12 @@ __all__ = [
     "Blocking",
     "Conflict",
     "Livelock",
+    "MissedGoal",
     "Order",
     "Properties",
+    "StrategyCheck",
+    "StrategyRun",
     "check_controller",
+    "check_strategy",
     "controller_findings",
 ]

@@ -26,10 +26,7 @@ from robosc.automata.compile import NO_DATA, Function, State, compile_expression
 from robosc.automata.semantics import Semantics
 from robosc.automata.state import Subject, subjects
 from robosc.controller_properties.messages import Choice, choices_together
-from robosc.model.structure import (
-    CommunicationKind,
-    EventKind,
-)
+from robosc.model.structure import EventKind
 from robosc.supervisor import AddedCondition
 from robosc.supervisor.predicates import state_predicates
 
@@ -121,7 +118,7 @@ class Controller:
         self._start: Node = (self._semantics.initial, (0,) * len(self.goals))
         moving = {edge.event for item in self.system.automata for edge in item.edges if edge.source != edge.target}
         self.silent: tuple[str, ...] = tuple(event for event in executable.resets_and_taus if event in moving)
-        self.batches = tuple(_batches(executable))
+        self.batches = executable.batches
         messages = {item.event(EventKind.RESPONSE): item for item in model.communications}
         together = (
             (batch, choices_together(model, self.system, [messages[event] for event in batch]))
@@ -129,11 +126,7 @@ class Controller:
             if len(batch) > 1
         )
         self._choices = {batch: choices for batch, choices in together if choices is not None}
-        self.requests = tuple(
-            item.event(EventKind.REQUEST)
-            for item in model.communications
-            if item.kind is not CommunicationKind.OUTGOING_MESSAGE
-        )
+        self.requests = executable.requests
         self._runs: dict[Node, SilentRun] = {}
         # Only where it is not marked everywhere, as a message's plant is.
         self._marked = tuple(
@@ -180,7 +173,7 @@ class Controller:
             if mask and mask & ~goal.holding(state):
                 target = self.after(state, goal.cancel)
                 if target is not None:
-                    yield goal.cancel, (target, self._forget(target, held))
+                    yield goal.cancel, (target, self.forgotten(target, held))
         for event in self.silent:
             target = self.after(state, event)
             # A tau that would change nothing is not taken.
@@ -236,12 +229,12 @@ class Controller:
         for event in self.requests:
             target = self.after(state, event)
             if target is not None and target != state:
-                yield (event,), True, (target, self._forget(target, held))
+                yield (event,), True, (target, self.forgotten(target, held))
         for batch in self.batches:
             for target, (events, is_whole) in sorted(
                 self._joint_targets(state, batch).items(), key=lambda item: item[0]
             ):
-                yield events, is_whole, (target, self._forget(target, held))
+                yield events, is_whole, (target, self.forgotten(target, held))
 
     def _joint_targets(self, state: State, batch: tuple[str, ...]) -> dict[State, tuple[tuple[str, ...], bool]]:
         """Return the states that events of a batch lead to, with these events, and True if they are the whole batch."""
@@ -296,7 +289,7 @@ class Controller:
         found.pop(state, None)
         return found
 
-    def _forget(self, state: State, held: Held) -> Held:
+    def forgotten(self, state: State, held: Held) -> Held:
         """Return the remembered bits, without those of goals that do not run."""
         if not any(held):
             return held
@@ -330,17 +323,3 @@ def _goals(executable: ExecutableSystem, places: dict[Subject, int]) -> Iterator
                     reads=frozenset().union(*(subjects_read(rule.condition) for rule in requirements)),
                 )
                 index += 1
-
-
-def _batches(executable: ExecutableSystem) -> Iterable[tuple[str, ...]]:
-    """Messages on one identifier together; every other event of the environment alone."""
-    topics: dict[str, tuple[str, ...]] = {}
-    others: list[tuple[str, ...]] = []
-    uncontrollable = {event.name for event in executable.automata.events if not event.is_controllable}
-    for event in executable.events.values():
-        if event.communication and event.communication.kind is CommunicationKind.OUTGOING_MESSAGE:
-            identifier = event.communication.identifier
-            topics[identifier] = (*topics.get(identifier, ()), event.name)
-        elif event.name in uncontrollable:
-            others.append((event.name,))
-    return (*topics.values(), *others)

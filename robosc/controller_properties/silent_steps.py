@@ -17,6 +17,7 @@ from robosc.automata.compile import NO_DATA, Function, State, compile_expression
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.automata.structure import Automaton, Edge, System
 from robosc.controller_properties.controller import Controller
+from robosc.controller_properties.graphs import components
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import Value
 from robosc.model.structure import CommunicationKind, EventKind, Model, is_tau
@@ -56,47 +57,12 @@ def _on_cycles(taus: Iterable[Edge]) -> _Arcs:
     leaving: _Arcs = {}
     for edge in taus:
         leaving.setdefault(edge.source, []).append(edge)
-    components = _components({source: [edge.target for edge in edges] for source, edges in leaving.items()})
+    numbers = components({source: [edge.target for edge in edges] for source, edges in leaving.items()})
     kept = {
-        source: [edge for edge in edges if components.get(edge.target) == components[source]]
+        source: [edge for edge in edges if numbers.get(edge.target) == numbers[source]]
         for source, edges in leaving.items()
     }
     return {source: edges for source, edges in kept.items() if edges}
-
-
-def _components(graph: Mapping[str, list[str]]) -> dict[str, int]:
-    """The strongly connected component of every node with arcs.
-
-    R. E. Tarjan, "Depth-first search and linear graph algorithms", SIAM Journal on Computing 1(2), 1972, pp. 146-160,
-    with a stack of its own instead of recursion.
-    """
-    order: dict[str, int] = {}
-    lowest: dict[str, int] = {}
-    found: dict[str, int] = {}
-    waiting: list[str] = []
-    for root in graph:
-        calls = [(root, 0)] if root not in order else []
-        while calls:
-            node, place = calls.pop()
-            if place == 0:
-                order[node] = lowest[node] = len(order)
-                waiting.append(node)
-            targets = graph.get(node, [])
-            if place > 0:
-                lowest[node] = min(lowest[node], lowest[targets[place - 1]])
-            while place < len(targets):
-                target = targets[place]
-                place += 1
-                if target not in order:
-                    calls += [(node, place), (target, 0)]
-                    break
-                if target not in found:
-                    lowest[node] = min(lowest[node], order[target])
-            else:
-                if lowest[node] == order[node]:
-                    while node not in found:
-                        found[waiting.pop()] = order[node]
-    return found
 
 
 def _clusters(cyclic: Mapping[str, _Arcs]) -> Iterator[tuple[str, ...]]:

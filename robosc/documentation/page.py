@@ -8,7 +8,9 @@ from collections.abc import Callable, Sequence
 from robosc.documentation.diagram import diagram, updates_text
 from robosc.documentation.markdown import blocks, bullets, code, codes, count, entities, fence, heading, quoted, table
 from robosc.documentation.sentences import (
+    assumption_sentence,
     enum_sentences,
+    goal_sentence,
     invariant_sentence,
     provide_sentences,
     requirement_sentence,
@@ -51,6 +53,7 @@ def page(model: Model, findings: Sequence[Diagnostic] = ()) -> str:
         _communications(model),
         _data_types(model),
         _requirements(model),
+        _goals(model),
         _provides(model),
         _findings(findings),
     )
@@ -72,6 +75,7 @@ def _overview(model: Model) -> str:
             f"{count(len(model.enums), 'enum')}, {count(len(model.objects), 'object')}",
         ),
         ("requirements", len(model.requirements) + len(model.invariants), _invariant_count(model)),
+        *_goal_rows(model),
         ("provide statements", len(model.provides), ""),
     ]
     return blocks(
@@ -82,6 +86,17 @@ def _overview(model: Model) -> str:
 
 def _invariant_count(model: Model) -> str:
     return count(len(model.invariants), "state invariant") if model.invariants else ""
+
+
+def _goal_rows(model: Model) -> list[tuple[str, int, str]]:
+    """The rows of goals and assumptions; none where the model has none of them."""
+    if not model.goals and not model.assumptions:
+        return []
+    allowed = sum(item.is_allowed for item in model.assumptions)
+    return [
+        ("goals", len(model.goals), ""),
+        ("assumptions", len(model.assumptions), f"{allowed} that the robot may break" if allowed else ""),
+    ]
 
 
 def _kind_counts(kinds: Sequence[CommunicationKind]) -> list[str]:
@@ -231,7 +246,7 @@ def _data_types(model: Model) -> str:
     return blocks(heading(2, "Data types"), *enums, *objects)
 
 
-# Requirements and data of requests
+# Requirements, goals and data of requests
 
 
 def _requirements(model: Model) -> str:
@@ -239,6 +254,15 @@ def _requirements(model: Model) -> str:
         return ""
     sentences = [*map(requirement_sentence, model.requirements), *map(invariant_sentence, model.invariants)]
     return blocks(heading(2, "Requirements"), bullets(sentences))
+
+
+def _goals(model: Model) -> str:
+    sections = (
+        ("Goals", map(goal_sentence, model.goals)),
+        ("Assumptions", map(assumption_sentence, model.assumptions)),
+    )
+    listed = [(title, list(sentences)) for title, sentences in sections]
+    return blocks(*(blocks(heading(2, title), bullets(found)) for title, found in listed if found))
 
 
 def _provides(model: Model) -> str:

@@ -6,7 +6,10 @@ from robosc.documentation.markdown import blocks, bullets, code, codes
 from robosc.expressions import Binary, BinaryOperator, Expression, Type, type_text
 from robosc.expressions.text import expression_text
 from robosc.model.structure import (
+    Assumption,
     EnumDefinition,
+    Goal,
+    GoalForm,
     Invariant,
     ObjectValue,
     Provide,
@@ -31,6 +34,31 @@ def invariant_sentence(invariant: Invariant) -> str:
     if invariant.is_never:
         return _listed("There is never a state with", "any of these", _joined(invariant.expression, "or"))
     return _listed("There are only states with", "all of these", _joined(invariant.expression, "and"))
+
+
+def goal_sentence(goal: Goal) -> str:
+    """Describe a goal in a sentence, with a list below where its condition has several parts."""
+    conditions = _joined(goal.condition, "and")
+    if goal.trigger is not None:
+        trigger = code(expression_text(goal.trigger))
+        return _listed(f"Whenever {trigger} held, the robot reaches later, or at once,", _ALL_AT_ONCE, conditions)
+    often = "at least once" if goal.form is GoalForm.ONCE else "again and again"
+    return _listed(f"The robot reaches {often}", _ALL_AT_ONCE, conditions)
+
+
+def assumption_sentence(assumption: Assumption) -> str:
+    """Describe an assumption in a sentence, with a list below where its condition has several parts."""
+    conditions = _joined(assumption.condition, "and")
+    allowed = ", unless the robot itself keeps it from coming true," if assumption.is_allowed else ""
+    if assumption.trigger is not None:
+        trigger = code(expression_text(assumption.trigger))
+        start = f"Whenever {trigger} held, the surroundings bring about later, or at once{allowed or ','}"
+    else:
+        start = f"The surroundings bring about again and again{allowed}"
+    return _listed(start, _ALL_AT_ONCE, conditions)
+
+
+_ALL_AT_ONCE = "a state where all of these hold"
 
 
 def _joined(expression: Expression, operator: BinaryOperator) -> tuple[Expression, ...]:

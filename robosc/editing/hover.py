@@ -91,6 +91,10 @@ def holder_of(parsed: Parsed, offset: int) -> str:
     match item:
         case syntax.Requirement() | syntax.Invariant():
             return f"requirement (line {item.location.line})"
+        case syntax.Goal():
+            return f"goal (line {item.location.line})"
+        case syntax.Assumption():
+            return f"assumption (line {item.location.line})"
         case syntax.Provide():
             return f"provide (line {item.location.line})"
         case syntax.Component():

@@ -14,6 +14,15 @@ _ITEMS = frozenset(
 )
 """Words that begin an item of a list."""
 
+_ROBOT_ITEMS = frozenset({"goal", "assume"})
+"""Words that begin an item of a robot, where no name can stand."""
+
+_BEFORE_OPERANDS = frozenset("allow always assume constant else eventually goal in never not once then".split())
+"""Free words that a name follows, unless they are names themselves."""
+
+_SIGNS_BEHIND = frozenset({"{", "}", ")", "]", "true", "false", "value"})
+"""Signs and reserved words that end an item, or begin a list."""
+
 _CLOSED = re.compile(r"/\*.*?\*/|//[^\n]*\n", re.DOTALL)
 """Comments that have ended."""
 
@@ -77,9 +86,20 @@ def place_at(text: str, offset: int) -> Place | None:
                 if opened:
                     opened.pop()
                 item = index + 1
+            case word if word in _ROBOT_ITEMS:
+                if len(opened) == 1 and _ends_item(tokens, kinds, index - 1):
+                    item = index
             case word if word in _ITEMS and not (index > item and tokens[index - 1] in ("initial", "marked")):
                 item = index
     return Place(begin, tokens, tuple(opened), tokens[item:])
+
+
+def _ends_item(tokens: Sequence[str], kinds: Sequence[int], index: int) -> bool:
+    """Return True if a token can be the last one of an item, or stands before the first."""
+    token = tokens[index]
+    if kinds[index] == Kind.NAME:
+        return token not in _BEFORE_OPERANDS or tokens[index - 1] == "."
+    return kinds[index] in (Kind.NUMBER, Kind.STRING) or token in _SIGNS_BEHIND
 
 
 def name_of(token: str) -> str:

@@ -1,5 +1,6 @@
 """Expressions in the language's own words and syntax, with as few parentheses as A.3 allows."""
 
+import re
 from collections.abc import Collection
 
 from robosc.expressions.tree import (
@@ -40,6 +41,9 @@ _NOT, _NEGATIVE, _OPERAND = 8, 9, 10
 _IMPLIES = 0
 _CONDITIONAL = -1
 
+_SENTENCE = re.compile(" (is|was) ")
+"""Verb of a variable whose name has blanks: no name of the language has any."""
+
 
 def automaton_text(name: str, components: Collection[str]) -> str:
     """Return the name of an automaton in a text.
@@ -57,12 +61,18 @@ def automaton_text(name: str, components: Collection[str]) -> str:
     return name if bare in components else bare
 
 
+def variable_text(component: str, variable: str) -> str:
+    """Return the name of a variable in a text: with its component before it, unless it is a sentence."""
+    return variable if _SENTENCE.search(variable) else f"{component}.{variable}"
+
+
 def expression_text(expression: Expression, components: Collection[str] = ()) -> str:
     """The expression as a user would write it.
 
     The operator `holds` has no syntax, since an author never needs it; it is printed as `holds(...)`.
     A communication's location is printed as `automaton_text` says. The elements that quantifiers look at are called
-    `x1` (of the outermost), `x2` and so on.
+    `x1` (of the outermost), `x2` and so on. A variable whose name has blanks is a sentence, such as `goal 1 is owed`,
+    of which no text of the language speaks either.
 
     Args:
         expression: The expression.
@@ -91,7 +101,7 @@ class _Printer:
             case EnumValue(value=value):
                 return value, _OPERAND
             case VariableRead(component=component, variable=variable):
-                return f"{component}.{variable}", _OPERAND
+                return variable_text(component, variable), _OPERAND
             case StateTest(component=component, state=state):
                 return f"{automaton_text(component, self._components)}.{state}", _OPERAND
             case Received(path=path):
@@ -111,6 +121,8 @@ class _Printer:
                 return "if {} then {} else {}".format(*parts), _CONDITIONAL
             case Unary(operator="holds", operand=operand):
                 return f"holds({self.print(operand, depth)[0]})", _OPERAND
+            case Unary(operator="not", operand=VariableRead(variable=variable)) if _SENTENCE.search(variable):
+                return _SENTENCE.sub(r" \1 not ", variable, count=1), _OPERAND
             case Unary(operator="not", operand=operand):
                 return f"!{self._within(operand, _NOT, depth)}", _NOT
             case Unary(operand=operand):

@@ -86,7 +86,8 @@ def find_structure(tokens: Tokens, tree: syntax.File) -> Structure:
 
     Args:
         tokens: Its tokens.
-        tree: Its syntax tree, which shows what tokens alone do not: which requirements are invariants.
+        tree: Its syntax tree, which shows what tokens alone do not: which requirements are invariants, and which words
+            of goals are names.
     """
     walker = _Walker(tokens, tree)
     walker.file()
@@ -337,6 +338,7 @@ class _Walker(_Expressions):
         self.statements: list[Statement] = []
         requirements = (item for item in tree.items if isinstance(item, syntax.Requirement | syntax.Invariant))
         self._are_invariants = (isinstance(item, syntax.Invariant) for item in requirements)
+        self._aims = (item for item in tree.items if isinstance(item, syntax.Goal | syntax.Assumption))
         # The words are those of the parser, whose table has what reads a statement; here is what lays it out.
         self._items: Mapping[str, Callable[[int], None]] = {
             "component": self._component,
@@ -345,6 +347,8 @@ class _Walker(_Expressions):
             "constant": self._constant,
             "requirement": self._requirement,
             "provide": self._provide,
+            "goal": self._aim,
+            "assume": self._aim,
             "incoming": self._communication,
             "outgoing": self._communication,
             "service": self._communication,
@@ -518,6 +522,21 @@ class _Walker(_Expressions):
             self.place += 1
             self._communications()
             self._clause(disables, is_alone=is_bracket)
+        self._end(first, level)
+
+    def _aim(self, level: int) -> None:
+        first = self.place
+        tree = next(self._aims)
+        self.place += 2 if isinstance(tree, syntax.Assumption) and tree.is_allowed else 1
+        if tree.trigger is None:
+            self.place += len(tree.form.split())
+            self.expression()
+        else:
+            is_bracket = self.expression()
+            leads = self.place
+            self.place += 2
+            self.expression(1)
+            self._clause(leads, is_alone=is_bracket)
         self._end(first, level)
 
     def _communications(self) -> None:

@@ -38,6 +38,7 @@ _SMACH_STATES = "simpleactionstate servicestate monitorstate conditionstate cbst
 _SAID_ELSEWHERE = {
     "action": f"task skill {_LEAF_NODES} {_SMACH_STATES}",
     "array": "list vector sequence",
+    "assume": "assumes assumption",
     "behaviour": "behavior automaton fsm statemachine state_machine machine",
     "cancel": "cancelled canceled preempted preempt halted",
     "component": f"class node module actor part block device package {_LEAF_NODES} {_SMACH_STATES}",
@@ -51,11 +52,13 @@ _SAID_ELSEWHERE = {
     "feedback": "running progress",
     "from": "by of in",
     "goto": "go_to next go target enter",
+    "goal": "goals objective aim",
     "identifier": "topic name id path",
     "if": "when guard where",
     "incoming": "input in sub subscriber subscribe subscription receives receive",
     "initial": "init start starting first begin",
     "interface": "import uses include using",
+    "leads": "lead causes implies triggers",
     "library": "lib package namespace",
     "links": "link linked link_to maps",
     "marked": "final accepting accept end mark terminal",
@@ -236,11 +239,14 @@ def _of_missing_words(before: str, token: str, expected: Sequence[str], followin
     is_name = token.removeprefix("^").isidentifier() and (token[0] == "^" or token not in RESERVED_WORDS)
     begins_operand = is_name or token in _BEGIN_OPERANDS or token[:1].isdigit()
     begins_item = "an operator" not in expected
+    is_operand_behind = following.isidentifier() or following in _BEGIN_OPERANDS
     missing = next(
         (
             word
             for word, is_missing in (
                 ("component", begins_item and is_name and following in ("{", "from")),
+                ("goal", begins_item and (token, following) == ("always", "eventually")),
+                ("goal", begins_item and (token == "eventually" or (token == "once" and is_operand_behind))),
                 ("requirement", begins_item and (begins_operand or token in ("{", "always", "never"))),
                 ("if", begins_operand and not (is_name and following in _BEHIND_TARGETS)),
                 ("do", is_name and following in (":=", "=")),
@@ -289,6 +295,7 @@ def _of_brackets(token: str, expected: Sequence[str]) -> str:
 
 _HOMES = {
     **dict.fromkeys(("component", "datatype", "interface", "requirement", "provide"), "the robot or library"),
+    **dict.fromkeys(("goal", "assume"), "the robot"),
     **dict.fromkeys(("incoming", "outgoing", "service", "action", "behaviour"), "a component"),
     **dict.fromkeys(("variable", "initial", "marked", "state"), "a behaviour"),
     **dict.fromkeys(("on", "transition"), "a state or behaviour"),

@@ -5,7 +5,7 @@ from typing import NamedTuple
 
 from robosc.language import precedence, syntax
 from robosc.language.advice import is_foreign_operator, type_elsewhere
-from robosc.language.cursor import Cursor, Fault
+from robosc.language.cursor import Cursor, Fault, TooManyFaults
 from robosc.language.limits import MAXIMUM_NESTING
 from robosc.language.negation import NOT, is_negation
 from robosc.language.tokens import Kind
@@ -58,6 +58,35 @@ class ExpressionParser(Cursor):
         index = self.place
         kind, token = self.kinds[index], self.texts[index]
         return kind in (_NAME, _NUMBER, _STRING) or token in _OPERAND_SIGNS
+
+    def begins_with_name(self, ending: str) -> bool:
+        """Return True if the next word can only be a name that an expression begins with.
+
+        Args:
+            ending: Word that stands behind such an expression; where it does not, the word that comes next is one of
+                the language.
+        """
+        following = self.texts[self.place + 1]
+        if following == "-":
+            # `always - 1 > x disables m` and `always -x < 1` begin alike: what ends the expression decides.
+            return self._is_ended_by(ending)
+        return following in _AFTER_NAME or self._is_ending(self.place + 1, ending)
+
+    def _is_ending(self, index: int, ending: str) -> bool:
+        """Return True if an expression ends at a token, because of the word there; `leads` is one with `to` alone."""
+        return self.texts[index] == ending and (ending != "leads" or self.texts[index + 1] == "to")
+
+    def _is_ended_by(self, ending: str) -> bool:
+        """Return True if the next word is the begin of an expression with `ending` behind it; reads nothing."""
+        begin, found, possible, faults = self.place, len(self.diagnostics), self._possible, self._faults
+        try:
+            self.expression()
+            return self._is_ending(self.place, ending)
+        except (Fault, TooManyFaults):
+            return False
+        finally:
+            self.place, self._possible, self._depth, self._faults = begin, possible, len(self._lists), faults
+            del self.diagnostics[found:]
 
     def is_negation(self, index: int) -> bool:
         """Return True if the word `not`, at a token where an operand begins, is the operator, not a name."""
@@ -312,5 +341,8 @@ class ExpressionParser(Cursor):
         self.take(")")
         return syntax.BasicType(basic, low, high, self.since(index))
 
+
+_AFTER_NAME = frozenset({"needs", ".", "[", "or", "and", "=", "!=", ">", ">=", "<", "<=", "+", "*", "/", "=>", ""})
+"""Tokens that follow a name that begins an expression, or a communication's name (`-` is looked at more closely)."""
 
 _OPERAND_SIGNS = frozenset({"(", "!", "-", "true", "false", "value", "if", *_CONVERSIONS})

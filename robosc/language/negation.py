@@ -13,6 +13,9 @@ _NAME, _NUMBER, _STRING = int(Kind.NAME), int(Kind.NUMBER), int(Kind.STRING)
 _BEGIN_OPERANDS = frozenset({"(", "!", "true", "false", "value"})
 _CONVERSIONS = frozenset({"integer", "double"})
 _BEHIND_OPERANDS = frozenset({"then", "else", "in"})
+_ITEMS = frozenset({"goal", "assume"})
+"""Free words that begin an item without a sign that tells."""
+
 _BETWEEN = frozenset({",", ":", "..", "in"})
 """Tokens between arguments, bounds of slices and parts of quantifiers."""
 _BINARY = frozenset({"or", "and", "=", "!=", ">", ">=", "<", "<=", "+", "*", "/", "=>"})
@@ -31,14 +34,23 @@ def is_negation(texts: Sequence[str], kinds: Sequence[int], index: int, word: st
         return False
     following, kind = texts[index + 1], kinds[index + 1]
     if kind == _NAME:
-        # The constant of the next item: `constant A: E = not constant B: E = red`.
-        begins_item = following == "constant" and kinds[index + 2] == _NAME and texts[index + 3] == ":"
-        return following not in _BEHIND_OPERANDS and not begins_item
+        return not _is_behind_operand(texts, kinds, index + 1)
     if following == "if":
         return _is_conditional(texts, kinds, index + 1)
     if following in _CONVERSIONS:
         return texts[index + 2] == "("
     return kind in (_NUMBER, _STRING) or following in _BEGIN_OPERANDS
+
+
+def _is_behind_operand(texts: Sequence[str], kinds: Sequence[int], index: int) -> bool:
+    """Return True if the free word at a token stands behind an operand, or begins the next item."""
+    word = texts[index]
+    if word in _ITEMS and kinds[index + 1] == _NAME:
+        # The goal of the next item: `goal once not goal always eventually red`.
+        return texts[index + 1] in _ITEMS or not _is_behind_operand(texts, kinds, index + 1)
+    # The constant of the next item: `constant A: E = not constant B: E = red`.
+    begins_constant = word == "constant" and kinds[index + 1] == _NAME and texts[index + 2] == ":"
+    return word in _BEHIND_OPERANDS or begins_constant or (word == "leads" and texts[index + 1] == "to")
 
 
 def _is_conditional(texts: Sequence[str], kinds: Sequence[int], index: int) -> bool:

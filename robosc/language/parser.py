@@ -13,6 +13,7 @@ from robosc.errors import Diagnostic, RelatedPlace, sorted_diagnostics
 from robosc.language import syntax
 from robosc.language.cursor import Extent, Fault, TooManyFaults, shown
 from robosc.language.expression_parser import ExpressionParser
+from robosc.language.goal_parser import GoalParser
 from robosc.language.limits import FRAMES_PER_LEVEL, MAXIMUM_NESTING
 from robosc.language.tokens import Kind, Places, Tokens, obstacle, readable_tokens, tokenize
 from robosc.recursion import allow_depth
@@ -73,7 +74,7 @@ def parse(file: SourceFile) -> Parsed:
     return Parsed(None if diagnostics else tree, diagnostics, tree, tuple(parser.extents), parser.expected)
 
 
-class _Parser(ExpressionParser):
+class _Parser(GoalParser):
     """Reads definitions."""
 
     def __init__(self, file: SourceFile, tokens: Tokens, places: Places) -> None:
@@ -86,6 +87,7 @@ class _Parser(ExpressionParser):
             "requirement": self._requirement,
             "provide": self._provide,
         }
+        self._robot_items = {**self._library_items, "goal": self.goal, "assume": self.assumption}
         self._component_items: Mapping[str, Callable[[], syntax.Communication | syntax.Behaviour]] = {
             "incoming": self._message,
             "outgoing": self._message,
@@ -114,14 +116,16 @@ class _Parser(ExpressionParser):
             index = begin
         self.place = index + 1
         name = self._name_of_file()
-        words = [f"'{word}'" for word in self._library_items]
-        items = self.items(self._library_items, *words)
+        self.is_library = self.texts[index] == "library"
+        # Those of a robot are read in a library, too, to say that they belong elsewhere.
+        words = [f"'{word}'" for word in (self._library_items if self.is_library else self._robot_items)]
+        items = self.items(self._robot_items, *words)
         if self.kinds[self.place] != _END and self.is_whole:
             closing = RelatedPlace(f"this '}}' ends the {self.texts[index]}", self.at(self.place - 1))
             self.fault("the end of the file", related=(closing,))
-        while self.texts[self.place] in ("}", *self._library_items):
-            self.go_on(self._library_items, *words)
-        return syntax.File(self.texts[index] == "library", name, items)
+        while self.texts[self.place] in ("}", *self._robot_items):
+            self.go_on(self._robot_items, *words)
+        return syntax.File(self.is_library, name, items)
 
     def _begin_of_file(self) -> int | None:
         """Return the place where a robot or library begins behind what should not be before it."""
@@ -482,7 +486,7 @@ class _Parser(ExpressionParser):
         begin = self.take("requirement")
         place = self.at(begin)
         word = self.texts[self.place]
-        if word in ("always", "never") and self._is_invariant():
+        if word in ("always", "never") and not self.begins_with_name("disables"):
             self.place += 1
             return syntax.Invariant(word == "never", self.expression(), place)
         if self.texts[self.place] == "{" or self.texts[self.place + 1] == "needs":
@@ -496,26 +500,6 @@ class _Parser(ExpressionParser):
         expression = self.expression()
         self.take("disables")
         return syntax.Requirement(self._communications(), True, expression, place)
-
-    def _is_invariant(self) -> bool:
-        """Return True if the next word is not the name of a communication, variable, state or component."""
-        following = self.texts[self.place + 1]
-        if following == "-":
-            # `always - 1 > x disables m` and `always -x < 1` begin alike: what ends the expression decides.
-            return not self._disables_follows()
-        return following not in _AFTER_NAME
-
-    def _disables_follows(self) -> bool:
-        """Return True if the word is the begin of an expression with `disables` behind it; reads nothing."""
-        begin, found, possible, faults = self.place, len(self.diagnostics), self._possible, self._faults
-        try:
-            self.expression()
-            return self.texts[self.place] == "disables"
-        except (Fault, TooManyFaults):
-            return False
-        finally:
-            self.place, self._possible, self._depth, self._faults = begin, possible, len(self._lists), faults
-            del self.diagnostics[found:]
 
     def _communications(self) -> tuple[syntax.Name, ...]:
         if not self.takes("{"):
@@ -566,9 +550,3 @@ class _WithList:
     types: dict[str, syntax.Type]
     options: tuple[syntax.Option, ...]
     link: syntax.Name | None
-
-
-_AFTER_NAME = frozenset(
-    {"needs", "disables", ".", "[", "or", "and", "=", "!=", ">", ">=", "<", "<=", "+", "*", "/", "=>", ""}
-)
-"""Tokens that can follow a name that begins a requirement of part A (`-` is looked at more closely)."""

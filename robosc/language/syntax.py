@@ -375,7 +375,55 @@ class Provide(msgspec.Struct, frozen=True, gc=False):
     location: Location
 
 
-Item = Component | ObjectDefinition | EnumDefinition | Interface | Constant | Requirement | Invariant | Provide
+GoalForm = Word["always eventually", "leads to", "once"]
+
+
+class Goal(msgspec.Struct, frozen=True, gc=False):
+    """`goal always eventually E`, `goal E leads to E` or `goal once E`.
+
+    Attributes:
+        form: Words that tell when the condition is to hold.
+        trigger: The expression before `leads to`; None in the other forms.
+        condition: The expression behind the words of the form.
+        location: Place of the word `goal`.
+    """
+
+    form: GoalForm
+    trigger: Expression | None
+    condition: Expression
+    location: Location
+
+
+class Assumption(msgspec.Struct, frozen=True, gc=False):
+    """`assume always eventually E` or `assume E leads to E`, perhaps with `allow` behind `assume`.
+
+    Attributes:
+        is_allowed: True with `allow`.
+        form: Words that tell when the condition holds; never `once`.
+        trigger: The expression before `leads to`; None in the other form.
+        condition: The expression behind the words of the form.
+        location: Place of the word `assume`.
+    """
+
+    is_allowed: bool
+    form: GoalForm
+    trigger: Expression | None
+    condition: Expression
+    location: Location
+
+
+Item = (
+    Component
+    | ObjectDefinition
+    | EnumDefinition
+    | Interface
+    | Constant
+    | Requirement
+    | Invariant
+    | Provide
+    | Goal
+    | Assumption
+)
 
 
 class File(msgspec.Struct, frozen=True, gc=False):

@@ -21,6 +21,8 @@ STARTS: dict[str, Literal[True, "a name"] | frozenset[str]] = {
     "interface": "a name",
     "requirement": True,
     "provide": "a name",
+    "goal": "a name",
+    "assume": "a name",
     "incoming": frozenset({"message"}),
     "outgoing": frozenset({"message"}),
     "service": "a name",
@@ -38,11 +40,11 @@ STARTS: dict[str, Literal[True, "a name"] | frozenset[str]] = {
 An error inside one item ends where the next one seems to begin.
 """
 
+_DEFINITIONS = frozenset({"'component'", "'constant'", "'datatype'", "'interface'", "'requirement'", "'provide'"})
+
 _GROUPS: tuple[tuple[str, frozenset[str]], ...] = (
-    (
-        "a definition",
-        frozenset({"'component'", "'constant'", "'datatype'", "'interface'", "'requirement'", "'provide'"}),
-    ),
+    ("a definition", _DEFINITIONS | {"'goal'", "'assume'"}),
+    ("a definition", _DEFINITIONS),
     ("a communication", frozenset({"'incoming'", "'outgoing'", "'service'", "'action'"})),
 )
 """Words that are listed as one group, the larger groups before the smaller ones that they contain."""

@@ -26,6 +26,7 @@ from robosc.model.communications import (
 from robosc.model.constants import Constants
 from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Bindings, Findings
+from robosc.model.goals import build_goals
 from robosc.model.interfaces import InterfaceChecker
 from robosc.model.own_requests import OwnRequests
 from robosc.model.places import Places
@@ -33,12 +34,14 @@ from robosc.model.restrictions import Restrictions
 from robosc.model.robot_scopes import RobotScopes
 from robosc.model.sent_messages import SentMessages
 from robosc.model.structure import (
+    Assumption,
     Behaviour,
     Communication,
     CommunicationKind,
     Component,
     EnumDefinition,
     EnumRule,
+    Goal,
     Model,
     Provide,
     Requirement,
@@ -186,9 +189,12 @@ class _RobotChecker:
         restrictions.build(communications, self.places)
         requirements, provides = tuple(restrictions.requirements), tuple(restrictions.provides)
         invariants = tuple(restrictions.invariants)
+        checker = ExpressionChecker(scopes.of(self._unit), self.findings)
+        goals, assumptions = build_goals(self._tree.items, checker, self.places)
         communications = with_conditions(trees, communications, scopes, self.findings)
         self.communications = communications
-        marked = mark_synthesis_variables(behaviours, requirements, provides, invariants)
+        aims: tuple[Goal | Assumption, ...] = (*goals, *assumptions)
+        marked = mark_synthesis_variables(behaviours, requirements, provides, invariants, aims)
         for name, behaviour in marked.items():
             tree = behaviour_trees[name]
             if tree is not None:
@@ -213,6 +219,8 @@ class _RobotChecker:
             requirements=requirements,
             provides=provides,
             invariants=invariants,
+            goals=goals,
+            assumptions=assumptions,
         )
 
     def _resolve_own_types(self) -> None:

@@ -21,6 +21,8 @@ class Places:
         requirements: In the order of the model's requirements.
         provides: In the order of the model's provide statements.
         invariants: In the order of the model's invariants.
+        goals: In the order of the model's goals.
+        assumptions: In the order of the model's assumptions.
         identifiers: By communication; where its identifier is written, or its name.
     """
 
@@ -35,4 +37,6 @@ class Places:
     requirements: list[Location] = field(default_factory=list)
     provides: list[Location] = field(default_factory=list)
     invariants: list[Location] = field(default_factory=list)
+    goals: list[Location] = field(default_factory=list)
+    assumptions: list[Location] = field(default_factory=list)
     identifiers: dict[str, Location] = field(default_factory=dict)

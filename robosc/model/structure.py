@@ -277,6 +277,54 @@ class Invariant(msgspec.Struct, frozen=True, gc=False):
         return Unary("not", self.expression) if self.is_never else self.expression
 
 
+class GoalForm(StrEnum):
+    """Form of a goal or an assumption, by its words."""
+
+    ALWAYS_EVENTUALLY = "always eventually"
+    LEADS_TO = "leads to"
+    ONCE = "once"
+
+
+class Goal(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """A condition that the robot is to reach (language C.1); it is looked at in stable states.
+
+    Attributes:
+        form: Form, which tells that it is to hold again and again, after each trigger, or at least once.
+        condition: Condition that is to hold.
+        trigger: The condition before `leads to`; None in the other forms.
+    """
+
+    form: GoalForm
+    condition: Expression
+    trigger: Expression | None = None
+
+    @property
+    def expressions(self) -> tuple[Expression, ...]:
+        """Its expressions, in the order of the text."""
+        return (self.condition,) if self.trigger is None else (self.trigger, self.condition)
+
+
+class Assumption(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """A condition that the surroundings of the robot bring about (language C.2); it is looked at in stable states.
+
+    Attributes:
+        form: Form, which tells that it holds again and again, or after each trigger; never `ONCE`.
+        condition: Condition that holds then.
+        trigger: The condition before `leads to`; None in the other form.
+        is_allowed: True if the robot itself may keep it from coming true.
+    """
+
+    form: GoalForm
+    condition: Expression
+    trigger: Expression | None = None
+    is_allowed: bool = False
+
+    @property
+    def expressions(self) -> tuple[Expression, ...]:
+        """Its expressions, in the order of the text."""
+        return (self.condition,) if self.trigger is None else (self.trigger, self.condition)
+
+
 class ObjectValue(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="object"):
     """Data given property by property; a missing property keeps the middleware's default."""
 
@@ -294,8 +342,8 @@ class Provide(msgspec.Struct, frozen=True, gc=False):
     condition: Expression | None
 
 
-class Model(msgspec.Struct, frozen=True, gc=False):
-    """A checked robot."""
+class Model(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """A checked robot; without goals and assumptions, its encoded form has no fields for them."""
 
     name: Name
     components: tuple[Component, ...]
@@ -305,6 +353,8 @@ class Model(msgspec.Struct, frozen=True, gc=False):
     requirements: tuple[Requirement, ...]
     provides: tuple[Provide, ...]
     invariants: tuple[Invariant, ...]
+    goals: tuple[Goal, ...] = ()
+    assumptions: tuple[Assumption, ...] = ()
 
     def component(self, name: str) -> Component:
         """The component called `name` (KeyError if there is none)."""
@@ -359,6 +409,7 @@ def _named[Item: Component | Communication | EnumDefinition | ObjectDefinition](
 __all__ = [
     "EVENT_KINDS",
     "ISSUED_KINDS",
+    "Assumption",
     "Behaviour",
     "Communication",
     "CommunicationKind",
@@ -367,6 +418,8 @@ __all__ = [
     "EnumDefinition",
     "EnumRule",
     "EventKind",
+    "Goal",
+    "GoalForm",
     "Interface",
     "Invariant",
     "Model",

@@ -1,4 +1,4 @@
-"""Variables that take part in synthesis, and the rules about them (language A.6)."""
+"""Variables that take part in synthesis, and the rules about them (language A.6, and C.3 for goals)."""
 
 from collections.abc import Iterable, Iterator, Mapping
 
@@ -18,7 +18,17 @@ from robosc.expressions import (
 from robosc.language import syntax
 from robosc.model.behaviour import BehaviourTree
 from robosc.model.findings import Findings
-from robosc.model.structure import Behaviour, Communication, EventKind, Invariant, Provide, Requirement, is_tau
+from robosc.model.structure import (
+    Assumption,
+    Behaviour,
+    Communication,
+    EventKind,
+    Goal,
+    Invariant,
+    Provide,
+    Requirement,
+    is_tau,
+)
 from robosc.model.types import Types
 
 Key = tuple[str, str]
@@ -29,11 +39,13 @@ def mark_synthesis_variables(
     requirements: Iterable[Requirement],
     provides: Iterable[Provide],
     invariants: Iterable[Invariant],
+    aims: Iterable[Goal | Assumption],
 ) -> dict[str, Behaviour]:
     """The behaviours with every variable classified: part of synthesis, or code-only."""
     found = set[Key]()
     conditions = [item.expression for item in requirements]
     conditions += [item.expression for item in invariants]
+    conditions += [expression for item in aims for expression in item.expressions]
     conditions += [item.condition for item in provides if item.condition is not None]
     conditions += [item.guard for behaviour in behaviours.values() for item in behaviour.transitions if item.guard]
     frontier = [key for condition in conditions for key in _read(condition)]

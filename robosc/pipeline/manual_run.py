@@ -24,6 +24,10 @@ class EventNotPossibleError(RoboscError, ValueError):
     """An event that cannot happen in the current state; the message says why."""
 
 
+class NoStrategyError(RoboscError, ValueError):
+    """A strategy that is to be followed where the supervisor has none."""
+
+
 class ManualRun(ABC):
     """A run of a controlled system, from its initial state.
 
@@ -47,6 +51,21 @@ class ManualRun(ABC):
     def locations(self) -> dict[str, str]:
         """Location of each service and action, by its name; automata have none."""
         return {}
+
+    @property
+    def has_strategy(self) -> bool:
+        """True if the supervisor has a strategy, which reaches the goals of its model."""
+        return False
+
+    @property
+    def chosen(self) -> str | None:
+        """Request that the strategy chooses now; None where it waits, and where there is no strategy."""
+        return None
+
+    @property
+    def reached(self) -> tuple[bool, ...]:
+        """For each goal True if it counts as come true now; nothing where there is no strategy."""
+        return ()
 
     @property
     @abstractmethod
@@ -206,7 +225,7 @@ class ManualRun(ABC):
         self._undone.clear()
         self._walker.forget()
 
-    def walk(self, steps: int, seed: int = 0) -> tuple[Step, ...]:
+    def walk(self, steps: int, seed: int = 0, *, strategy: bool = False) -> tuple[Step, ...]:
         """Take random events that an executor could take in some world; ends early if nothing can happen.
 
         As in an executor, resets and tau transitions are taken as soon as they are allowed, and nothing is requested
@@ -216,11 +235,21 @@ class ManualRun(ABC):
         Args:
             steps: Number of events.
             seed: Seed of the random numbers: the same seed gives the same events.
+            strategy: True if only the world plays by chance: of the requests, the strategy's choice alone is taken.
+
+        Raises:
+            NoStrategyError: The supervisor has no strategy.
         """
+        self._lead(strategy)
         return self._walker.walk(steps, seed)
 
     def walk_until_finding(
-        self, steps: int = 1000, seed: int = 0, kinds: Collection[WalkFindingKind] = ALL_FINDINGS
+        self,
+        steps: int = 1000,
+        seed: int = 0,
+        kinds: Collection[WalkFindingKind] = ALL_FINDINGS,
+        *,
+        strategy: bool = False,
     ) -> WalkFinding | None:
         """Walk by chance until there is a finding, and return it; None if there was none.
 
@@ -230,8 +259,23 @@ class ManualRun(ABC):
             steps: Most events to take.
             seed: Seed of the chance.
             kinds: Kinds of findings to look for.
+            strategy: True if only the world plays by chance, as of `walk`.
+
+        Raises:
+            NoStrategyError: The supervisor has no strategy.
         """
+        self._lead(strategy)
         return self._walker.walk_until_finding(steps, seed, kinds)
+
+    def _lead(self, strategy: bool) -> None:
+        """Begin a walk, in which the controller may follow its strategy.
+
+        Raises:
+            NoStrategyError: The supervisor has none.
+        """
+        if strategy and not self.has_strategy:
+            raise NoStrategyError(f"the supervisor of {self._name} has no strategy: there are no goals to reach")
+        self._walker.follows_strategy = strategy
 
     def save(self, file: FileName) -> Path:
         """Write the events so far as an event log (`.jsonl`) with one second for each event; return its path.

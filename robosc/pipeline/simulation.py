@@ -68,14 +68,36 @@ class Run(ManualRun):
                 for item, name in self._calls.items()
             },
         }
+        # The request that the strategy chooses, and which goals are true, as of the last stable state.
+        self._chosen: str | None = None
+        self._reached: tuple[bool, ...] = ()
         super().__init__(
             given.model.name, {event.name: event.is_controllable for event in given.executable.automata.events}
         )
+        self._observe()
 
     @property
     def supervisor(self) -> Supervisor:
         """The supervisor of the system."""
         return self._supervisor
+
+    @property
+    def has_strategy(self) -> bool:
+        """True if the supervisor has a strategy, which reaches the goals of its model."""
+        return self._supervisor.strategy is not None
+
+    @property
+    def chosen(self) -> str | None:
+        """Request that the strategy chooses now; None where it waits, and where there is no strategy.
+
+        Each stable state counts as a decision. Before silent steps are taken, it waits.
+        """
+        return self._chosen
+
+    @property
+    def reached(self) -> tuple[bool, ...]:
+        """For each goal True if it counts as come true in the last stable state; nothing without a strategy."""
+        return self._reached
 
     @property
     def is_marked(self) -> bool:
@@ -161,10 +183,12 @@ class Run(ManualRun):
             is_known, provided = self._system.provide(event.partition(".")[0])
             if not is_known:
                 unknown = (*unknown, "what it sends is unknown, and an executor would not issue it")
-        before = self._system.snapshot()
+        before = self._snapshot()
         skipped = self._system.step(event, reading) or ()
         data_seen = {} if reading is None else dict(reading.data)
-        step = Step(event, data_seen, self.state, provided, skipped, unknown, self._events[event], given)
+        reached = self._observe()
+        state, is_own = self.state, self._events[event]
+        step = Step(event, data_seen, state, provided, skipped, unknown, is_own, given, reached, self._chosen)
         return self._take(step, before)
 
     def again(self) -> "Run":
@@ -202,13 +226,29 @@ class Run(ManualRun):
         return tuple(self._explained(event))
 
     def _snapshot(self) -> Any:
-        return self._system.snapshot()
+        return self._system.snapshot(), self._reached, self._chosen
 
     def _restore(self, snapshot: Any) -> None:
-        self._system.restore(snapshot)
+        system, self._reached, self._chosen = snapshot
+        self._system.restore(system)
 
     def _begin(self) -> None:
         self._system.restart()
+        self._reached = ()
+        self._observe()
+
+    def _observe(self) -> tuple[int, ...]:
+        """Take in the state for the strategy, if it is stable, and return the goals that have come true."""
+        self._chosen = None
+        if not self.has_strategy or not self._system.is_stable():
+            return ()
+        before = self._reached
+        self._system.observe()
+        self._reached = self._system.reached()
+        number = self._system.choose()
+        self._chosen = None if number is None else self._requests.events[number]
+        pairs = zip(self._reached, before or [False] * len(self._reached), strict=True)
+        return tuple(place for place, (is_true, was_true) in enumerate(pairs, start=1) if is_true and not was_true)
 
     def _make_walker(self) -> Walker:
         return ModelWalker(self, self._system, self._model, RandomData(self._model))
@@ -279,11 +319,19 @@ class ModelWalker(Walker):
     def _candidates(self) -> Iterator[str]:
         """Yield the events that an executor and its environment could have happen now."""
         silent = self._system.enabled_silent()
+        if silent is None and self.follows_strategy:
+            silent = self._system.due_cancel()
         if silent is not None:
             yield silent
             return
+        possible = self._run.possible
+        if self.follows_strategy:
+            possible = tuple(event for event in possible if not self._run.is_controllable(event))
+            if self._run.chosen is not None:
+                # The world and the controller are as likely to have their turn.
+                possible += (self._run.chosen,) * max(1, len(possible))
         is_deaf = self._is_deaf()
-        for event in self._run.possible:
+        for event in possible:
             if not (is_deaf and _is_request(event)):
                 yield event
 
@@ -298,7 +346,7 @@ class ModelWalker(Walker):
 
     def _forbidden(self) -> Iterator[str]:
         """Yield the requests that the behaviours could do and that are not enabled."""
-        if self._system.enabled_silent() is None:
+        if self._system.enabled_silent() is None and not self.follows_strategy:
             for event in self._run.events:
                 if _is_request(event) and self._system.is_possible(event) and not self._system.enabled(event):
                     yield event

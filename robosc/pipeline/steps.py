@@ -22,6 +22,8 @@ class Step:
         unknown: Descriptions of what was unknown or moved into its range: parts of the data, what a request sends.
         is_controllable: True if it is one that the controller takes by itself.
         given: Data as it was given.
+        reached: Numbers of the goals that have come true with it, from 1 on.
+        chosen: Request that the strategy chooses in the state that it led to; None: it waits, or there is none.
     """
 
     event: str
@@ -32,6 +34,8 @@ class Step:
     unknown: tuple[str, ...] = ()
     is_controllable: bool = False
     given: Any = field(default=NO_DATA, hash=False)
+    reached: tuple[int, ...] = ()
+    chosen: str | None = None
 
     def __str__(self) -> str:
         return f"{self.event}: {self.state}"

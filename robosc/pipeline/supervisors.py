@@ -11,8 +11,9 @@ from robosc.model.structure import Deployment, Model
 from robosc.pipeline.conditions import Conditions, conditions_of
 from robosc.pipeline.files import FileName, SupervisorFile, given_path, read_bounded
 from robosc.pipeline.findings import Findings
+from robosc.pipeline.goals import Goals, goals_of
 from robosc.pipeline.results import Summary
-from robosc.supervisor import AddedCondition, Certificate
+from robosc.supervisor import AddedCondition, Certificate, Strategy
 from robosc.supervisor import Supervisor as CoreSupervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES, decode, encode
 from robosc.tables import html_table
@@ -26,12 +27,13 @@ class Supervisor(CoreSupervisor, SupervisorFile, frozen=True, dict=True):
         deployment: Deployment that it was synthesized for.
         added: Decision diagrams that synthesis adds to events; `conditions` has them in words.
         certificate: Record of what was checked.
+        strategy: Decision diagrams of what it chooses to reach the model's goals, or None; `goals` has them in words.
     """
 
     @classmethod
     def of(cls, supervisor: CoreSupervisor, diagnostics: tuple[Diagnostic, ...] | None = None) -> Self:
         """Take a supervisor of the core, with the findings about its model, or None if they are not known."""
-        made = cls.supervising(supervisor.executable, supervisor.added, supervisor.certificate)
+        made = cls.supervising(supervisor.executable, supervisor.added, supervisor.certificate, supervisor.strategy)
         # No field: a supervisor's file does not hold them.
         made.__dict__["diagnostics"] = None if diagnostics is None else Findings(diagnostics)
         return made
@@ -66,6 +68,11 @@ class Supervisor(CoreSupervisor, SupervisorFile, frozen=True, dict=True):
         components = frozenset(item.name for item in self.model.components)
         return conditions_of(self.added, self.system, components)
 
+    @cached_property
+    def goals(self) -> Goals:
+        """The goals of the model with what the strategy chooses for each, in the model's words; empty: no strategy."""
+        return goals_of(self)
+
     @property
     def states(self) -> int:
         """Reachable states of the controlled system, as the certificate says."""
@@ -99,16 +106,19 @@ class Supervisor(CoreSupervisor, SupervisorFile, frozen=True, dict=True):
     def _repr_html_(self) -> str:
         checks = ("safe", "controllable", "nonblocking", "maximally_permissive")
         found = [(name.replace("_", " "), getattr(self.certificate, name)) for name in checks]
-        return html_table(("check", "outcome"), found, caption=repr(self).strip("<>")) + self.conditions._repr_html_()
+        if self.certificate.goals is not None:
+            found.append(("goals", self.certificate.goals))
+        shown = html_table(("check", "outcome"), found, caption=repr(self).strip("<>")) + self.conditions._repr_html_()
+        return shown + self.goals._repr_html_() if self.goals else shown
 
     def __reduce__(self) -> tuple[Any, ...]:
-        fields = (self.model, self.deployment, self.added, self.certificate)
+        fields = (self.model, self.deployment, self.added, self.certificate, self.strategy)
         return _restored, (type(self), fields, None if self.diagnostics is None else tuple(self.diagnostics))
 
 
 def _restored(
     kind: type[Supervisor],
-    fields: tuple[Model, Deployment, tuple[AddedCondition, ...], Certificate],
+    fields: tuple[Model, Deployment, tuple[AddedCondition, ...], Certificate, Strategy | None],
     diagnostics: tuple[Diagnostic, ...] | None,
 ) -> Supervisor:
     return kind.of(CoreSupervisor(*fields), diagnostics)

@@ -66,10 +66,14 @@ class Walker(ABC):
 
     Args:
         run: The run that it leads.
+
+    Attributes:
+        follows_strategy: True if the controller follows its strategy, and only the world plays by chance.
     """
 
     def __init__(self, run: WalkedRun) -> None:
         self._run = run
+        self.follows_strategy = False
         # Findings that were reported before.
         self._reported: set[tuple[WalkFindingKind, str, tuple[str, ...]]] = set()
 

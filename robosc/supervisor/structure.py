@@ -59,6 +59,29 @@ class AddedCondition(msgspec.Struct, frozen=True):
     condition: DecisionDiagram
 
 
+class Choice(msgspec.Struct, frozen=True):
+    """Condition for choosing a request.
+
+    Attributes:
+        event: The request's event.
+        condition: Condition over the state and the memory of goals.
+    """
+
+    event: Annotated[str, msgspec.Meta(max_length=511)]
+    condition: DecisionDiagram
+
+
+class Strategy(msgspec.Struct, frozen=True):
+    """Choice among the requests that the supervisor enables, so that the goals of the model come true.
+
+    Attributes:
+        modes: For each goal of the model, in its order, the choices that approach it: the first whose condition is
+            true, else none. Once the goal is true, the next one in turn is approached.
+    """
+
+    modes: tuple[tuple[Choice, ...], ...]
+
+
 CheckResult = Literal["passed", "not checked"]
 
 
@@ -96,6 +119,7 @@ class Certificate(msgspec.Struct, frozen=True, omit_defaults=True):
         states: Reachable states of the controlled system, exact.
         transitions: Transitions between them, or None where they were not counted.
         controller: Properties of the controller, or None if they were not checked.
+        goals: Under the strategy every goal comes true while the assumptions do; None where there is no strategy.
     """
 
     engine_version: str
@@ -109,9 +133,10 @@ class Certificate(msgspec.Struct, frozen=True, omit_defaults=True):
     states: str
     transitions: str | None
     controller: ControllerProperties | None = None
+    goals: CheckResult | None = None
 
 
-class Supervisor(msgspec.Struct, frozen=True, dict=True):
+class Supervisor(msgspec.Struct, frozen=True, dict=True, omit_defaults=True):
     """A synthesized supervisor.
 
     Attributes:
@@ -119,17 +144,25 @@ class Supervisor(msgspec.Struct, frozen=True, dict=True):
         deployment: Deployment that it was synthesized for.
         added: The conditions that synthesis adds, in source order of their events.
         certificate: Record of what was checked.
+        strategy: Strategy that reaches the model's goals; None where it has none, and in a layer.
     """
 
     model: Model
     deployment: Deployment
     added: tuple[AddedCondition, ...]
     certificate: Certificate
+    strategy: Strategy | None = None
 
     @classmethod
-    def supervising(cls, system: ExecutableSystem, added: tuple[AddedCondition, ...], certificate: Certificate) -> Self:
+    def supervising(
+        cls,
+        system: ExecutableSystem,
+        added: tuple[AddedCondition, ...],
+        certificate: Certificate,
+        strategy: Strategy | None = None,
+    ) -> Self:
         """The supervisor of a system that is built already."""
-        made = cls(system.model, system.deployment, added, certificate)
+        made = cls(system.model, system.deployment, added, certificate, strategy)
         # No field: a supervisor's file does not hold it.
         made.__dict__["executable"] = system
         return made
@@ -144,8 +177,9 @@ class Supervisor(msgspec.Struct, frozen=True, dict=True):
         return next((item.condition for item in self.added if item.event == event), None)
 
     def __repr__(self) -> str:
-        certificate = self.certificate
+        certificate, modes = self.certificate, () if self.strategy is None else self.strategy.modes
+        strategy = f", a strategy for {len(modes)} goal{'s' if len(modes) != 1 else ''}" if modes else ""
         return (
             f"<supervisor of {self.model.name}: {self.deployment}, {certificate.states} states, "
-            f"conditions added to {len(self.added)} event{'s' if len(self.added) != 1 else ''}>"
+            f"conditions added to {len(self.added)} event{'s' if len(self.added) != 1 else ''}{strategy}>"
         )

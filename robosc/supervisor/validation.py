@@ -30,12 +30,16 @@ from robosc.expressions import (
 )
 from robosc.expressions.inference import Scope, has_type, is_assignable
 from robosc.model.structure import (
+    Assumption,
     Behaviour,
     Communication,
     CommunicationKind,
     Component,
+    Deployment,
     EnumDefinition,
     EventKind,
+    Goal,
+    GoalForm,
     Model,
     ObjectDefinition,
     ObjectValue,
@@ -100,6 +104,7 @@ def validate(supervisor: Supervisor) -> None:
             with _at(f"component {component.name}"):
                 _validate_component(component, names)
         _validate_requirements(model, names)
+        _validate_goals(model, names)
         for number, provide in enumerate(model.provides, start=1):
             with _at(f"provide statement {number} (for {provide.communication})"):
                 _validate_provide(provide, names)
@@ -109,6 +114,7 @@ def validate(supervisor: Supervisor) -> None:
             raise InvalidSupervisorError("the certificate is for another deployment than the supervisor")
         if supervisor.added:
             validate_added(supervisor.added, supervisor.executable.automata)
+        _validate_strategy(supervisor)
 
 
 @contextmanager
@@ -396,6 +402,25 @@ def _validate_requirements(model: Model, names: _Names) -> None:
             _require_boolean(invariant.expression, names.scope)
 
 
+def _validate_goals(model: Model, names: _Names) -> None:
+    for number, goal in enumerate(model.goals, start=1):
+        with _at(f"goal {number}"):
+            _validate_aim(goal, names)
+    for number, assumption in enumerate(model.assumptions, start=1):
+        with _at(f"assumption {number}"):
+            if assumption.form is GoalForm.ONCE:
+                raise InvalidSupervisorError("an assumption has not the form 'once'")
+            _validate_aim(assumption, names)
+
+
+def _validate_aim(aim: Goal | Assumption, names: _Names) -> None:
+    """A trigger stands in the one form that has it; conditions are boolean, and read no received data."""
+    if (aim.trigger is not None) != (aim.form is GoalForm.LEADS_TO):
+        raise InvalidSupervisorError("the form 'leads to' has a trigger, and no other form has one")
+    for expression in aim.expressions:
+        _require_boolean(expression, names.scope)
+
+
 def _validate_provide(provide: Provide, names: _Names) -> None:
     _validate_provided(provide.value, _request_type(provide.communication, names), names)
     if provide.condition is not None:
@@ -424,7 +449,7 @@ def _validate_provided(value: ProvidedValue, type_: Type, names: _Names) -> None
 def _validate_synthesis_variables(model: Model, names: _Names) -> None:
     """Check that all that synthesis reads is in synthesis and finite.
 
-    That is all that guards, requirements, data conditions and synthesis variables read.
+    That is all that guards, requirements, goals, assumptions, data conditions and synthesis variables read.
     """
     variables = {
         (component.name, variable.name): variable
@@ -450,6 +475,9 @@ def _synthesis_expressions(
         yield requirement.expression, None
     for invariant in model.invariants:
         yield invariant.expression, None
+    aims: tuple[Goal | Assumption, ...] = (*model.goals, *model.assumptions)
+    for aim in aims:
+        yield from ((expression, None) for expression in aim.expressions)
     for provide in model.provides:
         if provide.condition is not None:
             yield provide.condition, None
@@ -475,6 +503,32 @@ def _validate_certificate(certificate: Certificate) -> None:
         raise InvalidSupervisorError("certificate: the number of states is not a positive decimal number")
     if certificate.transitions is not None and not _COUNT.match(certificate.transitions):
         raise InvalidSupervisorError("certificate: the number of transitions is not a decimal number")
+
+
+def _validate_strategy(supervisor: Supervisor) -> None:
+    """Check that a strategy is there exactly where a controller has goals, and that it chooses among requests."""
+    strategy, goals = supervisor.strategy, supervisor.model.goals
+    is_needed = bool(goals) and supervisor.deployment is Deployment.CONTROLLER
+    if (strategy is not None) is not is_needed:
+        raise InvalidSupervisorError("a strategy belongs to a controller with goals, and to no other supervisor")
+    if (supervisor.certificate.goals is not None) is not is_needed:
+        raise InvalidSupervisorError("the certificate speaks of goals exactly where there is a strategy")
+    if strategy is None:
+        return
+    if len(strategy.modes) != len(goals):
+        raise InvalidSupervisorError("the strategy has not one mode for each goal")
+    requests = set(supervisor.executable.requests)
+    domains = diagram_domains(supervisor.executable.remembering_automata)
+    for number, mode in enumerate(strategy.modes, start=1):
+        seen: set[str] = set()
+        for item in mode:
+            with _at(f"mode {number} of the strategy"):
+                if item.event not in requests:
+                    raise InvalidSupervisorError(f"there is no request {item.event[:80]!a}")
+                if item.event in seen:
+                    raise InvalidSupervisorError(f"{item.event} stands twice")
+                seen.add(item.event)
+                validate_condition(item.condition, domains)
 
 
 def validate_added(added: Iterable[AddedCondition], system: System) -> None:

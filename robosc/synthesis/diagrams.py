@@ -168,3 +168,16 @@ def extract(encoding: Encoding, predicate: Any, maximum: int = MAXIMUM_TOTAL) ->
     places = [(subject.automaton, subject.variable) for subject in subjects]
     nodes = [DecisionNode(*places[place], starts, children) for place, starts, children in found.nodes]
     return DecisionDiagram(tuple(nodes), found.number)
+
+
+def predicate_of(encoding: Encoding, diagram: DecisionDiagram) -> Any:
+    """Return the state predicate of a valid decision diagram over the places of an encoding."""
+    manager = encoding.manager
+    found = [manager.false, manager.true]
+    for node in diagram.nodes:
+        bits = encoding.subjects[Subject(node.automaton, node.variable)]
+        result = found[node.children[-1]]
+        for start, child in zip(node.starts[:0:-1], node.children[-2::-1], strict=True):
+            result = manager.ite(encoding.at_least(bits, start), result, found[child])
+        found.append(result)
+    return found[diagram.root]

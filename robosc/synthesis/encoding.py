@@ -173,17 +173,20 @@ class Encoding:
 
     def valid(self, bits: Bits) -> Any:
         """Return the predicate that is true where the bits encode a value at all."""
-        count = len(bits.domain)
-        if count == 1 << len(bits.names):
-            return self.manager.true
-        # index < count, from the least significant bit up.
-        result = self.manager.false
+        return ~self.at_least(bits, len(bits.domain))
+
+    def at_least(self, bits: Bits, index: int) -> Any:
+        """Return the predicate that is true where the code of a value is an index or a larger one."""
+        if index >> len(bits.names):
+            return self.manager.false
+        # From the least significant bit up.
+        result = self.manager.true
         for place, name in enumerate(reversed(bits.names)):
             variable = self.manager.var(name)
-            limit_has_bit = (count >> place) & 1
-            result = self.manager.ite(variable, result if limit_has_bit else self.manager.false, result)
-            if limit_has_bit:
-                result = self.manager.ite(variable, result, self.manager.true)
+            if (index >> place) & 1:
+                result = self.manager.ite(variable, result, self.manager.false)
+            else:
+                result = self.manager.ite(variable, self.manager.true, result)
         return result
 
     @cached_property

@@ -143,10 +143,18 @@ def is_unseen(text: str, texts: Sequence[str], starts: Sequence[int], index: int
     is_split = "\n" in text[starts[index] : starts[index + 1]]
     if texts[index] in ("always", "never") and texts[index - 1] == "requirement":
         return is_split or texts[index + 1] == "-"
+    if texts[index] in ("allow", "always", "once") and texts[index - 1] in ("goal", "assume", "allow"):
+        is_far = texts[index + 1] == "leads" and "\n" in text[starts[index] : starts[index + 2]]
+        return is_split or is_far or texts[index + 1] == "-"
+    if (texts[index - 1], texts[index]) in (("always", "eventually"), ("allow", "leads"), ("once", "leads")):
+        return is_unseen(text, texts, starts, index - 1)
+    if texts[index - 2 : index] == ["always", "eventually"] and is_unseen(text, texts, starts, index - 2):
+        # Behind such a name no operand is seen.
+        return True
     if texts[index] == "not":
         following = texts[index + 1]
-        last = index + {"constant": 3, "integer": 2, "double": 2}.get(following, 1)
-        return following == "if" or "\n" in text[starts[index] : starts[last]]
+        last = index + {"constant": 3, "integer": 2, "double": 2, "leads": 2, "goal": 5, "assume": 5}.get(following, 1)
+        return following == "if" or "\n" in text[starts[index] : starts[min(last, len(starts) - 1)]]
     if texts[index - 1] == "not" and texts[index] in FUNCTIONS and is_unseen(text, texts, starts, index - 1):
         return True
     return is_split and texts[index] in FUNCTIONS and texts[index + 1] == "("

@@ -1,6 +1,8 @@
 """Every target does what the reference executor does: the same runs, compared step by step."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 from pathlib import Path
 from random import Random
 from types import ModuleType
@@ -26,6 +28,7 @@ from support.equivalence.worlds import WORLDS, live, robot_supervisor
 from support.generated import load_module, loaded_file
 from support.models import model_of
 from support.random_controllers import random_controller, random_robot
+from support.random_goals import strategic_controller
 from support.random_supervisors import CERTIFICATE, random_supervisor
 
 ROBOTS = sorted(WORLDS)
@@ -120,6 +123,35 @@ def test_random_robots_in_c(tmp_path_factory: pytest.TempPathFactory, seed: int)
     except UnsupportedModelError:
         return  # The random models hold what C cannot keep, too: received texts.
     compare(target, scenario, observe(supervisor, scenario))
+
+
+def _strategic(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
+    """Yield random robots whose strategies choose requests, with a run of each under its strategy."""
+    for seed in range(first, first + 1_500):
+        supervisor = strategic_controller(seed)
+        if supervisor is not None and supervisor.strategy and any(supervisor.strategy.modes):
+            yield supervisor, random_scenario(supervisor, seed, 80)
+
+
+def test_strategies_in_python() -> None:
+    requests = 0
+    for supervisor, scenario in _strategic(0):
+        expected = observe(supervisor, scenario)
+        compare(generated_python(supervisor, load_module(supervisor)), scenario, expected)
+        requests += sum(len(item.issued) for item in expected)
+    assert requests > 50
+
+
+@needs_gcc
+def test_strategies_in_c(tmp_path: Path) -> None:
+    requests = 0
+    for number, (supervisor, scenario) in enumerate(islice(_strategic(1_500), 6)):
+        expected = observe(supervisor, scenario)
+        # Some with sanitizers, which take the compiler three times as long.
+        options = () if number % 4 == 0 else ("-O0",)
+        compare(C99Target(supervisor, tmp_path / str(number), *options), scenario, expected)
+        requests += sum(len(item.issued) for item in expected)
+    assert requests > 5
 
 
 TWO_WHEELS = """robot TwoWheels {

@@ -62,6 +62,9 @@ class _Wanted:
     def __init__(self, number: int) -> None:
         self._number = number
 
+    def candidates(self, enabled: Any) -> Any:
+        return enabled
+
     def choose(self, candidates: Any) -> int:
         assert self._number in candidates
         return self._number
@@ -75,7 +78,7 @@ def _nothing(*names: str) -> str:
     raise KeyError(names)
 
 
-class _World:
+class World:
     """An executor after a history."""
 
     def __init__(self, supervisor: Supervisor, history: tuple[Move, ...]) -> None:
@@ -96,6 +99,10 @@ class _World:
     def held(self) -> Held:
         goals = self.executor._replies._goals.open_goals()
         return tuple((goal.action, goal.held if goal.held else ()) for goal in goals if goal.is_running and goal.held)
+
+    def open_actions(self) -> set[str]:
+        """Return the actions of which a goal is not known to have ended."""
+        return {goal.action for goal in self.executor._replies._goals.open_goals()}
 
     def key(self) -> StateKey:
         return (tuple(self.system.signature()), self.held())
@@ -185,7 +192,7 @@ def twin_of(supervisor: Supervisor, limit: int) -> Twin | None:
     good: set[StateKey] = set()
     tried: set[Any] = set()
 
-    def look(world: _World, before: StateKey | None, is_sure: bool) -> StateKey | None:
+    def look(world: World, before: StateKey | None, is_sure: bool) -> StateKey | None:
         """Judge what just happened, and return the stable state it led to."""
         steps = world.system.steps
         loud = [place for place, (event, _, _) in enumerate(steps) if not _is_silent(event)]
@@ -215,15 +222,15 @@ def twin_of(supervisor: Supervisor, limit: int) -> Twin | None:
             sure.setdefault(before, set()).add(key)
         return key
 
-    first = _World(supervisor, ())
+    first = World(supervisor, ())
     key = look(first, None, True)
     queue: list[StateKey] = []
     if key is not None:
         histories[key] = ()
         queue.append(key)
     for state in queue:
-        for move, is_sure in list(_World(supervisor, histories[state]).moves()):
-            world = _World(supervisor, histories[state])
+        for move, is_sure in list(World(supervisor, histories[state]).moves()):
+            world = World(supervisor, histories[state])
             world.do(move)
             target = look(world, state, is_sure)
             if target is not None and target not in histories:
@@ -238,7 +245,7 @@ def twin_of(supervisor: Supervisor, limit: int) -> Twin | None:
     return found
 
 
-def _live(world: _World, state: dict[Any, Any], held: Held) -> Held:
+def _live(world: World, state: dict[Any, Any], held: Held) -> Held:
     """Return the data that is remembered of goals that still run."""
     return tuple((name, kept) for name, kept in held if state[f"action {name}", None] == "executing")
 

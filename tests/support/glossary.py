@@ -18,6 +18,8 @@ WORDS = {
     "decision diagram": r"decision diagrams?",
     "batch": r"batch(?:es)?",
     "policy": r"polic(?:y|ies)",
+    "assumption": r"assumptions?",
+    "strategy": r"strateg(?:y|ies)",
     "event log": r"event logs?",
 }
 """Sections of the glossary, and the forms of their words."""

@@ -18,6 +18,7 @@ WORDS = tuple(
     """
     a b x far always never any all in then else min max length abs clamp qos depth max_age stamped when constant
     not identifier type reliable sensor latched until _x9 Value order androids ifs ^a ^state ^always ^value ^in ^then x1
+    goal assume eventually leads once allow ^once ^allow
     """.split()
 )
 """Free names; most of them are words of part B, or nearly a word."""
@@ -29,7 +30,7 @@ _STRINGS = ('""', "'a'", '"it\'s"', r"'it\'s'", r'"a\"\\\n\tb"', '"// no comment
 _SAMPLES: dict[str, tuple[str, ...]] = {
     "NameToken": WORDS,
     "RootToken": (*WORDS, "value"),
-    "FunctionToken": ("integer", "double", "min", "max", "any", "all", "always", "never", "f", "length", "then"),
+    "FunctionToken": tuple("integer double min max any all always never once f length then".split()),
     "DoubleToken": _DOUBLES,
     "IntegerToken": _NUMBERS,
     "StringToken": _STRINGS,

@@ -21,11 +21,13 @@ from robosc.expressions.text import expression_text
 from robosc.formatting import format_text
 from robosc.language.words import RESERVED_WORDS, spelled
 from robosc.model.structure import (
+    Assumption,
     Behaviour,
     Communication,
     CommunicationKind,
     Component,
     EnumDefinition,
+    Goal,
     Model,
     ObjectValue,
     ProvidedValue,
@@ -89,6 +91,9 @@ class _Writer:
         for invariant in model.invariants:
             word = "never" if invariant.is_never else "always"
             yield f"requirement {word} {self._expression(invariant.expression)}"
+        yield from (f"goal {self._aim(goal)}" for goal in model.goals)
+        for assumption in model.assumptions:
+            yield f"assume {'allow ' if assumption.is_allowed else ''}{self._aim(assumption)}"
         for item_ in model.provides:
             condition = "" if item_.condition is None else f" if {self._expression(item_.condition)}"
             yield f"provide {spelled(item_.communication)} with {self._provided(item_.value)}{condition}"
@@ -161,6 +166,11 @@ class _Writer:
         if item.form is RequirementForm.NEEDS:
             return f"requirement {requests} needs {condition}"
         return f"requirement {condition} disables {requests}"
+
+    def _aim(self, item: Goal | Assumption) -> str:
+        # Whatever a condition is, none of its words is taken for one of the form.
+        conditions = [f"({self._expression(expression)})" for expression in item.expressions]
+        return f" {item.form} ".join(conditions) if len(conditions) > 1 else f"{item.form} {conditions[0]}"
 
     def _provided(self, value: ProvidedValue) -> str:
         if not isinstance(value, ObjectValue):

@@ -15,19 +15,20 @@ from support.failing import bundle_files, made
 
 _STATES = ("idle", "busy", "^state", "always", "depth", "then_")
 _VARIABLES = ("level", "^value", "never", "count", "max", "flag")
+_GOAL_WORDS = ("allow", "always", "eventually", "goal", "leads", "once")
 _BLANKS = (" ", " ", " ", " ", "\n", "\n\n", "\t", "  ")
 _COMMENTS = ("/* a } b */", "/**/", "// to the end {\n", "/* two\n lines */", "//\n")
 
 
-def models(*, part_b: bool = True) -> st.SearchStrategy[Bundle]:
-    """Bundles of a robot and perhaps a library that it imports from."""
-    return st.integers(0, 2**32 - 1).map(lambda seed: random_bundle(seed, part_b=part_b))
+def models(*, part_b: bool = True, goals: bool = False) -> st.SearchStrategy[Bundle]:
+    """Bundles of a robot and perhaps a library that it imports from; the robot perhaps with goals and assumptions."""
+    return st.integers(0, 2**32 - 1).map(lambda seed: random_bundle(seed, part_b=part_b, goals=goals))
 
 
-def random_bundle(seed: int, *, part_b: bool = True) -> Bundle:
-    """The bundle of a seed."""
+def random_bundle(seed: int, *, part_b: bool = True, goals: bool = False) -> Bundle:
+    """The bundle of a seed; with goals, it is the same but for them and for the constants that they read."""
     dice = Random(seed)
-    author = _Author(dice, part_b)
+    author = _Author(dice, part_b, goals)
     library = author.library() if dice.random() < 0.5 else None
     main = author.robot(library is not None)
     files = [] if library is None else [SourceFile("parts.rscd", relaid(library, dice))]
@@ -64,11 +65,13 @@ class _Author:
     Args:
         dice: Source of chance that decides everything.
         part_b: True if the language's extensions are used.
+        goals: True if the robot has goals and assumptions.
     """
 
-    def __init__(self, dice: Random, part_b: bool) -> None:
+    def __init__(self, dice: Random, part_b: bool, goals: bool = False) -> None:
         self._dice = dice
         self._part_b = part_b
+        self._has_goals = goals
         self._number = 0
         self._constants: dict[str, str] = {}
         self._components: list[_Component] = []
@@ -93,6 +96,9 @@ class _Author:
         own = [self._component() for _ in range(self._dice.randint(1, 3))]
         parts += own
         parts += self._restrictions(self._components, self._dice.randint(0, 4))
+        if self._has_goals:
+            parts += [f"constant {word}: boolean = {self._dice.choice(('true', 'false'))}" for word in _GOAL_WORDS]
+            parts += [self._goal() for _ in range(self._dice.randint(1, 5))]
         self._dice.shuffle(parts)
         return f"robot {self._new('Robot')} {{ {' '.join(parts)} }}"
 
@@ -312,7 +318,8 @@ class _Author:
 
     # Requirements and data
 
-    def _restrictions(self, components: list[_Component], count: int) -> list[str]:
+    def _readable(self, components: list[_Component]) -> dict[str, str]:
+        """Conditions about states and variables of some components."""
         states: dict[str, str] = {}
         for component in components:
             states |= {f"{component.name}.{state}": "" for state in component.states}
@@ -321,6 +328,20 @@ class _Author:
                     states[f"{component.name}.{name}"] = ""
                 elif type_.startswith("integer("):
                     states[f"({component.name}.{name} >= 1)"] = ""
+        return states
+
+    def _goal(self) -> str:
+        """A goal or an assumption; the words of both are names in it, too."""
+        conditions = self._readable(self._components) | dict.fromkeys(_GOAL_WORDS, "")
+        trigger, condition = (self._condition(2, conditions, {}) for _ in range(2))
+        first = self._dice.choice(("goal", "assume", "assume allow"))
+        forms = [f"{first} always eventually {condition}", f"{first} {trigger} leads to {condition}"]
+        if first == "goal":
+            forms.append(f"goal once {condition}")
+        return self._dice.choice(forms)
+
+    def _restrictions(self, components: list[_Component], count: int) -> list[str]:
+        states = self._readable(components)
         requests = {name: kind for component in components for name, kind in component.requests.items()}
         found = []
         for _ in range(count):

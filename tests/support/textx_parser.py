@@ -146,6 +146,14 @@ class _Converter:
                 return syntax.Constant(self._name(node.name), self._type(node.type), self._expression(node.value))
             case "Requirement":
                 return self._requirement(node)
+            case "Goal":
+                place = self._first(node, "goal")
+                self._in_robot(node, place)
+                return syntax.Goal(*self._aim(node), place)
+            case "Assumption":
+                place = self._first(node, "assume")
+                self._in_robot(node, place)
+                return syntax.Assumption(node.allowed is not None, *self._aim(node.allowed or node), place)
             case _:
                 value, condition = self._provided(node.value), self._condition(node.condition)
                 return syntax.Provide(self._name(node.communication), value, condition, self._first(node, "provide"))
@@ -157,6 +165,17 @@ class _Converter:
         form = node.needs or node.disables
         names = tuple(self._name(name) for name in form.communications.names)
         return syntax.Requirement(names, node.needs is None, self._expression(form.expression), place)
+
+    def _in_robot(self, node: Any, place: Location) -> None:
+        if _kind(node.parent) == "Library":
+            self._report("goal-in-library", place)
+
+    def _aim(self, node: Any) -> tuple[syntax.GoalForm, syntax.Expression | None, syntax.Expression]:
+        if node.answer is not None:
+            return "leads to", self._expression(node.answer.trigger), self._expression(node.answer.condition)
+        if node.recurring is not None:
+            return "always eventually", None, self._expression(node.recurring.condition)
+        return "once", None, self._expression(node.once.condition)
 
     def _provided(self, node: Any) -> syntax.ObjectValue | syntax.Expression:
         if node.object is None:

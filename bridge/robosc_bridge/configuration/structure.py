@@ -91,9 +91,12 @@ class Execution(_Section, frozen=True):
         ),
     ] = None
     policy: Annotated[
-        Literal["fair", "priority", "random"],
-        Meta(description="Choice of the request to issue if several are allowed."),
-    ] = "fair"
+        Literal["fair", "priority", "random", "strategy"] | None,
+        Meta(
+            description="Choice of the request to issue if several are allowed; null: `strategy` where the model has "
+            "goals, else `fair`."
+        ),
+    ] = None
     priority: Annotated[
         tuple[_Name, ...], Meta(description="Communications, most urgent first, for the policy `priority`.")
     ] = ()

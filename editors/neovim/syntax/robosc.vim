@@ -9,6 +9,12 @@ syntax keyword roboscWord disables do double else enum error false feedback from
 syntax keyword roboscWord integer interface library links marked message needs never none not object on or outgoing
 syntax keyword roboscWord provide request requirement response robot service state string then to transition true
 syntax keyword roboscWord use value variable with
+" Words of goals and assumptions, where they are no names.
+syntax match roboscWord "^\s*\zs\%(goal\|assume\)\>\ze\s\+[^:,.=[:blank:]]"
+syntax match roboscWord "\%(^\s*goal\s\+\)\@<=once\>\ze\s\+\%(and\>\|or\>\|leads\>\)\@![[:alpha:]_(!^]"
+syntax match roboscWord "\%(^\s*assume\s\+\)\@<=allow\>\ze\s\+\%(and\>\|or\>\|leads\>\)\@![[:alpha:]_(!^]"
+syntax match roboscWord "\%(\<always\s\+\)\@<=eventually\>"
+syntax match roboscWord "\<leads\>\ze\s\+to\>"
 " A word of the language as a name.
 syntax match roboscName "\^\h\w*"
 syntax match roboscNumber "\<\d\+\%(\.\d\+\)\?\>"

@@ -24,6 +24,7 @@ def describe(supervisor: Supervisor) -> Description:
         resets=tuple(item.event(EventKind.RESET) for item in model.communications if item.kind in _WITH_RESET),
         taus=tuple(transition.event for transition in _taus(model)),
         silent_bound=silent_bound(model),
+        has_strategy=supervisor.strategy is not None,
     )
 
 

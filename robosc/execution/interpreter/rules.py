@@ -145,7 +145,7 @@ def initial_state(model: Model) -> dict[Place, Value]:
 def event_rules(supervisor: Supervisor) -> dict[str, EventRule]:
     """The rule of every event, by name."""
     model = supervisor.model
-    domains = _domains(model)
+    domains = place_domains(model)
     events: dict[str, EventRule] = {}
     for communication in model.communications:
         for event in communication.events:
@@ -182,7 +182,7 @@ def _event(
     )
 
 
-def _domains(model: Model) -> dict[Place, Sequence[Value]]:
+def place_domains(model: Model) -> dict[Place, Sequence[Value]]:
     """All values of each place that an added condition may read."""
     domains: dict[Place, Sequence[Value]] = {}
     for component in model.components:

@@ -7,6 +7,7 @@ from typing import Any
 from robosc.automata.plants import communication_plant_name
 from robosc.execution.interpreter.description import describe
 from robosc.execution.interpreter.functions import Data, Place, function_of, holds, no_data
+from robosc.execution.interpreter.goals import GoalsOfSystem
 from robosc.execution.interpreter.received import Reader
 from robosc.execution.interpreter.rules import (
     EventRule,
@@ -15,6 +16,7 @@ from robosc.execution.interpreter.rules import (
     WhenRule,
     event_rules,
     initial_state,
+    place_domains,
     provided_function,
 )
 from robosc.execution.runtime.protocol import MATCHES, Match, Reading, batches, requesting
@@ -36,6 +38,19 @@ class _Successor:
     state: dict[Place, Value]
     skipped: tuple[str, ...]
     leaves_range: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Snapshot:
+    """State of an interpreted system to come back to.
+
+    Attributes:
+        state: Value of each place.
+        goals: Memory of the goals; None where there is no strategy.
+    """
+
+    state: Mapping[Place, Value]
+    goals: tuple[dict[str, bool], int] | None
 
 
 class InterpretedSystem:
@@ -83,11 +98,16 @@ class InterpretedSystem:
         self.changes = 0
         self._request_events = tuple(info.name + ".request" for info in requesting(self.description.communications))
         self._batches = batches(self.description.communications)
+        self._goals = None
+        if supervisor.strategy is not None:
+            self._goals = GoalsOfSystem(model, supervisor.strategy, self._request_events, place_domains(model))
 
     def restart(self) -> None:
         """Return to the initial state."""
         self.changes += 1
         self._state = self._initial
+        if self._goals is not None:
+            self._goals.restart()
 
     def enabled(self, event: str) -> bool:
         """Return True if a controllable event is allowed now; an unknown event is a KeyError."""
@@ -108,14 +128,16 @@ class InterpretedSystem:
         successor = self._successor(rule, no_data)
         return successor is not None and not (rule.is_controllable and successor.leaves_range)
 
-    def snapshot(self) -> Mapping[Place, Value]:
-        """Return the state as a value that `restore` takes."""
-        return self._state
+    def snapshot(self) -> Snapshot:
+        """Return the state with the memory of goals, as a value that `restore` takes."""
+        return Snapshot(self._state, None if self._goals is None else self._goals.snapshot())
 
-    def restore(self, snapshot: Mapping[Place, Value]) -> None:
+    def restore(self, snapshot: Snapshot) -> None:
         """Return to a state that `snapshot` has returned."""
         self.changes += 1
-        self._state = dict(snapshot)
+        self._state = dict(snapshot.state)
+        if self._goals is not None and snapshot.goals is not None:
+            self._goals.restore(snapshot.goals)
 
     def enabled_requests(self) -> tuple[int, ...]:
         """Return the numbers, in source order of all requests, of those that are allowed now."""
@@ -178,6 +200,31 @@ class InterpretedSystem:
     def location(self, communication: str) -> str:
         """Return the location of a service or action; an unknown name is a KeyError."""
         return str(self._state[communication_plant_name(self._model.communication(communication)), None])
+
+    def observe(self) -> None:
+        """Take in a stable state, for what the strategy remembers."""
+        if self._goals is not None:
+            self._goals.observe(self._state)
+
+    def choose(self) -> int | None:
+        """Number of the request that the strategy chooses in this stable state, or None if it waits."""
+        return None if self._goals is None else self._goals.choose(self._state)
+
+    def is_stable(self) -> bool:
+        """Return True if an executor would take no silent step now: no reset, no tau, no cancel of its own."""
+        if self.enabled_silent() is not None:
+            return False
+        return self.due_cancel() is None
+
+    def due_cancel(self) -> str | None:
+        """Return the cancel that an executor would issue by itself now; known only where there is a strategy."""
+        if self._goals is None:
+            return None
+        return next((event for event in self._goals.due_cancels(self._state) if self.enabled(event)), None)
+
+    def reached(self) -> tuple[bool, ...]:
+        """Return for each goal True if it counts as come true in this stable state; nothing without a strategy."""
+        return () if self._goals is None else self._goals.are_true(self._state)
 
     def state(self) -> dict[str, dict[str, Any]]:
         """State and variables of every component with a behaviour."""

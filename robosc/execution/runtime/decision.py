@@ -11,11 +11,16 @@ from __future__ import annotations
 import random
 from typing import List, Protocol, Sequence, Tuple
 
+from robosc.execution.runtime.protocol import StrategicSystem
+
 _NEVER = -1
 
 
 class Policy(Protocol):
     """Policy that decides between requests that are enabled together."""
+
+    def candidates(self, enabled: Tuple[int, ...]) -> Tuple[int, ...]:
+        """Return those of the enabled requests that may be issued at this decision."""
 
     def choose(self, candidates: Sequence[int]) -> int:
         """One of the candidates (at least one, ascending)."""
@@ -27,7 +32,17 @@ class Policy(Protocol):
         """End the decision; `enabled` were the requests that were enabled at it."""
 
 
-class FairPolicy:
+class AnyRequest:
+    """Part of a policy by which every enabled request may be issued."""
+
+    __slots__ = ()
+
+    def candidates(self, enabled: Tuple[int, ...]) -> Tuple[int, ...]:
+        """Return all of them."""
+        return enabled
+
+
+class FairPolicy(AnyRequest):
     """
     Newly enabled requests first, then never issued ones, then the one issued longest ago.
 
@@ -83,7 +98,7 @@ class FairPolicy:
         self._decision += 1
 
 
-class PriorityPolicy:
+class PriorityPolicy(AnyRequest):
     """
     The first enabled request of a list; if none of them is enabled, fair.
 
@@ -115,7 +130,7 @@ class PriorityPolicy:
         self._fair.close(enabled)
 
 
-class RandomPolicy:
+class RandomPolicy(AnyRequest):
     """
     Policy that takes any candidate with equal probability, the same sequence for the same seed.
 
@@ -137,6 +152,38 @@ class RandomPolicy:
 
     def close(self, enabled: Tuple[int, ...]) -> None:
         """Chance has no memory."""
+
+
+class StrategyPolicy:
+    """
+    The request that the supervisor's strategy chooses, or none.
+
+    :param system: System with a strategy.
+    """
+
+    __slots__ = ('_system',)
+
+    def __init__(self, system: StrategicSystem) -> None:
+        self._system = system
+
+    def candidates(self, enabled: Tuple[int, ...]) -> Tuple[int, ...]:
+        """
+        Return the chosen request alone, or nothing.
+
+        An action whose cancelled goal is not known to have ended is not enabled: it is waited for.
+        """
+        chosen = self._system.choose()
+        return (chosen,) if chosen in enabled else ()
+
+    def choose(self, candidates: Sequence[int]) -> int:
+        """Return the only one."""
+        return candidates[0]
+
+    def issued(self, request: int) -> None:
+        """Do nothing: the system remembers what a strategy needs."""
+
+    def close(self, enabled: Tuple[int, ...]) -> None:
+        """Do nothing: the system remembers what a strategy needs."""
 
 
 def make_policy(policy: str, names: Sequence[str], priority: Sequence[str], seed: int) -> Policy:

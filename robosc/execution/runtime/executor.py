@@ -6,12 +6,12 @@ It issues the requests itself (semantics 3.5), on top of what all executors do.
 
 from __future__ import annotations
 
-from typing import Optional
+from typing import cast, Optional
 
 from robosc.execution.runtime.clock import Clock
-from robosc.execution.runtime.decision import make_policy, Policy
+from robosc.execution.runtime.decision import make_policy, Policy, StrategyPolicy
 from robosc.execution.runtime.event_log import EventLog
-from robosc.execution.runtime.protocol import ControlledSystem, Middleware
+from robosc.execution.runtime.protocol import ControlledSystem, Middleware, StrategicSystem
 from robosc.execution.runtime.requests import Decisions
 from robosc.execution.runtime.runner import Runner
 from robosc.execution.runtime.safe_stop import describe_error
@@ -41,6 +41,9 @@ class Executor(Runner):
         log: Optional[EventLog] = None,
     ) -> None:
         super().__init__(system, middleware, 'controller', settings, clock, log)
+        if self.settings.policy is None:
+            policy = 'strategy' if system.description.has_strategy else 'fair'
+            self.settings = self.settings._replace(policy=policy)
         self._request_names = [request.name for request in self._requests]
         self._decisions = Decisions(
             system,
@@ -83,6 +86,8 @@ class Executor(Runner):
             self._deadline_s = self._next_deadline(self._now_s)
 
     def _new_policy(self) -> Policy:
-        return make_policy(
-            self.settings.policy, self._request_names, self.settings.priority, self.settings.seed
-        )
+        settings = self.settings
+        policy = settings.policy or 'fair'
+        if policy == 'strategy':
+            return StrategyPolicy(cast(StrategicSystem, self._system))
+        return make_policy(policy, self._request_names, settings.priority, settings.seed)

@@ -60,6 +60,7 @@ class Description(NamedTuple):
     :ivar resets: Reset events of services and actions.
     :ivar taus: Tau events that can change something.
     :ivar silent_bound: Maximum number of silent steps in a row of a run that ends.
+    :ivar has_strategy: True if the supervisor has a strategy that reaches the goals of the model.
     """
 
     name: str
@@ -69,6 +70,7 @@ class Description(NamedTuple):
     resets: Tuple[str, ...]
     taus: Tuple[str, ...]
     silent_bound: int
+    has_strategy: bool = False
 
 
 def requesting(infos: Sequence[CommunicationInfo]) -> Tuple[CommunicationInfo, ...]:
@@ -218,6 +220,24 @@ class ControlledSystem(Protocol):
 
     def signature(self) -> Any:
         """Return a hashable value that differs between states."""
+
+
+class StrategicSystem(ControlledSystem, Protocol):
+    """A controlled system with a strategy, which its description says."""
+
+    def observe(self) -> None:
+        """
+        Take in a stable state, for what the strategy remembers of goals and assumptions.
+
+        To observe a state again changes nothing.
+        """
+
+    def choose(self) -> Optional[int]:
+        """
+        Return the number of the request that the strategy chooses in this stable state.
+
+        None if it waits. Goals that are true are noted.
+        """
 
 
 class RobotSide(Protocol):

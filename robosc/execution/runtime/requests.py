@@ -129,11 +129,17 @@ class Decisions:
             enabled = self._steps.enabled = self._find_enabled()
         issued = None
         if enabled:
+            candidates = self.policy.candidates(enabled)
             if self._releases.waiting:
-                ending, others = self._split(enabled)
-                issued = self._issue_one_of(ending, now_s) or self._issue_one_of(others, now_s)
+                ending, others = self._split(candidates)
+                issued = self._issue_one_of(ending, now_s)
+                if issued is None:
+                    # A strategy may choose something else, or nothing: then none of them comes.
+                    if candidates is not enabled:
+                        self._release_waiting()
+                    issued = self._issue_one_of(others, now_s)
             else:
-                issued = self._issue_one_of(enabled, now_s)
+                issued = self._issue_one_of(candidates, now_s)
         self.policy.close(enabled)
         return issued is not None and issued.kind != _MESSAGE
 
@@ -159,6 +165,11 @@ class Decisions:
         }
         ending = tuple([number for number in enabled if self._requests[number].name in names])
         return ending, tuple([number for number in enabled if number not in ending])
+
+    def _release_waiting(self) -> None:
+        """Release what waits for a message that does not come."""
+        for identifier in self._releases.waiting:
+            self._steps.release(identifier)
 
     def _issue_one_of(self, candidates: Tuple[int, ...], now_s: float) -> Optional[Request]:
         """Issue and return the policy's choice, or the next if its data is not known or unfit."""

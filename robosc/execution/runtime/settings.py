@@ -8,7 +8,7 @@ from typing import Any, Dict, Iterable, Mapping, NamedTuple, Optional, Tuple
 
 from robosc.execution.runtime.protocol import Description
 
-POLICIES = ('fair', 'priority', 'random')
+POLICIES = ('fair', 'priority', 'random', 'strategy')
 EVERY = ('period', 'event')
 ON_UNKNOWN = ('default', 'keep', 'fault')
 
@@ -26,7 +26,8 @@ class Settings(NamedTuple):
     Settings that a deployment may choose; `validated` makes them out of plain values.
 
     :ivar period_s: Time between decisions, in seconds.
-    :ivar policy: Policy that chooses the enabled request to issue: `fair`, `priority` or `random`.
+    :ivar policy: Policy that chooses the enabled request to issue: `fair`, `priority`, `random` or
+        `strategy`; None: `strategy` where the supervisor has one, else `fair`.
     :ivar priority: Names of communications, most urgent first, for the policy `priority`.
     :ivar seed: Seed of the policy `random`.
     :ivar every: Times of decisions: each `period`, or after each batch as well (`event`).
@@ -44,7 +45,7 @@ class Settings(NamedTuple):
     """
 
     period_s: float = 0.1
-    policy: str = 'fair'
+    policy: Optional[str] = None
     priority: Tuple[str, ...] = ()
     seed: int = 0
     every: str = 'period'
@@ -90,7 +91,7 @@ def validated(settings: Settings) -> Settings:
     release = settings.release_identifiers
     return Settings(
         period_s=_seconds('period_s', settings.period_s, MINIMUM_PERIOD_S),
-        policy=_choice('policy', settings.policy, POLICIES),
+        policy=None if settings.policy is None else _choice('policy', settings.policy, POLICIES),
         priority=_names('priority', settings.priority),
         seed=_integer('seed', settings.seed),
         every=_choice('every', settings.every, EVERY),
@@ -110,6 +111,10 @@ def settings_for(settings: Settings, description: Description) -> Settings:
     :raises SettingsError: A value is wrong, or a name is none of the model's.
     """
     checked = validated(settings)
+    if checked.policy == 'strategy' and not description.has_strategy:
+        raise SettingsError(
+            "setting 'policy' is 'strategy', but the supervisor has none: its model has no goals"
+        )
     infos = description.communications
     _require_known(
         'priority',

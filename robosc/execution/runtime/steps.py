@@ -8,11 +8,11 @@ within a batch counts as new: a second check gives the same result.
 
 from __future__ import annotations
 
-from typing import Any, Dict, Optional, Tuple
+from typing import Any, cast, Dict, Optional, Tuple
 
 from robosc.execution.runtime.calls import Goals
 from robosc.execution.runtime.livelock import LivelockDetector
-from robosc.execution.runtime.protocol import ControlledSystem, Reading, RobotSide
+from robosc.execution.runtime.protocol import ControlledSystem, Reading, RobotSide, StrategicSystem
 from robosc.execution.runtime.recorder import Recorder
 from robosc.execution.runtime.release import Releases
 from robosc.execution.runtime.safe_stop import request_cancel
@@ -42,6 +42,7 @@ class Steps:
     __slots__ = (
         '_goals',
         '_middleware',
+        '_observes',
         '_on_unknown',
         '_pending',
         '_recorder',
@@ -67,6 +68,7 @@ class Steps:
         self._releases = releases
         self._goals = goals
         self._on_unknown = on_unknown
+        self._observes = system.description.has_strategy
         self.enabled: Optional[Tuple[int, ...]] = None
         self.unchanging: Dict[str, Tuple[Any, bool]] = {}
         # The system's `changes` in the last stable state, or None if the state may not be stable.
@@ -169,6 +171,8 @@ class Steps:
             if event is not None:
                 self._run_on(event)
             self._stable = self._system.changes
+            if self._observes:
+                self._observe()
             if self._goals:
                 self._goals.observe_stable_state()
             for identifier in self._releases.due(issuing):
@@ -183,6 +187,9 @@ class Steps:
         self._middleware.publish_default(identifier)
         self._releases.released(identifier)
         self._recorder.release(identifier)
+
+    def _observe(self) -> None:
+        cast(StrategicSystem, self._system).observe()
 
     def _run_on(self, event: Optional[str]) -> None:
         """Take silent steps after the first one, `event`, until none is enabled."""

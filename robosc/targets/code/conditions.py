@@ -7,6 +7,7 @@ from robosc.automata import System
 from robosc.automata.executable import ExecutableEvent
 from robosc.conditions.rendering import Formulas, in_words, size_in_words
 from robosc.expressions import conjuncts
+from robosc.expressions.text import variable_text
 from robosc.supervisor import DecisionDiagram, DecisionNode, Supervisor
 from robosc.supervisor.diagram import diagram_domains
 from robosc.targets.acceptance import accepting_conditions, enabling_conditions
@@ -58,10 +59,11 @@ class Diagrams(ABC):
 
     def added(self, diagram: DecisionDiagram) -> Condition:
         """Return a condition of the supervisor: a formula where it is short, else functions that share nodes."""
-        words, code = self._diagram(diagram)
+        words, code = self.described(diagram)
         return f"added by the supervisor: {words}", code
 
-    def _diagram(self, diagram: DecisionDiagram) -> Condition:
+    def described(self, diagram: DecisionDiagram) -> Condition:
+        """Return a condition over the state with its formula, or with its size where that is not short."""
         expression = self._formulas.formula(diagram)
         if expression is not None:
             return in_words(expression, self._names), self._scope.truth(expression)
@@ -78,7 +80,7 @@ class Diagrams(ABC):
         if is_new:
             spans = zip(node.starts, node.starts[1:], branches, strict=False)
             tests = [when(self._node_test(node, start, end), Return(branch)) for start, end, branch in spans]
-            subject = node.automaton if node.variable is None else f"{node.automaton}.{node.variable}"
+            subject = node.automaton if node.variable is None else variable_text(node.automaton, node.variable)
             # The last branch needs no test, since a subject always has a value of its domain.
             body: Block = [*tests, Return(branches[-1])]
             self.nodes[code.word] = self._node_function(number, f"Node of the decision diagrams: {subject}.", body)

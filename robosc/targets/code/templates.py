@@ -45,5 +45,6 @@ def shared_values(supervisor: Supervisor, package: str, metadata: PackageMetadat
             field: printable(str(getattr(supervisor.certificate, field)))
             for field in ("safe", "controllable", "nonblocking", "maximally_permissive", "method", "states")
         },
+        "has_strategy": supervisor.strategy is not None,
         "requirements": [printable(text) for text in requirement_texts(supervisor.model)],
     }

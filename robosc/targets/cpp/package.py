@@ -144,7 +144,9 @@ def _context(
     if typed_state is not None:
         types.append(("msg", typed_state))
 
-    declared = tuple(item for item in declarations(released) if item.name not in middleware.without)
+    policy = "fair" if supervisor.strategy is None else "strategy"
+    offered = declarations(released, policy=policy)
+    declared = tuple(item for item in offered if item.name not in middleware.without)
     declared += middleware.parameters
 
     numbers = {identifier: number for number, identifier in enumerate(received_topics(layout))}

@@ -118,7 +118,8 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
             require_names_of_a_layer(found, asked)
             require_own_topics(found, asked, middleware.parts_of_actions)
         values = context(supervisor, name, found, asked, options)
-    declared = (*declarations(release_identifiers(found), str(deployment)), *middleware.parameters)
+    policy = "fair" if supervisor.strategy is None else "strategy"
+    declared = (*declarations(release_identifiers(found), str(deployment), policy), *middleware.parameters)
     typed = set() if options.state_message == StateMessage.JSON else set(middleware.typed_state)
     values["dependencies"] = sorted({*middleware.dependencies, *packages(found, asked), *typed})
     values["parameters"] = [item for item in chosen(declared, options) if item.name not in middleware.without]

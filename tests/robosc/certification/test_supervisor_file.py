@@ -15,7 +15,7 @@ from robosc.certification.supervisor_file import PROPERTIES, FileVerification, v
 from robosc.errors import InvalidSupervisorError
 from robosc.expressions import Binary, Constant
 from robosc.model.check import check
-from robosc.model.structure import Deployment
+from robosc.model.structure import Assumption, Deployment, Goal, GoalForm
 from robosc.source import Bundle
 from robosc.supervisor import Supervisor, decode, encode
 from robosc.supervisor.predicates import state_predicates
@@ -214,6 +214,21 @@ def test_a_number_of_another_kind_is_another_model() -> None:
     assert as_double == as_integer
     assert model_differences(as_double, as_integer) == (
         "requirement 1: expression: 1 < 2 in the supervisor, 1.0 < 2 in the model",
+    )
+
+
+def test_goals_and_assumptions_are_a_part_of_the_model() -> None:
+    model = _supervisor(bundle_of(COUNTER)).model
+    goal, other = Goal(GoalForm.ONCE, Constant(True)), Goal(GoalForm.LEADS_TO, Constant(True), Constant(False))
+    assumed = Assumption(GoalForm.ALWAYS_EVENTUALLY, Constant(True))
+    assert model_differences(change(model, goals=(goal,)), model) == ("goal 1: in the supervisor only",)
+    assert model_differences(change(model, goals=(goal,)), change(model, goals=(other,))) == (
+        "goal 1: form: 'once' in the supervisor, 'leads to' in the model",
+        "goal 1: trigger: nothing in the supervisor, false in the model",
+    )
+    allowed = change(assumed, is_allowed=True)
+    assert model_differences(change(model, assumptions=(assumed,)), change(model, assumptions=(allowed,))) == (
+        "assumption 1: 'allow': no in the supervisor, yes in the model",
     )
 
 

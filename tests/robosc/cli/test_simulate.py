@@ -17,6 +17,7 @@ from robosc.cli.simulation_shell import HELP, Shell
 from robosc.pipeline.saved_runs import ModelOfTest
 from robosc.pipeline.simulation import Run
 from robosc.pipeline.synthesis import synthesize
+from support.lift import LIFT
 
 MODEL = """robot Gate {
     datatype enum Way from double to { value > 0.5 -> free  default -> blocked }
@@ -104,6 +105,8 @@ def test_for_machines(capsys: pytest.CaptureFixture[str]) -> None:
         "provided": 2,
         "skipped": [],
         "unknown": [],
+        "reached": [],
+        "strategy": None,
         "state": {
             "components": {"Sensor": "sensing", "Base": "moving"},
             "variables": {"Sensor.front": "free", "Sensor.number": 1},
@@ -154,6 +157,8 @@ def test_a_saved_log_is_taken_as_events_and_checked(capsys: pytest.CaptureFixtur
         (["--random", "0"], 2, "invalid number of events from 1 to 1000000 value: '0'"),
         (["--finding", "deadlock"], 2, "--finding says what --until-finding looks for: it needs that"),
         (["--json"], 2, "--json and --save need events: --events, --random or --until-finding"),
+        (["--events", "run.txt", "--strategy"], 2, "--strategy says how the controller plays in --random"),
+        (["--random", "3", "--strategy"], 1, "the supervisor of Gate has no strategy: there are no goals to reach"),
         (["--random", "3", "--save", "x.txt"], 2, "x.txt: the name of a saved run ends in .jsonl"),
         (["--random", "3", "--save", "none/x.py"], 2, "cannot write none/x.py: No such file or directory"),
     ],
@@ -218,6 +223,33 @@ def test_commands_from_a_file(capsys: pytest.CaptureFixture[str], monkeypatch: p
     assert Path("run.jsonl").exists()
 
 
+def test_a_controller_follows_its_strategy(capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch) -> None:
+    Path("lift.rscd").write_text(LIFT, encoding="utf-8")
+    monkeypatch.setattr("sys.stdin", typed("arrived\ncall\nundo\ncall\narrived\nstrategy 1\nredo\nundo\nquit\n"))
+    assert main(["simulate", "lift.rscd"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    told = [line.partition(" ")[2].strip() for line in lines if line.startswith(("goals ", "strategy "))]
+    assert told == [
+        *("1 not yet", "call.request"),  # a message that means nothing
+        *("1 not yet", "waits"),  # called
+        *("1 not yet", "call.request"),  # taken back
+        *("1 not yet", "waits"),
+        *("1 not yet", "enter.request"),
+        *("1 true", "waits"),
+        *("1 true", "waits"),
+        *("1 not yet", "enter.request"),
+    ]
+    assert main(["simulate", "lift.rscd", "--random", "8", "--strategy", "--seed", "1", "--json"]) == 0
+    *steps, end = map(json.loads, capsys.readouterr().out.splitlines())
+    own = [step["event"] for step in steps if step["controllable"]]
+    assert own == ["call.request", "enter.request"]
+    assert [step["reached"] for step in steps if step["event"] == "enter.request"] == [[1]]
+    assert steps[-1]["strategy"] is None
+    assert (end["goals"], end["strategy"], end["enabled"]) == ([True], None, ["leave.request"])
+    assert main(["simulate", "lift.rscd", "--until-finding", "30", "--strategy", "--finding", "blocked"]) == 0
+    assert main(["simulate", "lift.rscd", "--until-finding", "30", "--finding", "blocked"]) == 1
+
+
 @pytest.mark.parametrize(
     ("command", "message"),
     [
@@ -228,6 +260,8 @@ def test_commands_from_a_file(capsys: pytest.CaptureFixture[str], monkeypatch: p
         ("why", "why which event? why EVENT"),
         ("undo 0", "N is a number from 1 to 1000000: undo [N]"),
         ("random", "N is a number from 1 to 1000000: random N [SEED]"),
+        ("strategy", "N is a number from 1 to 1000000: strategy N [SEED]"),
+        ("strategy 3", "the supervisor of Gate has no strategy: there are no goals to reach"),
         ("random x", "'x' is not a whole number: random N [SEED]"),
         ("until-finding 1 2 3", "too many words: until-finding [N] [SEED]"),
         ("save", "save to which file?"),

@@ -216,6 +216,54 @@ def test_a_requirement_is_a_sentence(requirement: str, lines: list[str]) -> None
     assert section(sections, "Requirements").lines == lines
 
 
+@pytest.mark.parametrize(
+    ("statement", "title", "lines"),
+    [
+        ("goal always eventually C.a", "Goals", ["The robot reaches again and again C.a."]),
+        ("goal once C.a or C.b", "Goals", ["The robot reaches at least once C.a or C.b."]),
+        (
+            "goal once C.a and !C.b",
+            "Goals",
+            ["The robot reaches at least once a state where all of these hold:", "C.a", "!C.b"],
+        ),
+        ("goal C.a leads to C.b", "Goals", ["Whenever C.a held, the robot reaches later, or at once, C.b."]),
+        ("assume always eventually C.a", "Assumptions", ["The surroundings bring about again and again C.a."]),
+        (
+            "assume allow always eventually C.a",
+            "Assumptions",
+            ["The surroundings bring about again and again, unless the robot itself keeps it from coming true, C.a."],
+        ),
+        (
+            "assume C.a leads to C.b",
+            "Assumptions",
+            ["Whenever C.a held, the surroundings bring about later, or at once, C.b."],
+        ),
+        (
+            "assume allow C.a leads to C.b",
+            "Assumptions",
+            [
+                "Whenever C.a held, the surroundings bring about later, or at once, unless the robot itself keeps it "
+                "from coming true, C.b."
+            ],
+        ),
+    ],
+)
+def test_goals_and_assumptions_are_sentences(statement: str, title: str, lines: list[str]) -> None:
+    sections = read_page(page(model_of(REQUIREMENTS % statement)))
+    assert section(sections, title).lines == lines
+
+
+def test_only_a_robot_with_goals_counts_them() -> None:
+    def counted(*statements: str) -> dict[str, list[str]]:
+        model = model_of(REQUIREMENTS % " ".join(statements))
+        return {row[0]: row[1:] for row in section(read_page(page(model)), "Overview").tables[0]}
+
+    assert not {"goals", "assumptions"} & counted("requirement go needs C.a").keys()
+    found = counted("goal once C.a", "goal once C.b", "assume always eventually C.a", "assume allow C.a leads to C.b")
+    assert found["goals"] == ["2", ""]
+    assert found["assumptions"] == ["2", "1 that the robot may break"]
+
+
 PROVIDES = """robot R {
     component C {
         incoming message go with type: double

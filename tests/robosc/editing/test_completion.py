@@ -5,6 +5,7 @@ from hypothesis import given
 
 from robosc.editing.completion import Candidate, Surroundings, complete
 from robosc.editing.names import Names
+from robosc.editing.place import place_at
 from robosc.language import load_bundle, parse, syntax
 from robosc.language.tokens import Kind, tokenize
 from robosc.model.check import check, inspect
@@ -66,7 +67,7 @@ def check_every_word(bundle: Bundle, step: int) -> int:
     return count
 
 
-@given(models())
+@given(models(goals=True))
 def test_every_word_of_a_random_model_is_offered(bundle: Bundle) -> None:
     if check(bundle).model is not None:
         check_every_word(bundle, 9)
@@ -211,6 +212,56 @@ def test_behind_not_stands_an_operand() -> None:
 def test_behind_what_is_called_not_stands_an_operator_too() -> None:
     found = offered(NEGATED.replace("NAME", "not").replace("?", ""))
     assert {"Door", "true", "not", "and", "or"} <= found.keys()
+
+
+AIMED = """robot R {{
+    component goal {{
+        outgoing message seen with type: none
+        behaviour {{ initial marked state shut {{ on response from seen goto open }} marked state open {{ }} }}
+    }}
+    requirement never goal.shut and goal.open
+    {}
+}}"""
+
+
+@pytest.mark.parametrize(
+    ("words", "expected", "unfit"),
+    [
+        ("|", {"goal", "assume", "requirement"}, {"always", "once", "leads"}),
+        ("goal |", {"always", "once", "goal", "not", "true"}, {"eventually", "allow", "seen", "and"}),
+        ("goal al|", {"always"}, set()),
+        ("goal always |", {"eventually"}, {"always", "once", "true"}),
+        ("goal always eventually |", {"goal", "not", "if"}, {"eventually", "always", "leads"}),
+        ("goal always eventually goal.|", {"shut", "open"}, {"goal"}),
+        ("goal once |", {"goal", "not"}, {"once", "always"}),
+        ("goal goal.open |", {"leads", "and", "or"}, {"to", "always"}),
+        ("goal goal.open leads |", {"to"}, {"leads", "goal"}),
+        ("goal goal.open leads to |", {"goal", "not"}, {"to"}),
+        ("assume |", {"allow", "always", "goal"}, {"once", "eventually"}),
+        ("assume allow |", {"always", "goal"}, {"once", "allow"}),
+        ("assume allow always |", {"eventually"}, {"once", "allow"}),
+        ("goal once goal.open assume goal.open leads to goal.|", {"open"}, {"goal"}),
+    ],
+)
+def test_the_words_of_goals_are_offered(words: str, expected: set[str], unfit: set[str]) -> None:
+    found = offered(AIMED.format(words)).keys()
+    assert expected <= found
+    assert not unfit & found
+
+
+def test_goals_begin_items_and_names_do_not() -> None:
+    def item(words: str) -> str:
+        place = place_at(f"robot R {{ {words} ", len(words) + len("robot R {  "))
+        assert place is not None
+        return " ".join(place.item)
+
+    for before in ("requirement a needs b", "requirement a needs 1", "provide m with goal.once", "component C { }"):
+        for word in ("goal once", "assume allow"):
+            assert item(f"{before} {word}") == word, before
+    for words in ("component goal", "constant assume", "requirement a needs not goal", "goal once goal", "goal goal"):
+        assert item(words) == words
+    assert item("component C { behaviour { variable goal") == "variable goal"
+    assert item("datatype object O { a: T goal") == "a : T goal"
 
 
 FIELDS = """robot R {

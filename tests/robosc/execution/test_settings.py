@@ -2,7 +2,14 @@ from typing import Any
 
 import pytest
 
-from robosc.execution.runtime.settings import Settings, SettingsError, settings_for, settings_from
+from robosc.execution.runtime.settings import (
+    POLICIES,
+    Settings,
+    SettingsError,
+    require_settings_of,
+    settings_for,
+    settings_from,
+)
 from support.execution import bench, system_of
 
 ROBOT = """
@@ -49,7 +56,7 @@ def test_plain_values_become_settings() -> None:
         ({"period_s": float("nan")}, "period_s"),
         ({"period_s": "1"}, "period_s"),
         ({"period_s": True}, "period_s"),
-        ({"policy": "best"}, "one of fair, priority, random"),
+        ({"policy": "best"}, "one of fair, priority, random, strategy"),
         ({"every": 3}, "one of period, event"),
         ({"on_unknown": "ignore"}, "one of default, keep, fault"),
         ({"seed": 1.5}, "an integer"),
@@ -68,6 +75,25 @@ def test_a_wrong_setting_is_refused_in_words(given: dict[str, Any], message: str
     with pytest.raises(SettingsError, match=r".*") as caught:
         settings_for(settings_from(given), DESCRIPTION)
     assert message in str(caught.value)
+
+
+def test_without_a_policy_it_is_the_strategy_where_there_is_one() -> None:
+    assert Settings().policy is None
+    assert settings_from({"policy": None}).policy is None
+    assert settings_for(Settings(), DESCRIPTION).policy is None
+    assert bench(ROBOT).executor.settings.policy == "fair"
+    with_goals = DESCRIPTION._replace(has_strategy=True)
+    assert settings_for(Settings(policy="strategy"), with_goals).policy == "strategy"
+    assert settings_for(Settings(policy="fair"), with_goals).policy == "fair"
+    with pytest.raises(SettingsError, match="the supervisor has none: its model has no goals"):
+        settings_for(Settings(policy="strategy"), DESCRIPTION)
+
+
+def test_a_layer_has_no_policy_to_set() -> None:
+    require_settings_of(Settings(), "layer")
+    for policy in POLICIES:
+        with pytest.raises(SettingsError, match="'policy' means nothing in the deployment 'layer'"):
+            require_settings_of(Settings(policy=policy), "layer")
 
 
 def test_an_executor_checks_its_settings() -> None:

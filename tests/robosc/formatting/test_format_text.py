@@ -131,7 +131,7 @@ def test_files_keep_all_but_their_layout(name: str) -> None:
     assert_only_the_layout_changes(FILES[name])
 
 
-@given(models())
+@given(models(goals=True))
 @settings(max_examples=examples(40))
 def test_random_models_keep_all_but_their_layout(bundle: object) -> None:
     for file in bundle.files:  # type: ignore[attr-defined]
@@ -221,6 +221,26 @@ LONG = "Component.remaining"
         ("requirement x needs then(1)and then>else", "requirement x needs then(1) and then > else"),
         ("requirement always(a)", "requirement always (a)"),
         ("requirement always-a<b", "requirement always -a < b"),
+        ("goal   always\neventually(a)", "goal always eventually (a)"),
+        ("goal once-a<b", "goal once -a < b"),
+        ("goal once-a<b leads   to!c", "goal once - a < b leads to !c"),
+        ("goal once(a)", "goal once (a)"),
+        ("goal once leads to once", "goal once leads to once"),
+        ("assume\nallow(a)leads to b", "assume allow (a) leads to b"),
+        ("assume allow leads to-1<b", "assume allow leads to -1 < b"),
+        ("assume always  eventually not a", "assume always eventually not a"),
+        (
+            f"goal {LONG} and {LONG} and {LONG} or {LONG} leads to {LONG} and {LONG} and {LONG}",
+            f"goal {LONG} and {LONG} and {LONG} or {LONG}\n    leads to {LONG} and {LONG} and {LONG}",
+        ),
+        (
+            f"goal ({LONG} and {LONG} and {LONG} and {LONG} and {LONG} and {LONG}) leads to {LONG}",
+            f"goal (\n    {LONG}\n" + f"    and {LONG}\n" * 5 + f") leads to {LONG}",
+        ),
+        (
+            f"goal once {LONG} and {LONG} and {LONG} and {LONG} and {LONG} and {LONG}",
+            f"goal once {LONG}\n" + "\n".join([f"    and {LONG}"] * 5),
+        ),
         ("requirement always-a<b disables c", "requirement always - a < b disables c"),
         (
             "requirement x needs if(a)then(b)else(c)and any(y in a . b [ 1 .. 2 ] . c :y)",

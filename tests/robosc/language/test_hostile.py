@@ -61,6 +61,10 @@ def both(times: int, before: str, after: str) -> str:
             + " := 1 } } }",
             "nesting-too-deep",
         ),
+        ("robot R { goal once " + "(" * 201 + "a" + ")" * 201 + " }", "nesting-too-deep"),
+        ("robot R { goal once -" + "(" * 201 + "a" + ")" * 201 + " }", "nesting-too-deep"),
+        ("robot R { goal " + "!" * 201 + "a leads to a }", "nesting-too-deep"),
+        ("robot R { assume allow a leads to a" + " + a" * 201 + " }", "nesting-too-deep"),
         ("robot R { provide r with " + "{ a: " * 201 + "1" + " }" * 201 + " }", "nesting-too-deep"),
         ("robot R { datatype object O { x: " + "array(" * 201 + "double" + ")" * 201 + " } }", "nesting-too-deep"),
         ("robot " + "r" * 1_000_000 + " { }", "name-too-long"),
@@ -105,6 +109,11 @@ LARGE: dict[str, Callable[[int], str]] = {
     "operators": lambda n: (
         "robot R { component C { incoming message m with type: none behaviour { initial marked state s { } } } "
         "requirement m needs C.s" + " and C.s" * n + " }"
+    ),
+    "goals": lambda n: (
+        "robot R { component C { incoming message m with type: none behaviour { initial marked state s { } } }\n"
+        + "goal once C.s\ngoal C.s leads to C.s\nassume allow always eventually C.s\n" * n
+        + "}"
     ),
     "actions": lambda n: (
         "robot R { interface i use T from p\n"

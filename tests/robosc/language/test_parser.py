@@ -317,6 +317,24 @@ def test_a_long_hostile_text_takes_no_time_worth_mentioning(piece: str) -> None:
     faults(piece * 300_000)
 
 
+@pytest.mark.timeout(60)
+@pytest.mark.parametrize(
+    "piece",
+    [
+        "goal ",
+        "assume allow ",
+        "goal once not ",
+        "goal once - ",
+        "once - ",
+        "goal x leads to ",
+        "goal always eventually x ",
+    ],
+)
+def test_nor_does_a_long_row_of_words_of_goals(piece: str) -> None:
+    faults("robot R { " + piece * 100_000)
+    faults("robot R { goal " + piece * 100_000)
+
+
 @pytest.mark.parametrize("end", ["", "\n", "\n\n"])
 def test_the_end_of_a_file_is_found_with_and_without_a_line_end(end: str) -> None:
     (found,) = faults("robot R {" + end)

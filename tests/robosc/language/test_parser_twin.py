@@ -27,6 +27,12 @@ from support.models import EXAMPLES
 HIDDEN = ("empty-file", "unclosed-comment", "unclosed-string")
 """Errors that the parser reports before it reads anything; the twin stops there, or at an error before it."""
 
+UNFIT = re.compile(
+    "so it has no|what must never be|has no 'allow'|stands here twice|stands behind 'always'|or 'leads to' behind|"
+    "in one statement"
+)
+"""Messages about goals and assumptions that are told of a word before the one that fits nowhere."""
+
 OPTIONS = ("qos", "depth", "max_age", "stamped", "when")
 
 FILES = tuple(sorted([*EXAMPLES.rglob("*.rscd"), *CORPUS.rglob("*.rscd")]))
@@ -81,6 +87,10 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
     if fault.fix == "Write '{' before it." and fault.message.endswith("expected '{'"):
         # The sign behind the name shows that it is the first of several, or the name of a property.
         return stops is not None and stops >= here
+    if UNFIT.search(fault.message) or fault.fix == "Write 'eventually' before it.":
+        # A word of goals and assumptions that does not fit is told of, not the begin of the expression behind it; of a
+        # goal without a form, the begin. `always -x` lacks a word although `always -x leads to` could become of it.
+        return stops is not None and stops >= here
     if re.search(r"Write '.+' instead of '\w+(/|::|$)", fault.fix) and "a type" in fault.message:
         return stops is not None and stops > here
     if "is never closed" in fault.message or "cannot stand before '!'" in fault.message:
@@ -102,9 +112,11 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
     if token == "if" and tokens.texts[at - 1] == "not":
         # Without its end it is no conditional, so that `not` is a name.
         return True
-    # What follows shows that `3 needs x` wants a name, and `integer < x` something else than this word.
+    # What follows shows that `3 needs x` wants a name, and `integer < x` something else than this word; and that an
+    # item begins behind a name `not`.
     is_next = offset(text, *stops) == tokens.starts[at + 1]
-    return is_next and (following == "needs" or token in ("integer", "double"))
+    is_item = token in ("goal", "assume") and tokens.texts[at - 1] == "not"
+    return is_next and (following == "needs" or token in ("integer", "double") or is_item)
 
 
 def offset(text: str, line: int, column: int) -> int:
@@ -334,6 +346,9 @@ PLACES = (
     "robot R {{ component C {{ behaviour {{ initial state S {{ transition if {} goto S }} }} }} }}",
     "robot R {{ component C {{ incoming message m with when: {}, type: none }} }}",
     "library L {{ constant c: double = {} provide m with c }}",
+    "robot R {{ goal {} leads to {} assume allow {} leads to {} }}",
+    "robot R {{ goal always eventually {} goal once {} assume allow always eventually {} }}",
+    "library L {{ goal {} leads to x assume always eventually x }}",
 )
 """Texts in which an expression is wanted, with something behind it."""
 
@@ -341,7 +356,7 @@ PLACES = (
 @pytest.mark.parametrize("place", PLACES)
 def test_expressions_wherever_one_may_stand(place: str) -> None:
     for expression in EXPRESSIONS:
-        compare(place.format(expression))
+        compare(place.replace("{}", expression).replace("{{", "{").replace("}}", "}"))
 
 
 @pytest.mark.parametrize("word", [*WORDS, "state", "needs", "value", "integer"])
@@ -358,6 +373,8 @@ def test_words_as_names(word: str) -> None:
         f"robot R {{ requirement {word} disables {word} requirement {word}.{word} disables {{}} }}",
         f"library R {{ constant {word}: {word} = {word} requirement never {word} requirement always {word}.{word} }}",
         f"robot R {{ provide m with {{ {word}: {word}, {word}: {{ {word}: if {word} then {word} else {word} }} }} }}",
+        f"robot R {{ goal {word} leads to {word} goal once {word} goal always eventually {word}.{word} }}",
+        f"robot R {{ assume {word} leads to {word} assume allow {word} leads to {word} goal {word} = 1 leads to x }}",
         f"robot R {{ requirement m needs any({word} in {word}[{word}..{word}]: {word}) = min({word}, {word}) }}",
     )
     trees = [compare(text) for text in texts]
@@ -368,18 +385,108 @@ def test_words_as_names(word: str) -> None:
 
 
 def test_not_takes_no_meaning_from_a_text() -> None:
-    """A text that the grammar without the operator reads is read like that, but for calls: `not` is no function."""
+    """A text that the grammar without the operator reads is read like that, but for calls: `not` is no function.
+
+    Goals and assumptions are younger than the operator: before them it takes what follows.
+    """
     read = 0
-    for seed in range(300):
+    for seed in range(600):
         random = Random(seed)
         tokens = ["not" if token in WORDS and random.random() < 0.4 else token for token in grammar_tokens(random, 60)]
         text = joined(tokens, random)
         before = textx_parser.parse(SourceFile("model.rscd", text), has_not=False).tree
-        calls = [part for part in parts(before) if isinstance(part, syntax.Call) and part.function.text == "not"]
-        if before is not None and not calls:
+        younger = [
+            part
+            for part in parts(before)
+            if isinstance(part, syntax.Goal | syntax.Assumption)
+            or (isinstance(part, syntax.Call) and part.function.text == "not")
+        ]
+        if before is not None and not younger:
             assert compare(text) == before
             read += "not" in tokens
     assert read > 50
+
+
+GOALS = {
+    "goal once x": "once",
+    "goal once (x)": "once",
+    "goal once x.y leads to z": None,
+    "goal once.x leads to y": "leads to",
+    "goal once leads to x": "leads to",
+    "goal once leads": "once",
+    "goal once leads to": None,
+    "goal ^once leads to x": "leads to",
+    "goal once - x > 3 leads to y": "leads to",
+    "goal once - x > 3": "once",
+    "goal once -!x leads to y": "leads to",
+    "goal once = x leads to y": "leads to",
+    "goal once[1] = x leads to y": "leads to",
+    "goal once(x) leads to y": None,
+    "goal once once": "once",
+    "goal once always eventually x": None,
+    "goal always eventually x": "always eventually",
+    "goal always eventually (x)": "always eventually",
+    "goal always eventually eventually": "always eventually",
+    "goal always eventually leads": "always eventually",
+    "goal always eventually x leads to y": None,
+    "goal always ^eventually leads to y": None,
+    "goal always leads to always": "leads to",
+    "goal always.x leads to eventually": "leads to",
+    "goal always - 1 > 2 leads to y": "leads to",
+    "goal always -x < 2": None,
+    "goal always x": None,
+    "goal eventually leads to x": "leads to",
+    "goal eventually x": None,
+    "goal never.x leads to x": "leads to",
+    "goal never x": None,
+    "goal goal leads to goal": "leads to",
+    "goal leads leads to leads": "leads to",
+    "goal allow and x leads to y": "leads to",
+    "goal allow x leads to y": None,
+    "goal x leads y": None,
+    "goal x": None,
+    "goal not leads to not": "leads to",
+    "goal once not": "once",
+    "goal not goal leads to goal": "leads to",
+    "goal not leads leads to x": "leads to",
+    "goal x => y leads to z": "leads to",
+    "goal": None,
+    "assume x leads to y": "leads to",
+    "assume allow leads to y": "leads to",
+    "assume allow allow leads to y": "leads to",
+    "assume allow allow allow leads to y": None,
+    "assume allow always leads to y": "leads to",
+    "assume allow always eventually y": "always eventually",
+    "assume allow (x) leads to y": "leads to",
+    "assume allow - x > 1 leads to y": "leads to",
+    "assume once x": None,
+    "assume once leads to x": "leads to",
+    "assume": None,
+}
+"""Begins of goals and assumptions, and their forms; None: neither parser reads them."""
+
+
+@pytest.mark.parametrize("text", GOALS)
+def test_words_of_goals(text: str) -> None:
+    for following in (
+        "",
+        " goal once x",
+        " assume x leads to y",
+        " requirement m needs x",
+        " constant c: boolean = true",
+        " provide m with x",
+    ):
+        tree = compare(f"robot R {{ {text}{following} }}")
+        assert (None if tree is None else tree.items[0].form) == GOALS[text], following  # type: ignore[union-attr]
+
+
+def test_allow_is_a_word_where_no_expression_begins_with_it() -> None:
+    texts = {"x leads to y": False, "allow leads to y": False, "allow.x leads to y": False, "allow x leads to y": True}
+    texts |= {"allow - x > 1 leads to y": False, "allow (x) leads to y": True, "allow always eventually y": True}
+    for text, is_allowed in texts.items():
+        tree = compare(f"robot R {{ assume {text} }}")
+        assert tree is not None
+        assert tree.items[0].is_allowed == is_allowed, text  # type: ignore[union-attr]
 
 
 REQUIREMENTS = {

@@ -115,7 +115,7 @@ def check_bindings(bundle: Bundle, step: int = 1) -> int:
     return len(names.definitions)
 
 
-@given(models())
+@given(models(goals=True))
 def test_definitions_of_random_models_can_be_renamed(bundle: Bundle) -> None:
     if check(bundle).model is not None:
         check_bindings(bundle, step=5)

@@ -489,6 +489,18 @@ EXTENSION_RULES: list[tuple[str, str, str, str]] = [
         robot(component("variable v: integer(0..3) " + STATES), "requirement never C.v > 1"),
     ),
     (
+        "double-in-synthesis",
+        "error",
+        robot(component("variable v: §double " + STATES), "goal C.a leads to C.v > 1"),
+        robot(component("variable v: integer(0..3) " + STATES), "goal C.a leads to C.v > 1"),
+    ),
+    (
+        "goal-in-library",
+        "error",
+        f"library L {{ {component(STATES)} §assume allow always eventually C.a }}",
+        robot(component(STATES), "assume allow always eventually C.a"),
+    ),
+    (
         "option-not-allowed",
         "error",
         robot("component C { incoming message m with type: none, §max_age: 1.0 }"),

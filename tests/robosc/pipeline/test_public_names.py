@@ -10,7 +10,17 @@ import robosc
 
 FUNCTIONS = ["check", "explain", "explore", "generate", "load", "simulate", "synthesize", "verify"]
 VALUES = [
-    *("Condition", "Conditions", "Deployment", "Diagnostic", "Explained", "Exploration", "Findings", "GenerateOptions"),
+    *(
+        "Choice",
+        "Condition",
+        "Conditions",
+        "Deployment",
+        "Diagnostic",
+        "Explained",
+        "Exploration",
+        "Findings",
+        "GenerateOptions",
+    ),
     *("Generation", "LoadedAutomata", "LoadedModel", "NoSupervisor", "Progress", "Run", "Severity", "Step", "Summary"),
     *(
         "Supervisor",
@@ -21,7 +31,7 @@ VALUES = [
         "SystemSupervisor",
         "SystemSynthesis",
     ),
-    *("Verification", "VerificationStatus", "WalkFinding", "WalkFindingKind"),
+    *("GoalApproach", "Goals", "Verification", "VerificationStatus", "WalkFinding", "WalkFindingKind"),
 ]
 ERRORS = [
     *(
@@ -33,7 +43,14 @@ ERRORS = [
         "InternalError",
         "InvalidSupervisorError",
     ),
-    *("InvalidSystemError", "LanguageError", "NodeLimitError", "NothingGeneratedError", "OverwriteError"),
+    *(
+        "InvalidSystemError",
+        "LanguageError",
+        "NoStrategyError",
+        "NodeLimitError",
+        "NothingGeneratedError",
+        "OverwriteError",
+    ),
     *("RequestError", "RoboscError", "SynthesisCancelled", "UnknownCodeError", "UnknownEngineError"),
     *("UnknownEventError", "UnknownNameError", "UnknownTargetError", "UnsupportedModelError"),
 ]

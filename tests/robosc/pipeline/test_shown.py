@@ -11,6 +11,7 @@ import pytest
 import robosc
 from robosc.supervisor import Supervisor as CoreSupervisor
 from robosc.tables import MAXIMUM_ROWS, html_table, html_text
+from support.lift import LIFT
 from support.models import EMPTY, EXAMPLES
 
 NAVIGATION = EXAMPLES / "navigation" / "navigation.rscd"
@@ -117,6 +118,46 @@ def test_a_supervisor_in_figures(supervisor: robosc.Supervisor) -> None:
     assert repr(CoreSupervisor(supervisor.model, supervisor.deployment, (), supervisor.certificate)) == (
         "<supervisor of Navigation: controller, 784 states, conditions added to 0 events>"
     )
+
+
+def test_goals_and_what_is_chosen_for_them_are_told(tmp_path: Path) -> None:
+    made = robosc.synthesize(robosc.load(text=LIFT)).supervisor
+    assert made is not None and made.strategy is not None
+    assert repr(made).endswith(", a strategy for 1 goal>")
+    (goal,) = made.goals
+    assert (goal.goal, [item.event for item in goal.choices]) == ("once Base.inside", ["call.request", "enter.request"])
+    assert (
+        str(made.goals)
+        == """\
+once Base.inside:
+  call.request where Lift.away and assumption 1 is not owed
+  enter.request where Lift.here
+  nothing otherwise"""
+    )
+    assert (repr(made.goals), repr(goal)) == ("<1 goal>", "<once Base.inside: requests call.request, enter.request>")
+    assert repr(goal.choices[0]) == "<call.request where Lift.away and assumption 1 is not owed>"
+    assert "enter.request" in made.goals._repr_html_() and made.goals._repr_html_() in made._repr_html_()
+    assert re.search(r">goals</td><td[^>]*>passed<", made._repr_html_())
+    assert "for goal 1, once Base.inside" in str(made)
+    for again in (robosc.Supervisor.read(made.write(tmp_path / "lift.rsup")), pickle.loads(pickle.dumps(made))):
+        assert (again.strategy, again.goals) == (made.strategy, made.goals)
+        assert robosc.simulate(again).chosen == "call.request"
+
+
+def test_a_choice_without_a_formula_is_told_node_by_node(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robosc.conditions.rendering.Formulas.formula", lambda *arguments, **options: None)
+    made = robosc.synthesize(robosc.load(text=LIFT)).supervisor
+    assert made is not None
+    assert """
+  enter.request where a decision diagram of 1 node, to be read from [1] on:
+[1] Lift.here
+""" in str(made.goals)
+
+
+def test_without_goals_none_are_told(supervisor: robosc.Supervisor) -> None:
+    assert (supervisor.strategy, len(supervisor.goals), str(supervisor.goals)) == (None, 0, "no goals")
+    assert repr(supervisor.goals) == "<no goals>"
+    assert "goal" not in repr(supervisor) + str(supervisor) + supervisor._repr_html_()
 
 
 def test_values_cannot_be_changed_and_can_be_pickled(supervisor: robosc.Supervisor) -> None:

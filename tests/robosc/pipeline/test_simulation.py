@@ -7,6 +7,8 @@ import pytest
 
 import robosc
 from robosc.automata import to_automata
+from robosc.automata.state import subjects
+from robosc.controller_properties import StrategyRun
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.expressions import (
     ArrayType,
@@ -20,7 +22,9 @@ from robosc.expressions import (
 )
 from robosc.model.structure import EventKind, Model, is_tau
 from support.effort import seeds
+from support.lift import LIFT
 from support.models import EXAMPLES
+from support.random_goals import strategic_controller
 from support.random_supervisors import random_data, random_supervisor
 
 STEPS = 40
@@ -245,3 +249,81 @@ def _navigation() -> robosc.Supervisor:
     made = robosc.synthesize(EXAMPLES / "navigation" / "navigation.rscd").supervisor
     assert made is not None
     return made
+
+
+@pytest.mark.random
+@pytest.mark.parametrize("seed", seeds(40))
+def test_what_the_strategy_chooses_in_a_random_run_is_what_its_check_says(seed: int) -> None:
+    core = next(found for number in range(seed * 100, seed * 100 + 400) if (found := strategic_controller(number)))
+    dice, run, met = Random(f"strategy {seed}"), robosc.simulate(core), 0
+    assert core.strategy is not None and run.has_strategy
+    twin = StrategyRun(core.executable, core.strategy)
+    system = core.executable.executed_automata
+    # Messages have one location, which the interpreter does not keep.
+    places = [
+        ((item.automaton, item.variable), system.automaton(item.automaton).locations[0]) for item in subjects(system)
+    ]
+    memory, mode, kept = twin.memory, 0, [(run.reached, run.chosen)]
+    for number in range(30):
+        state: tuple[Any, ...] = tuple(run._system._state.get(place, only) for place, only in places)
+        if run._system.is_stable():
+            memory = twin.observed(state, memory)
+            chosen, mode = twin.decided(state, memory, mode)
+            assert (run.chosen, run.reached) == (chosen, twin.goals(state, memory))
+            met += 1
+        else:
+            assert run.chosen is None
+        kept[number:] = [(run.reached, run.chosen)]
+        taken = run.walk(1, dice.randrange(1000), strategy=dice.random() < 0.5)
+        if not taken:
+            break
+        # Taken back and again, the memory of goals comes along.
+        run.undo()
+        assert (run.reached, run.chosen) == kept[number]
+        run.redo()
+    assert met
+    while run.undo():
+        assert (run.reached, run.chosen) == kept[len(run)]
+    run.restart()
+    assert (run.reached, run.chosen) == kept[0]
+
+
+def test_a_walk_that_follows_the_strategy_requests_what_it_chooses_alone() -> None:
+    # Nothing is in the way of waving, and no goal needs it.
+    waving = LIFT.replace(
+        "    component Base {\n", "    component Base {\n        incoming message wave with type: none\n"
+    )
+    run = robosc.simulate(robosc.synthesize(robosc.load(text=waving)).supervisor)  # type: ignore[arg-type]  # it is there
+    assert set(run.enabled) == {"call.request", "wave.request"}
+    run.walk(40, 1, strategy=True)
+    assert [step.event for step in run.history if step.is_controllable] == ["call.request", "enter.request"]
+    assert len(run) == 40 and "wave.request" in run.enabled
+    run.restart()
+    assert run.walk_until_finding(40, 1, {robosc.WalkFindingKind.BLOCKED}, strategy=True) is None
+    assert "wave.request" not in {step.event for step in run.history}
+    run.walk(40, 1)
+    assert "wave.request" in {step.event for step in run.history}
+
+
+def test_a_strategy_that_is_not_there_is_not_followed(run: robosc.Run) -> None:
+    assert (run.has_strategy, run.chosen, run.reached) == (False, None, ())
+    for walk in (run.walk, run.walk_until_finding):
+        with pytest.raises(robosc.NoStrategyError, match="the supervisor of R has no strategy"):
+            walk(3, strategy=True)
+    assert len(run) == 0
+
+
+def test_what_was_taken_back_is_not_remembered_of_goals() -> None:
+    run = robosc.simulate(robosc.synthesize(robosc.load(text=LIFT)).supervisor)  # type: ignore[arg-type]  # there is one
+    for event in ("call", "arrived", "enter"):
+        run.step(run.event_called(event))
+    assert (run.history[-1].reached, run.reached, run.chosen) == ((1,), (True,), None)
+    run.undo()
+    # What comes instead finds the goal as it was before.
+    assert run.step("arrived.response").chosen == "enter.request"
+    assert run.reached == (False,)
+    run.undo()
+    assert run.step("enter.request").reached == (1,)
+    run.restart()
+    assert run.step("arrived.response").chosen == "call.request"
+    assert run.reached == (False,)

@@ -12,9 +12,9 @@ from hypothesis import strategies as st
 from robosc.automata import to_automata
 from robosc.certification import make_supervisor
 from robosc.errors import InvalidSupervisorError, UnsupportedModelError
-from robosc.expressions import TRUE, Constant, Unary
-from robosc.model.structure import Deployment, Requirement, RequirementForm
-from robosc.supervisor import Supervisor
+from robosc.expressions import TRUE, Binary, Constant, StateTest, Unary, VariableRead
+from robosc.model.structure import Assumption, Deployment, Goal, GoalForm, Requirement, RequirementForm
+from robosc.supervisor import Strategy, Supervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES, MAXIMUM_EXPRESSION_DEPTH, decode, encode
 from support.damaged_json import change_value
 from support.effort import examples
@@ -43,6 +43,30 @@ def with_requirement(expression: Any) -> Supervisor:
     return msgspec.structs.replace(made, model=msgspec.structs.replace(made.model, requirements=(requirement,)))
 
 
+def with_goals() -> Supervisor:
+    """A supervisor of a model with goals and assumptions of every form."""
+    made = supervisor()
+    idle, few = StateTest("Base", "idle"), Binary("<", VariableRead("Base", "failures"), Constant(2))
+    goals = (
+        Goal(GoalForm.ALWAYS_EVENTUALLY, idle),
+        Goal(GoalForm.LEADS_TO, idle, few),
+        Goal(GoalForm.ONCE, few),
+    )
+    assumptions = (Assumption(GoalForm.ALWAYS_EVENTUALLY, few), Assumption(GoalForm.LEADS_TO, idle, few, True))
+    return msgspec.structs.replace(
+        made,
+        model=msgspec.structs.replace(made.model, goals=goals, assumptions=assumptions),
+        certificate=msgspec.structs.replace(made.certificate, goals="not checked"),
+        strategy=Strategy(((),) * len(goals)),
+    )
+
+
+def document_with_goals() -> dict[str, Any]:
+    found = json.loads(encode(with_goals()))
+    assert isinstance(found, dict)
+    return found
+
+
 def negations(depth: int) -> Any:
     expression: Any = TRUE
     for _ in range(depth):
@@ -65,6 +89,16 @@ class TestRoundTrip:
         assert repr(x[1]) == "Constant(value=1.0)"
         assert repr(y[1].operand) == "Constant(value=2)"
         assert repr(made.component("Sensor").behaviour.variables[2].initial) == "1.0"
+
+    def test_goals_there_and_back(self) -> None:
+        made = with_goals()
+        assert decode(encode(made)) == made
+        assert encode(decode(encode(made))) == encode(made)
+        assert type(decode(encode(made)).model.goals[0].form) is GoalForm
+
+    def test_without_goals_nothing_is_written_of_them(self) -> None:
+        assert b'"goals"' in encode(with_goals()) and b'"assumptions"' in encode(with_goals())
+        assert b'"goals"' not in canonical() and b'"assumptions"' not in canonical()
 
     def test_other_layouts_are_read(self) -> None:
         assert decode(json.dumps(document(), indent=3).encode()) == supervisor()
@@ -310,6 +344,72 @@ def test_inconsistent(path: Any, new: Any, words: str) -> None:
     assert str(caught.value).isprintable()
 
 
+NUMBER = {"node": "constant", "value": 1}
+RECEIVED = {"node": "received", "path": []}
+ASIDE = {
+    "node": "binary",
+    "operator": "<",
+    "left": {"node": "variable", "component": "Sensor", "variable": "level"},
+    "right": NUMBER,
+}
+"""A condition on a variable that does not take part in synthesis."""
+
+INCONSISTENT_GOALS: list[tuple[str, Any, str]] = [
+    ("goals.0.form", "leads to", "goal 1: the form 'leads to' has a trigger"),
+    ("goals.0.form", "sometimes", "malformed"),
+    ("goals.0.trigger", NUMBER, "goal 1: the form 'leads to' has a trigger"),
+    ("goals.1.form", "always eventually", "goal 2: the form 'leads to' has a trigger"),
+    ("goals.1.form", "once", "goal 2: the form 'leads to' has a trigger"),
+    ("goals.1.trigger", None, "goal 2: the form 'leads to' has a trigger"),
+    ("goals.1.trigger", NUMBER, "goal 2: a condition is .*, not boolean"),
+    ("goals.1.trigger", ASIDE, "Sensor.level is read in synthesis"),
+    ("goals.1.condition", NUMBER, "goal 2: a condition is .*, not boolean"),
+    ("goals.2.condition", {"node": "state", "component": "Base", "state": "flying"}, "goal 3: .*no state"),
+    ("goals.2.condition", RECEIVED, "goal 3: "),
+    ("goals.2.condition", ASIDE, "Sensor.level is read in synthesis"),
+    ("goals.2.condition", "idle", "malformed"),
+    ("goals.2.is_allowed", True, "unknown field 'is_allowed'"),
+    ("goals.2", {"form": "once"}, "malformed"),
+    ("goals", {}, "malformed"),
+    ("goals", None, "malformed"),
+    ("assumptions.0.form", "once", "assumption 1: an assumption has not the form 'once'"),
+    ("assumptions.0.trigger", ASIDE, "assumption 1: the form 'leads to' has a trigger"),
+    ("assumptions.0.condition", ASIDE, "Sensor.level is read in synthesis"),
+    ("assumptions.1.is_allowed", 1, "malformed"),
+    ("assumptions.1.is_allowed", "yes", "malformed"),
+    ("assumptions.1.trigger", RECEIVED, "assumption 2: "),
+    ("assumptions.1.trigger", {"node": "constant", "value": "yes"}, "assumption 2: .*not boolean"),
+    ("assumptions.1.hope", True, "unknown field 'hope'"),
+]
+
+
+@pytest.mark.parametrize(("path", "new", "words"), INCONSISTENT_GOALS)
+def test_inconsistent_goals(path: Any, new: Any, words: str) -> None:
+    value = document_with_goals()
+    decode(as_bytes(value))
+    *place, last = [int(key) if key.isdigit() else key for key in path.split(".")]
+    at(value["supervisor"]["model"], place)[last] = new
+    with pytest.raises(InvalidSupervisorError) as caught:
+        decode(as_bytes(value))
+    assert re.search(words, str(caught.value)), str(caught.value)
+    assert str(caught.value).isprintable()
+
+
+def test_goals_nest_no_deeper_than_requirements() -> None:
+    for depth, is_read in ((MAXIMUM_EXPRESSION_DEPTH - 1, True), (600, False)):
+        value = document_with_goals()
+        value["supervisor"]["model"]["assumptions"][1]["trigger"] = "HERE"
+        nested = (
+            '{"node":"unary","operator":"not","operand":' * depth + '{"node":"constant","value":true}' + "}" * depth
+        )
+        data = as_bytes(value).replace(b'"HERE"', nested.encode())
+        if is_read:
+            assert decode(data)
+        else:
+            with pytest.raises(InvalidSupervisorError, match="nested too deeply"):
+                decode(data)
+
+
 def test_an_event_has_one_added_condition() -> None:
     value = document()
     value["supervisor"]["added"] *= 2
@@ -364,7 +464,7 @@ def test_mutated_bytes(seed: Any) -> None:
 @given(seed=st.integers(0, 2**64))
 def test_mutated_values(seed: Any) -> None:
     chance = random.Random(seed)
-    value = document()
+    value = chance.choice((document, document_with_goals))()
     for _ in range(chance.randint(1, 2)):
         change_value(value, chance)
     survives(as_bytes(value))

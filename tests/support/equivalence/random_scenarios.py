@@ -129,6 +129,8 @@ def random_settings(supervisor: Supervisor, dice: Random) -> dict[str, Any]:
     sent = [item for item in model.communications if item.kind is CommunicationKind.INCOMING_MESSAGE]
     topics = list(dict.fromkeys(item.identifier for item in sent))
     policy = dice.choice(("fair", "fair", "priority"))
+    if supervisor.strategy is not None:
+        policy = "strategy"
     decisions: dict[str, Any] = {
         "policy": policy,
         "priority": tuple(dice.sample(requests, dice.randint(0, len(requests)))) if policy == "priority" else (),

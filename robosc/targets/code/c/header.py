@@ -6,6 +6,7 @@ from itertools import groupby
 
 from robosc._version import __version__
 from robosc.automata.executable import CALLED_KINDS
+from robosc.automata.goal_memory import MEMORY
 from robosc.automata.plants import PLANT_LOCATIONS, communication_plant_name
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import (
@@ -44,21 +45,26 @@ def runtime_text(layout: Layout, name: str, package: str = "robosc.targets.code.
     prefixes = {"robot_": f"{layout.prefix}_", "ROBOT_": f"{layout.upper}_"}
     return "".join(
         f"{prefixes[word[:6]]}{word[6:]}" if word[:6] in prefixes and word[6:] else word
-        for word in _words(package, name, layout.is_layer)
+        for word in _words(package, name, layout.is_layer, layout.supervisor.strategy is not None)
     )
 
 
 @cache
-def _words(package: str, name: str, is_layer: bool) -> tuple[str, ...]:
+def _words(package: str, name: str, is_layer: bool, has_strategy: bool) -> tuple[str, ...]:
     """A file of a package's runtime as the names in it, in code and in comments, and what stands between them."""
     text = resources.files(f"{package}.runtime").joinpath(name).read_text(encoding="utf-8")
-    kept = for_deployment(text, is_layer)
+    kept = decided(text, is_layer, has_strategy)
     return tuple("".join(run) for _, run in groupby(kept, key=lambda char: char == "_" or char.isalnum()))
 
 
-def for_deployment(text: str, is_layer: bool) -> str:
-    """The lines of a runtime file for a deployment: what `#if` asks of it is decided here, not by a compiler."""
-    conditions = {"#if ROBOT_IS_LAYER": is_layer, "#if !ROBOT_IS_LAYER": not is_layer}
+def decided(text: str, is_layer: bool, has_strategy: bool) -> str:
+    """The lines of a runtime file for a supervisor: what `#if` asks of it is decided here, not by a compiler."""
+    conditions = {
+        "#if ROBOT_IS_LAYER": is_layer,
+        "#if !ROBOT_IS_LAYER": not is_layer,
+        "#if ROBOT_HAS_STRATEGY": has_strategy,
+        "#if !ROBOT_HAS_STRATEGY": not has_strategy,
+    }
     lines: list[str] = []
     # For each `#if` around: whether its part is kept; None if it stays for the compiler.
     around: list[bool | None] = []
@@ -330,6 +336,11 @@ def _state(layout: Layout) -> list[str]:
     for item in layout.model.communications:
         if item.kind in CALLED_KINDS:
             body.append(f"uint8_t {layout.locations[communication_plant_name(item)]}; /* {item.kind} {item.name} */")
+    if layout.supervisor.strategy is not None:
+        places = layout.executable.obligations.places
+        body += [f"bool {layout.variables[MEMORY, place.name][0]}; /* {place.name} */" for place in places]
+        goals = len(layout.supervisor.strategy.modes)
+        body.append(f"{width(goals)} {layout.mode}; /* goal that is approached, of {goals} */")
     return [
         "/* The state: where everything is. */",
         "typedef struct {",

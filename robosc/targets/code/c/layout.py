@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 
 from robosc.automata.executable import CALLED_KINDS, ExecutableSystem
+from robosc.automata.goal_memory import MEMORY
 from robosc.automata.plants import PLANT_LOCATIONS, communication_plant_name
 from robosc.errors import InternalError
 from robosc.execution.interpreter import describe
@@ -58,11 +59,13 @@ class Layout:
         converters: Function that makes each enum out of received data.
         properties: Member of each property, by object and property.
         request_members: Member of a request's union for each communication.
+        mode: Member of the state for the goal that is approached; empty where there is no strategy.
     """
 
     supervisor: Supervisor
     prefix: str
     description: Description
+    mode: str = ""
     events: dict[str, str] = field(default_factory=dict)
     communications: dict[str, str] = field(default_factory=dict)
     topics: dict[str, str] = field(default_factory=dict)
@@ -231,6 +234,11 @@ def _name_state(layout: Layout) -> None:
             layout.locations[plant] = members.name(f"at_{item.name}")
             for location in PLANT_LOCATIONS[item.kind]:
                 layout.location_names[plant, location] = name(f"{layout.upper}_AT_{item.name}_{location}")
+    if layout.supervisor.strategy is not None:
+        for place in layout.executable.obligations.places:
+            member = members.name(place.name.replace(" ", "_"))
+            layout.variables[MEMORY, place.name] = (member, BooleanType())
+        layout.mode = members.name("mode")
 
 
 def possible_messages(model: Model, identifier: str) -> tuple[Communication, ...]:

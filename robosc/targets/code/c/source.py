@@ -18,6 +18,7 @@ from robosc.targets.code.c.provide import default_function, provide_function
 from robosc.targets.code.c.received import converter, converter_head, unknown_name
 from robosc.targets.code.c.statements import statement_lines, unused
 from robosc.targets.code.c.step import Stepper
+from robosc.targets.code.c.strategy import forgotten, strategy_functions
 from robosc.targets.code.c.text import comment, string_literal
 from robosc.targets.code.c.unit import Reading, Unit
 from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, double, variable
@@ -45,11 +46,14 @@ def source_file(unit: Unit) -> str:
     provided += [] if layout.is_layer else [default_function(unit, item) for item in messages]
     held = [conditions.conjuncts_function(item.name) for item in messages]
     held += [conditions.requirements_function(item.name) for item in layout.of_kind(CommunicationKind.ACTION)]
+    chosen: list[list[str]] = []
+    if layout.supervisor.strategy is not None:
+        chosen = strategy_functions(unit, conditions, layout.supervisor.strategy)
     parts = _LAYER_ENGINE if layout.is_layer else _ENGINE
     engine = [runtime_text(layout, f"{part}.c").rstrip().splitlines() for part in parts]
     asked = request_functions(unit) if layout.is_layer else []
     ends = [*engine, *happens, *asked, *_entries(layout), *_names(layout)]
-    rest = [*allows, *steps, *provided, *held, *_dispatchers(unit), *ends]
+    rest = [*allows, *steps, *provided, *held, *_dispatchers(unit), *chosen, *ends]
     converters = {layout.converters[enum.name]: converter(unit, enum) for enum in layout.model.enums}
     functions = {
         **HELPERS,
@@ -205,6 +209,8 @@ def _dispatchers(unit: Unit) -> list[list[str]]:
     allowed = [(events[event], f"return {function('allows', event)}(s);") for event in layout.executable.issued]
     head_ = f"static bool is_allowed({state}, {event})"
     start = initial_state(layout.executable, Reading(unit), partial(_initial, layout))
+    if layout.supervisor.strategy is not None:
+        start += forgotten(unit)
     initial = unit.definition("static void set_initial(state_t *s)", [*unused("s"), *start])
     result = [initial, _same(layout), _model_settings(layout)]
     result.append(_switch(head_, "s event", "event", allowed, "return false;"))

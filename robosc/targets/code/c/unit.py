@@ -336,4 +336,6 @@ class Reading(CWriter):
 
 def make_unit(supervisor: Supervisor, prefix: str | None) -> Unit:
     """An empty unit for one supervisor."""
-    return Unit(make_layout(supervisor, prefix), supervisor.executable.automata)
+    executable = supervisor.executable
+    system = executable.automata if supervisor.strategy is None else executable.remembering_automata
+    return Unit(make_layout(supervisor, prefix), system)

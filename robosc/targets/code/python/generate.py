@@ -26,6 +26,7 @@ from robosc.targets.code.python.provide import provide_method
 from robosc.targets.code.python.received import converter
 from robosc.targets.code.python.statements import statement_lines
 from robosc.targets.code.python.step import read_method, receive_method, step_method
+from robosc.targets.code.python.strategy import forgetting_lines, mode_tables, strategy_methods
 from robosc.targets.code.python.when import matches_method
 from robosc.targets.code.python.writer import Writer, make_writer
 from robosc.targets.code.steps import initial_state
@@ -162,6 +163,8 @@ def _class(writer: Writer) -> list[str]:
     methods += [conditions.requirements_method(name) for name in requested]
     methods += [conditions.conjuncts_method(name) for name in requested]
     methods += [matches_method(writer, item) for item in model.communications if item.when is not None]
+    if writer.layout.supervisor.strategy is not None:
+        methods += strategy_methods(writer, writer.layout.supervisor.strategy)
     methods += conditions.nodes.values()
     lines = [
         "class Supervisor:",
@@ -177,6 +180,8 @@ def _class(writer: Writer) -> list[str]:
 def _description(description: Description) -> list[str]:
     lines = ["description = Description("]
     for field, content in description._asdict().items():
+        if field == "has_strategy" and not content:
+            continue
         if field == "communications":
             lines += ["    communications=(", *(f"        {item!a}," for item in content), "    ),"]
         else:
@@ -206,13 +211,15 @@ def _constructor(writer: Writer, description: Description) -> list[str]:
         )
     requests, silent = _allow_names(writer, description)
     lines += indent(question_lines(requests, (*description.resets, *description.taus), silent))
+    if writer.layout.supervisor.strategy is not None:
+        lines += indent(mode_tables(writer.layout.supervisor.strategy))
     return [*lines, "    self.changes = 0", "    self.restart()"]
 
 
 def _restart(writer: Writer, requests: int, silent: int) -> list[str]:
     start = initial_state(writer.layout.executable, writer.scope, _initial)
     head = ["def restart(self):", '    """Go back to the initial state."""']
-    return [*head, *indent([*restart_lines(requests, silent), *statement_lines(start)])]
+    return [*head, *indent([*restart_lines(requests, silent), *statement_lines(start), *forgetting_lines(writer)])]
 
 
 def _initial(type_: Type, value: bool | int | float | str) -> Code:

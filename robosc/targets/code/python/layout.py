@@ -11,6 +11,7 @@ from robosc.targets.code.python.naming import PythonNamer
 
 PROTOCOL_NAMES = (
     "changes",
+    "choose",
     "conjuncts",
     "description",
     "enabled",
@@ -18,6 +19,7 @@ PROTOCOL_NAMES = (
     "enabled_silent",
     "location",
     "matches",
+    "observe",
     "provide",
     "read",
     "receive",
@@ -27,7 +29,7 @@ PROTOCOL_NAMES = (
     "state",
     "step",
 )
-"""The members of `ControlledSystem`."""
+"""The members of `StrategicSystem`."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -41,6 +43,7 @@ class Layout:
         methods: Method by (purpose, event or communication); purposes are `allow`, `read`, `step`,
             `provide`, `requirements`, `conjuncts`, `matches`; and `receive` with an identifier.
         converters: Function that makes each enum out of received data.
+        memory: Attribute of each place of the memory of goals, by its name.
     """
 
     supervisor: Supervisor
@@ -48,6 +51,7 @@ class Layout:
     variables: dict[tuple[str, str], tuple[str, Type]]
     methods: dict[tuple[str, str], str]
     converters: dict[str, str]
+    memory: dict[str, str]
 
     @property
     def model(self) -> Model:
@@ -75,7 +79,13 @@ def make_layout(supervisor: Supervisor) -> Layout:
     for item in model.communications:
         if item.kind in CALLED_KINDS:
             locations[communication_plant_name(item)] = members.name(f"{item.name}__location")
-    return Layout(supervisor, locations, variables, _method_names(supervisor, members), _converter_names(model))
+    methods, converters = _method_names(supervisor, members), _converter_names(model)
+    return Layout(supervisor, locations, variables, methods, converters, _memory_names(supervisor, members))
+
+
+def _memory_names(supervisor: Supervisor, members: PythonNamer) -> dict[str, str]:
+    places = () if supervisor.strategy is None else supervisor.executable.obligations.places
+    return {place.name: members.name(place.name.replace(" ", "_")) for place in places}
 
 
 def _method_names(supervisor: Supervisor, members: PythonNamer) -> dict[tuple[str, str], str]:

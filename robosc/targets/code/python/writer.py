@@ -3,7 +3,8 @@
 from dataclasses import dataclass, field
 
 from robosc.automata import System
-from robosc.expressions import Type
+from robosc.automata.goal_memory import MEMORY
+from robosc.expressions import BooleanType, Type
 from robosc.model.structure import Model
 from robosc.supervisor import Supervisor
 from robosc.targets.code.python.conditions import PythonConditions
@@ -43,6 +44,8 @@ class Writer:
         return self.layout.model
 
     def _variable(self, component: str, variable: str) -> tuple[str, Type]:
+        if component == MEMORY:
+            return f"self.{self.layout.memory[variable]}", BooleanType()
         attribute, type_ = self.layout.variables[component, variable]
         return f"self.{attribute}", type_
 
@@ -54,4 +57,6 @@ class Writer:
 
 def make_writer(supervisor: Supervisor) -> Writer:
     """A writer for one supervisor."""
-    return Writer(make_layout(supervisor), supervisor.executable.automata)
+    executable = supervisor.executable
+    system = executable.automata if supervisor.strategy is None else executable.remembering_automata
+    return Writer(make_layout(supervisor), system)

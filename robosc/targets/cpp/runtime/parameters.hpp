@@ -270,7 +270,12 @@ inline Parameters validated(const Given& given, const std::vector<Nameable>& req
     if (!(result.period_s >= 0.0001 && result.period_s <= 3600.0)) {
         detail::wrong("period", given.at("period"), "0.0001 seconds or more, and at most 3600 seconds");
     }
+#if ROBOT_HAS_STRATEGY
+    settings.policy
+        = static_cast<robot_policy_t>(detail::choice(given, "policy", {"fair", "priority", "random", "strategy"}));
+#else
     settings.policy = static_cast<robot_policy_t>(detail::choice(given, "policy", {"fair", "priority", "random"}));
+#endif
     for (const std::string& name : detail::texts(given, "priority")) {
         const int number = detail::named("priority", name, requests, false, "a request").front();
         settings.priority[settings.priority_count++] = static_cast<robot_communication_t>(number);

@@ -64,24 +64,27 @@ class Parameter(NamedTuple):
 _PERIODS = (MINIMUM_PERIOD_S, MAXIMUM_PERIOD_S)
 _SECONDS = (0.0, sys.float_info.max)
 
-_OF_A_CONTROLLER = (
-    Parameter(
-        'period',
-        0.1,
-        'Seconds between decisions: at most one request is issued each time.',
-        _PERIODS,
-    ),
-    Parameter(
-        'policy',
-        'fair',
-        'Choice among enabled requests: fair, random, priority (the list, then fair).',
-    ),
-    Parameter('priority', [''], 'Messages in order of urgency, for the policy priority.'),
-    Parameter('seed', 0, 'Seed of the policy random.'),
-    Parameter(
-        'every', 'period', 'Times of decisions: each period, or after each event as well (event).'
-    ),
-)
+
+def _of_a_controller(policy: str) -> tuple[Parameter, ...]:
+    goals = ', strategy (what reaches the goals of the model)' if policy == 'strategy' else ''
+    choices = f'fair, random, priority (the list, then fair){goals}'
+    return (
+        Parameter(
+            'period',
+            0.1,
+            'Seconds between decisions: at most one request is issued each time.',
+            _PERIODS,
+        ),
+        Parameter('policy', policy, f'Choice among enabled requests: {choices}.'),
+        Parameter('priority', [''], 'Messages in order of urgency, for the policy priority.'),
+        Parameter('seed', 0, 'Seed of the policy random.'),
+        Parameter(
+            'every',
+            'period',
+            'Times of decisions: each period, or after each event as well (event).',
+        ),
+    )
+
 
 _OF_A_LAYER = (
     Parameter(
@@ -144,12 +147,18 @@ class Parameters(NamedTuple):
 
 
 def declarations(
-    release_identifiers: Sequence[str], deployment: str = CONTROLLER
+    release_identifiers: Sequence[str], deployment: str = CONTROLLER, policy: str = 'fair'
 ) -> tuple[Parameter, ...]:
-    """Every parameter of a deployment, given the release identifiers that the model suggests."""
+    """
+    Return every parameter of a deployment.
+
+    :param release_identifiers: Release identifiers that the model suggests.
+    :param deployment: `controller` or `layer`.
+    :param policy: Default policy of a controller: `strategy` if its supervisor has one.
+    """
     is_layer = deployment == LAYER
     return (
-        *(_OF_A_LAYER if is_layer else _OF_A_CONTROLLER),
+        *(_OF_A_LAYER if is_layer else _of_a_controller(policy)),
         Parameter(
             'release_identifiers',
             list(release_identifiers) or [''],

@@ -145,6 +145,14 @@ static bool decide(robot_t *r)
         enabled[request] = r->is_enabled[request];
         candidates[request] = enabled[request];
     }
+#if ROBOT_HAS_STRATEGY
+    if (r->settings.policy == ROBOT_POLICY_STRATEGY) {
+        const int chosen = choose_by_strategy(&r->state);
+        for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
+            candidates[request] = enabled[request] && request == chosen;
+        }
+    }
+#endif
 #if ROBOT_TOPIC_COUNT > 0
     if (is_any_waiting(r)) {
         bool others[ROBOT_REQUEST_COUNT];
@@ -152,12 +160,18 @@ static bool decide(robot_t *r)
             const int topic = REQUESTS[request].topic;
             const bool is_ending
                 = topic >= 0 && r->acting[topic].is_waiting && r->acting[topic].request != request;
-            candidates[request] = enabled[request] && is_ending;
-            others[request] = enabled[request] && !is_ending;
+            others[request] = candidates[request] && !is_ending;
+            candidates[request] = candidates[request] && is_ending;
         }
         if (!issue_one_of(r, candidates, &issued)) {
             return false;
         }
+#if ROBOT_HAS_STRATEGY
+        /* A strategy may choose something else, or nothing: then no message comes that the releases wait for. */
+        if (issued < 0 && r->settings.policy == ROBOT_POLICY_STRATEGY && !release_waiting(r)) {
+            return false;
+        }
+#endif
         if (issued < 0 && !issue_one_of(r, others, &issued)) {
             return false;
         }

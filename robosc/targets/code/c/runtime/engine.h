@@ -9,7 +9,12 @@ typedef enum {
 typedef enum {
     ROBOT_POLICY_FAIR,     /* newly enabled first, then the longest-ago issued */
     ROBOT_POLICY_PRIORITY, /* a list, then fair */
+#if ROBOT_HAS_STRATEGY
+    ROBOT_POLICY_RANDOM,   /* splitmix64 from `seed`: not the sequence of the Python executor */
+    ROBOT_POLICY_STRATEGY  /* what reaches the goals of the model, and nothing else */
+#else
     ROBOT_POLICY_RANDOM    /* splitmix64 from `seed`: not the sequence of the Python executor */
+#endif
 } robot_policy_t;
 
 #endif

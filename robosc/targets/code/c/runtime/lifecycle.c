@@ -43,8 +43,12 @@ static bool begin(robot_t *r)
 void robot_default_settings(robot_settings_t *settings)
 {
     memset(settings, 0, sizeof *settings);
+#if ROBOT_HAS_STRATEGY
+    settings->policy = ROBOT_POLICY_STRATEGY;
+#else
 #if !ROBOT_IS_LAYER
     settings->policy = ROBOT_POLICY_FAIR;
+#endif
 #endif
     settings->on_unknown = ROBOT_ON_UNKNOWN_DEFAULT;
     settings->service_timeout_us = UINT64_C(10000000);
@@ -68,8 +72,16 @@ bool robot_init(robot_t *r, const robot_settings_t *settings, const robot_callba
         return false;
     }
 #else
-    if (callbacks == NULL || r->settings.policy > ROBOT_POLICY_RANDOM
-        || r->settings.on_unknown > ROBOT_ON_UNKNOWN_FAULT || r->settings.priority_count < 0
+#if ROBOT_HAS_STRATEGY
+    if (r->settings.policy > ROBOT_POLICY_STRATEGY) {
+        return false;
+    }
+#else
+    if (r->settings.policy > ROBOT_POLICY_RANDOM) {
+        return false;
+    }
+#endif
+    if (callbacks == NULL || r->settings.on_unknown > ROBOT_ON_UNKNOWN_FAULT || r->settings.priority_count < 0
         || r->settings.priority_count > ROBOT_REQUEST_COUNT) {
         return false;
     }

@@ -114,6 +114,18 @@ static bool is_any_waiting(const robot_t *r)
 }
 
 #endif
+#if ROBOT_HAS_STRATEGY
+/* Release what waits for a message that does not come. */
+static bool release_waiting(robot_t *r)
+{
+    bool is_now[ROBOT_TOPIC_COUNT] = {false};
+    for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
+        is_now[topic] = r->acting[topic].is_waiting;
+    }
+    return release_marked(r, is_now);
+}
+
+#endif
 static void sent(robot_t *r, int request, bool is_default)
 {
     const int topic = REQUESTS[request].topic;

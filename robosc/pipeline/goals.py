@@ -1,0 +1,95 @@
+"""Goals of a supervisor and what its strategy chooses for them, in the model's words."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+from robosc.conditions.goals import goals_in_words
+from robosc.conditions.literals import Vocabulary
+from robosc.conditions.summary import ELSEWHERE, condition_line, short_diagrams
+from robosc.pipeline.conditions import Condition
+from robosc.supervisor import Supervisor
+from robosc.supervisor.diagram import diagram_domains
+from robosc.tables import html_table
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class Choice(Condition):
+    """Request that a strategy chooses, with the condition for it: the first of a goal whose condition is true."""
+
+    def __repr__(self) -> str:
+        return f"<{self.event} where {self.text}>"
+
+
+@dataclass(frozen=True, slots=True, repr=False)
+class GoalApproach:
+    """Goal with what the strategy does to reach it.
+
+    Attributes:
+        goal: The goal, as a user writes it.
+        choices: Choices in the order in which they are tried; where none applies, the controller waits.
+    """
+
+    goal: str
+    choices: tuple[Choice, ...]
+
+    def __repr__(self) -> str:
+        requests = ", ".join(item.event for item in self.choices) or "nothing"
+        return f"<{self.goal}: requests {requests}>"
+
+    def __str__(self) -> str:
+        return "\n".join([f"{self.goal}:", *(f"  {event} {text}" for event, text in self.rows())])
+
+    def rows(self) -> list[tuple[str, str]]:
+        """Each choice with its condition, and at last when nothing is requested, if there is such a case."""
+        short = short_diagrams(item.diagram for item in self.choices if item.formula is None)
+        rows: list[tuple[str, str]] = []
+        for item in self.choices:
+            has_text = item.formula is not None or item.diagram in short
+            text = f"where {item if has_text else f'{item.text}{ELSEWHERE}'}"
+            rows.append((item.event, ("otherwise" if rows else "always") if item.adds_nothing else text))
+        if not self.choices or not self.choices[-1].adds_nothing:
+            rows.append(("nothing", "otherwise" if rows else "at all"))
+        return rows
+
+
+class Goals(tuple[GoalApproach, ...]):
+    """The goals of a supervisor, in source order, each with what its strategy chooses for it."""
+
+    __slots__ = ()
+
+    def __new__(cls, goals: Iterable[GoalApproach] = ()) -> "Goals":
+        """Goals in their order."""
+        return super().__new__(cls, tuple(goals))
+
+    def __repr__(self) -> str:
+        return f"<{len(self)} goal{'s' if len(self) != 1 else ''}>" if self else "<no goals>"
+
+    def __str__(self) -> str:
+        return "\n".join(map(str, self)) or "no goals"
+
+    def _repr_html_(self) -> str:
+        rows = [
+            (str(number), item.goal, event, text)
+            for number, item in enumerate(self, start=1)
+            for event, text in item.rows()
+        ]
+        return html_table(("", "goal", "the strategy requests", ""), rows)
+
+
+def goals_of(supervisor: Supervisor) -> Goals:
+    """Return the goals of a supervisor with the choices of its strategy; empty where it has none."""
+    components = frozenset(item.name for item in supervisor.model.components)
+    found = goals_in_words(supervisor)
+    if not found:
+        return Goals()
+    vocabulary = Vocabulary(diagram_domains(supervisor.executable.remembering_automata), components)
+    return Goals(
+        GoalApproach(
+            item.text,
+            tuple(
+                Choice(event, condition_line(diagram, formula, components), formula, diagram, vocabulary)
+                for event, diagram, formula in item.choices
+            ),
+        )
+        for item in found
+    )

@@ -1,0 +1,205 @@
+"""Synthesis of a strategy: what the controller does next, of what its supervisor allows, so that its goals come true.
+
+The supervisor stays as it is: a strategy only chooses among the requests that it enables, or waits. In each mode one
+goal is approached; once it is true the next one in turn is.
+"""
+
+from collections.abc import Callable, Collection, Iterable, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+from robosc.automata import ExecutableSystem
+from robosc.strategies.arena import ControllerArena
+from robosc.strategies.gr1 import Solution, solve
+from robosc.supervisor import AddedCondition, Choice, Strategy
+from robosc.synthesis.diagrams import extract
+from robosc.synthesis.engines import EngineOptions
+from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.nodes import count_models
+from robosc.synthesis.result import SynthesisProgress
+from robosc.synthesis.simplify import Simplifier
+from robosc.synthesis.workspace import Workspace, workspace
+
+
+@dataclass(frozen=True, slots=True)
+class StrategyResult:
+    """Outcome of the synthesis of a strategy.
+
+    Attributes:
+        strategy: The strategy, or None where there is none.
+        unreached: Numbers of goals that cannot be reached together, a set of which none can be left out; empty where
+            there is a strategy.
+        is_hopeless: True if these goals cannot be reached even if the surroundings do all they can for it.
+        preventable: Numbers of assumptions that the robot itself can keep from coming true, though nobody allows it.
+        unneeded: Numbers of assumptions without which the goals are reached just as well.
+        positions: Number of positions of the game: stable states, each with every memory.
+        winning: Number of those from which the goals can be reached.
+        rounds: Rounds of the outermost fixed point.
+    """
+
+    strategy: Strategy | None
+    unreached: tuple[int, ...]
+    is_hopeless: bool
+    preventable: tuple[int, ...]
+    unneeded: tuple[int, ...]
+    positions: int
+    winning: int
+    rounds: int
+
+
+def synthesize_strategy(
+    executable: ExecutableSystem,
+    added: Sequence[AddedCondition],
+    *,
+    engine: str | EngineOptions = "auto",
+    should_stop: Callable[[], bool] = lambda: False,
+    on_progress: Callable[[SynthesisProgress], None] = lambda progress: None,
+) -> StrategyResult:
+    """Synthesize a strategy that reaches every goal of a model while its assumptions come true.
+
+    Args:
+        executable: Executable system of the robot, with at least one goal.
+        added: The conditions that its supervisor adds.
+        engine: Name of the engine for decision diagrams, or its options.
+        should_stop: Function called before each step of the work; once it returns true, the work ends.
+        on_progress: Function called with the progress of the work.
+
+    Raises:
+        SynthesisCancelled: `should_stop` became true.
+        NodeLimitError: Diagrams became larger than the options allow.
+        UnknownEngineError: There is no such engine.
+        UnsupportedModelError: A condition would be too large.
+    """
+    with workspace(executable.remembering_automata, engine, should_stop, on_progress) as place:
+        allowed = [number for number, item in enumerate(executable.model.assumptions) if item.is_allowed]
+        return StrategySynthesis(executable, added, place).result(allowed)
+
+
+class StrategySynthesis:
+    """One synthesis: its manager is its own."""
+
+    def __init__(self, executable: ExecutableSystem, added: Sequence[AddedCondition], place: Workspace) -> None:
+        owed = executable.obligations
+        self._encoding = place.encoding
+        self._manager = place.encoding.manager
+        self._monitor: ProgressMonitor = place.monitor
+        self._seconds = place.condition_seconds
+        self.arena = ControllerArena(executable, added, owed.places, owed.cancels, place.encoding, place.monitor)
+        self.goals = [self.arena.condition(item) for item in owed.goals]
+        self.assumptions = [self.arena.condition(item) for item in owed.assumptions]
+
+    def result(self, allowed: Collection[int] = ()) -> StrategyResult:
+        """Return the strategy, or the reason why there is none.
+
+        Args:
+            allowed: Numbers of the assumptions that the robot may keep from coming true.
+        """
+        solution = self._solution(range(len(self.assumptions)), range(len(self.goals)))
+        is_won = self.arena.can_begin(solution.winning)
+        unreached = () if is_won else self._unreached()
+        preventable = self._preventable(allowed)
+        return StrategyResult(
+            strategy=self._strategy(solution) if is_won and not preventable else None,
+            unreached=unreached,
+            is_hopeless=bool(unreached) and not self._can_be_reached(unreached),
+            preventable=preventable,
+            unneeded=self._unneeded() if is_won else (),
+            positions=self._count(self.arena.positions),
+            winning=self._count(solution.winning),
+            rounds=solution.rounds,
+        )
+
+    def _solution(self, assumptions: Iterable[int], goals: Iterable[int]) -> Solution:
+        return self._solved([self.assumptions[item] for item in assumptions], [self.goals[item] for item in goals])
+
+    def _solved(self, assumptions: Sequence[Any], goals: Sequence[Any]) -> Solution:
+        return solve(self.arena, assumptions, goals, false=self._manager.false, check_stop=self._monitor.check_stop)
+
+    def _is_won(self, assumptions: Iterable[int], goals: Iterable[int]) -> bool:
+        return self.arena.can_begin(self._solution(assumptions, goals).winning)
+
+    def _unreached(self) -> tuple[int, ...]:
+        """Return a smallest set, by leaving out, of goals that cannot be reached together; later ones go first."""
+        every = range(len(self.assumptions))
+        kept = list(range(len(self.goals)))
+        for item in reversed(range(len(self.goals))):
+            fewer = [number for number in kept if number != item]
+            if fewer and not self._is_won(every, fewer):
+                kept = fewer
+        return tuple(kept)
+
+    def _can_be_reached(self, goals: Sequence[int]) -> bool:
+        """Return True if both sides together can make goals true again and again."""
+        found = self.arena.positions
+        before = None
+        while found != before:
+            before = found
+            for item in goals:
+                near = found & self.goals[item] & self.arena.together(found)
+                wider = None
+                while near != wider:
+                    wider = near
+                    near = near | (found & self.arena.together(near))
+                found = near
+        return self.arena.can_begin(found)
+
+    def _unneeded(self) -> tuple[int, ...]:
+        """Return assumptions that can be left out together; of two that can replace each other, the later one."""
+        goals = range(len(self.goals))
+        kept = list(range(len(self.assumptions)))
+        for item in reversed(range(len(self.assumptions))):
+            fewer = [number for number in kept if number != item]
+            if self._is_won(fewer, goals):
+                kept = fewer
+        return tuple(item for item in range(len(self.assumptions)) if item not in kept)
+
+    def _preventable(self, allowed: Collection[int]) -> tuple[int, ...]:
+        """Return assumptions that the robot can make false for ever, in a state that it can get to.
+
+        A robot that does so reaches its goals in name alone. Such assumptions are not well separated from the goals:
+        U. Klein and A. Pnueli, "Revisiting synthesis of GR(1) specifications", HVC 2010, LNCS 6504, pp. 161-181.
+        """
+        found = []
+        for item, assumption in enumerate(self.assumptions):
+            if item not in allowed:
+                prevented = self._solved([assumption], [self._manager.false]).winning
+                if self._is_met(prevented):
+                    found.append(item)
+        return tuple(found)
+
+    def _is_met(self, predicate: Any) -> bool:
+        """Return True if moves of both sides can lead from the first position into a predicate."""
+        found, before = predicate, None
+        while found != before:
+            before = found
+            found = found | self.arena.together(found)
+        return bool(self.arena.start & self.arena.arriving(found) != self._manager.false)
+
+    def _count(self, predicate: Any) -> int:
+        return count_models(self._manager, predicate, self._encoding.state_names)
+
+    def _strategy(self, solution: Solution) -> Strategy:
+        simplifier = Simplifier(self._encoding, self._seconds)
+        return Strategy(tuple(self._mode(solution, number, simplifier) for number in range(len(self.goals))))
+
+    def _mode(self, solution: Solution, number: int, simplifier: Simplifier) -> tuple[Choice, ...]:
+        """Return the requests that approach a goal, in order, each with the condition for choosing it."""
+        chosen: dict[str, Any] = {}
+        decided = self.goals[number]
+        for approach in solution.approaches[number]:
+            here = approach.positions & ~approach.nearer
+            for event in self.arena.requests:
+                found = here & ~decided & self.arena.choice(event, approach.nearer)
+                if found != self._manager.false:
+                    chosen[event] = chosen.get(event, self._manager.false) | found
+                    decided = decided | found
+        care = solution.winning & self.arena.observed & ~self.goals[number]
+        choices: list[Choice] = []
+        for event in self.arena.requests:
+            if event in chosen and chosen[event] & care != self._manager.false:
+                condition = simplifier.condition(chosen[event], care)
+                if condition is None:
+                    condition = extract(self._encoding, self._manager.true)
+                choices.append(Choice(event, condition))
+                care = care & ~chosen[event]
+        return tuple(choices)

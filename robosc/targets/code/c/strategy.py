@@ -1,0 +1,61 @@
+"""Generated functions of a strategy: its memory of goals, and its choices."""
+
+from robosc.automata.goal_memory import MEMORY
+from robosc.supervisor import Strategy
+from robosc.targets.code.c.conditions import CConditions
+from robosc.targets.code.c.naming import CNamer
+from robosc.targets.code.c.statements import unused
+from robosc.targets.code.c.unit import Reading, Unit
+from robosc.targets.code.expressions import FALSE_CODE, integer, variable
+from robosc.targets.code.statements import Assign, Statement
+from robosc.targets.code.strategy import choosing, observing, reached
+
+
+def forgotten(unit: Unit) -> list[Statement]:
+    """The assignments by which nothing is remembered of goals."""
+    scope, layout = Reading(unit), unit.layout
+    places = (scope.variable_place(MEMORY, place.name) for place in layout.executable.obligations.places)
+    return [*(Assign(place, FALSE_CODE) for place in places), Assign(variable(f"s->{layout.mode}"), integer(0))]
+
+
+def strategy_functions(unit: Unit, conditions: CConditions, strategy: Strategy) -> list[list[str]]:
+    """Return the functions through which the engine asks the strategy.
+
+    Args:
+        unit: The file.
+        conditions: Writer of its conditions.
+        strategy: The strategy.
+    """
+    executable, scope, mode = unit.layout.executable, Reading(unit), f"s->{unit.layout.mode}"
+    count = len(strategy.modes)
+    taken = observing(executable, scope, CNamer(frozenset({"s"})))
+    found = [unit.definition("static void observe_for_strategy(state_t *s)", [*unused("s"), *taken])]
+    for number in range(count):
+        body = [*unused("s"), *reached(executable, number, scope)]
+        found.append(unit.definition(f"static bool is_goal_{number + 1}_reached(const state_t *s)", body))
+        body = [*unused("s"), *choosing(executable, strategy, number, conditions, integer(-1))]
+        found.append(unit.definition(f"static int approach_goal_{number + 1}(const state_t *s)", body))
+    lines = [
+        "/* The request that the strategy chooses in a stable state, or -1 to wait. */",
+        "static int choose_by_strategy(state_t *s)",
+        "{",
+        f"    for (int tried = 0; tried < {count}; tried++) {{",
+        f"        switch ({mode}) {{",
+    ]
+    for number in range(count):
+        lines += [
+            f"        case {number}:",
+            f"            if (!is_goal_{number + 1}_reached(s)) {{",
+            f"                return approach_goal_{number + 1}(s);",
+            "            }",
+            "            break;",
+        ]
+    lines += ["        default:", "            return -1;", "        }"]
+    following = f"{mode} + 1 < {count} ? {mode} + 1 : 0"
+    lines += [
+        f"        {mode} = ({following});" if count > 1 else f"        {mode} = 0;",
+        "    }",
+        "    return -1;",
+        "}",
+    ]
+    return [*found, lines]

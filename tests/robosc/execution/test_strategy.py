@@ -1,0 +1,79 @@
+"""The policy `strategy`: what the executor issues, against what the check of strategies says that it does."""
+
+from collections import Counter
+from random import Random
+
+import pytest
+
+from robosc.automata.state import subjects
+from robosc.controller_properties import StrategyRun
+from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.runtime.settings import Settings, SettingsError
+from robosc.expressions import Value
+from robosc.supervisor import Supervisor
+from support.controller_twin import World
+from support.execution import Bench
+from support.random_controllers import random_robot
+from support.random_goals import strategic_controller
+
+
+def walk(supervisor: Supervisor, dice: Random, met: Counter[str]) -> None:
+    world = World(supervisor, ())
+    executor = world.bench.executor
+    assert executor.settings.policy == "strategy"
+    if world.is_endless:
+        return
+    run = StrategyRun(supervisor.executable, supervisor.strategy)  # type: ignore[arg-type]  # it has one
+    system = supervisor.executable.executed_automata
+    # Messages have one location, which the executor does not keep.
+    places = [
+        ((item.automaton, item.variable), system.automaton(item.automaton).locations[0]) for item in subjects(system)
+    ]
+
+    def state() -> tuple[Value, ...]:
+        return tuple(world.system._state.get(place, only) for place, only in places)
+
+    memory, mode = run.observed(state(), run.memory), 0
+    for _ in range(25):
+        request, mode = run.decided(state(), memory, mode)
+        world.system.steps.clear()
+        before = world.open_actions()
+        executor.tick()
+        issued = next((event for event, _, _ in world.system.steps if event.endswith(".request")), None)
+        if request is not None and request.removesuffix(".request") in before:
+            # A cancelled goal that is not known to have ended is waited for.
+            assert issued is None
+            met["waited for an end"] += 1
+        else:
+            assert issued == request
+            met["requests" if issued else "waits"] += 1
+        memory = run.observed(state(), memory)
+        for _ in range(dice.choice((0, 1, 1, 2))):
+            moves = [move for move, _ in world.moves() if move[0] != "request"]
+            if moves:
+                world.do(dice.choice(moves))
+                if world.is_endless:
+                    return
+                memory = run.observed(state(), memory)
+
+
+def test_the_executor_issues_what_the_strategy_chooses() -> None:
+    met: Counter[str] = Counter()
+    for seed in range(1_500):
+        supervisor = strategic_controller(seed)
+        if supervisor is not None:
+            walk(supervisor, Random(seed), met)
+            met["robots"] += 1
+    assert met["robots"] > 60 and met["requests"] > 40 and met["waits"] > 1_000, met
+
+
+def test_a_strategy_that_is_not_there_is_refused() -> None:
+    with pytest.raises(SettingsError, match="'policy' is 'strategy', but the supervisor has none"):
+        Bench(InterpretedSystem(random_robot(1)), policy="strategy")
+    bench = Bench(InterpretedSystem(random_robot(1)))
+    assert bench.executor.settings == Settings(policy="fair", release_identifiers=())
+
+
+def test_another_policy_may_be_used_all_the_same() -> None:
+    supervisor = next(found for seed in range(700) if (found := strategic_controller(seed)) is not None)
+    assert Bench(InterpretedSystem(supervisor), policy="fair").executor.settings.policy == "fair"

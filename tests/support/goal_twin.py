@@ -1,0 +1,298 @@
+"""The obvious twin of strategies: an explicit parity game on the controller automaton, and a check of what is chosen.
+
+Goals and assumptions are counted off one after the other whenever the controller has its turn: a game with the
+priorities 0, 1 (all assumptions once more) and 2 (all goals once more) is solved by Zielonka's algorithm. Source:
+W. Zielonka, "Infinite games on finitely coloured graphs with applications to automata on infinite trees", Theoretical
+Computer Science 200(1-2), 1998, pp. 135-183.
+"""
+
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+from robosc.automata import ExecutableSystem
+from robosc.automata.compile import NO_DATA, Function, compile_expression
+from robosc.automata.state import subjects
+from robosc.controller_properties.controller import Controller, Node
+from robosc.model.structure import Assumption, Goal, GoalForm
+from robosc.supervisor import AddedCondition
+
+Marks = tuple[bool, ...]
+"""Memory of each assumption, then of each goal: that an answer is owed, or that it came true."""
+
+Position = tuple[Node, Marks]
+
+LOST = "lost"
+"""The vertex that silent steps without end lead to."""
+
+
+@dataclass
+class _Item:
+    """A goal or an assumption over explicit states."""
+
+    form: GoalForm
+    condition: Callable[[Any], bool]
+    trigger: Callable[[Any], bool]
+
+    def mark(self, mark: bool, state: Any) -> bool:
+        if self.form is GoalForm.LEADS_TO:
+            return (mark or self.trigger(state)) and not self.condition(state)
+        return self.form is GoalForm.ONCE and (mark or self.condition(state))
+
+    def holds(self, mark: bool, state: Any) -> bool:
+        if self.form is GoalForm.LEADS_TO:
+            return not mark
+        return mark if self.form is GoalForm.ONCE else self.condition(state)
+
+
+def _is_true(function: Function) -> Callable[[Any], bool]:
+    return lambda state: function(state, NO_DATA) is True
+
+
+NEVER = _Item(GoalForm.ALWAYS_EVENTUALLY, lambda state: False, lambda state: False)
+"""A goal that is never true."""
+
+
+@dataclass
+class Game:
+    """The explicit game of a controller.
+
+    Attributes:
+        successors: For each position, the positions that a move of the surroundings leads to.
+        choices: For each position, where each request leads to; waiting stays.
+        first: The position in which the executor begins, or None if it never gets to one.
+    """
+
+    assumptions: list[_Item]
+    goals: list[_Item]
+    successors: dict[Position, set[Any]] = field(default_factory=dict)
+    choices: dict[Position, dict[str, Any]] = field(default_factory=dict)
+    first: Any = None
+    asked: tuple[list[_Item], list[_Item]] | None = None
+
+    def asking(self, assumptions: list[_Item], goals: list[_Item]) -> "Game":
+        """Return the same game about other assumptions and goals, of those that it keeps account of."""
+        return replace(self, asked=(assumptions, goals))
+
+    def holds(self, position: Position, item: _Item) -> bool:
+        """Return True if an assumption or a goal counts as come true in a position."""
+        (state, _), marks = position
+        place = next((place for place, kept in enumerate((*self.assumptions, *self.goals)) if kept is item), None)
+        return item.holds(place is not None and marks[place], state)
+
+    def can_meet_again_and_again(self, goals: Iterable[int]) -> bool:
+        """Return True if both sides together can make goals true again and again."""
+        following = {
+            position: {*self.successors[position], *self.choices[position].values(), position} - {LOST}
+            for position in self.choices
+        }
+        # Each position can be waited in: a turn at which a goal is true is a turn in its component.
+        return any(
+            all(any(self.holds(position, self.goals[item]) for position in component) for item in goals)
+            for component in _components(list(following), following.__getitem__)
+        )
+
+    def holding(self, position: Position, items: list[_Item]) -> tuple[bool, ...]:
+        (state, _), marks = position
+        offset = 0 if items is self.assumptions else len(self.assumptions)
+        return tuple(item.holds(marks[offset + place], state) for place, item in enumerate(items))
+
+
+def game_of(executable: ExecutableSystem, added: Iterable[AddedCondition], limit: int) -> Game | None:
+    """Return the game of a controller, or None if it has more positions than a limit."""
+    controller = Controller(executable, added)
+    # What the events of one message carry together is not known to the strategy.
+    controller._choices.clear()
+    places = {subject: place for place, subject in enumerate(subjects(controller.system))}
+
+    def items(given: tuple[Goal, ...] | tuple[Assumption, ...]) -> list[_Item]:
+        return [
+            _Item(
+                item.form,
+                _is_true(compile_expression(item.condition, places)),
+                (lambda state: False) if item.trigger is None else _is_true(compile_expression(item.trigger, places)),
+            )
+            for item in given
+        ]
+
+    game = Game(items(executable.model.assumptions), items(executable.model.goals))
+    everything = [*game.assumptions, *game.goals]
+
+    def arrived(node: Node, marks: Marks) -> Any:
+        end = controller.run(node).end
+        if end is None:
+            return LOST
+        return end, tuple(item.mark(mark, end[0]) for item, mark in zip(everything, marks, strict=True))
+
+    game.first = arrived(controller.start, (False,) * len(everything))
+    queue = [] if game.first == LOST else [game.first]
+    for position in queue:
+        if position in game.choices:
+            continue
+        if len(game.choices) == limit:
+            return None
+        node, marks = position
+        requests: dict[str, Any] = {}
+        others: set[Any] = set()
+        for events, _, target in controller.moves(node):
+            if len(events) == 1 and events[0] in controller.requests:
+                requests[events[0]] = arrived(target, marks)
+            else:
+                others.add(arrived(target, marks))
+        game.choices[position], game.successors[position] = requests, others
+        queue += [target for target in (*requests.values(), *others) if target != LOST]
+    return game
+
+
+def winning_positions(game: Game) -> set[Position]:
+    """Return the positions from which the controller reaches its goals for ever, whatever the surroundings do."""
+    vertices, priorities, owners = _vertices(game)
+    won = _zielonka(vertices, set(vertices), priorities, owners)[0]
+    return {vertex[0] for vertex in won if vertex != LOST and vertex[1] == "surroundings" and vertex[2:4] == (0, 0)}
+
+
+def _vertices(game: Game) -> tuple[dict[Any, set[Any]], dict[Any, int], dict[Any, int]]:
+    """The parity game: where each vertex leads, its priority, and whose it is (0 the controller's)."""
+    edges: dict[Any, set[Any]] = {LOST: {LOST}}
+    priorities, owners = {LOST: 1}, {LOST: 0}
+    queue: list[Any] = [(position, "surroundings", 0, 0, 0) for position in game.choices]
+    for vertex in queue:
+        if vertex in edges:
+            continue
+        position, side, owed, wanted, priority = vertex
+        priorities[vertex] = priority
+        owners[vertex] = int(side == "surroundings")
+
+        def at(target: Any, owed: int = owed, wanted: int = wanted) -> Any:
+            return LOST if target == LOST else (target, "surroundings", owed, wanted, 0)
+
+        if side == "surroundings":
+            edges[vertex] = {at(target) for target in game.successors[position]}
+            edges[vertex].add((position, "controller", *_counted(game, position, owed, wanted)))
+        else:
+            edges[vertex] = {at(target) for target in (position, *game.choices[position].values())}
+        queue += edges[vertex]
+    return edges, priorities, owners
+
+
+def _counted(game: Game, position: Position, owed: int, wanted: int) -> tuple[int, int, int]:
+    """Return the two counters after a turn, and the priority of it."""
+    priority = 0
+    wanting = game.asked or (game.assumptions, game.goals)
+    assumptions, goals = (tuple(game.holds(position, item) for item in items) for items in wanting)
+    # One more assumption, that there are turns at all, is true at each.
+    if (*assumptions, True)[owed]:
+        owed = (owed + 1) % (len(assumptions) + 1)
+        priority = int(owed == 0)
+    if goals[wanted]:
+        wanted = (wanted + 1) % len(goals)
+        priority = 2 if wanted == 0 else priority
+    return owed, wanted, priority
+
+
+def _zielonka(
+    edges: Mapping[Any, set[Any]], inside: set[Any], priorities: Mapping[Any, int], owners: Mapping[Any, int]
+) -> tuple[set[Any], set[Any]]:
+    """The vertices of a subgame that each side wins: the controller, the surroundings."""
+    if not inside:
+        return set(), set()
+    highest = max(priorities[vertex] for vertex in inside)
+    side = highest % 2
+    near = _attractor(edges, inside, {vertex for vertex in inside if priorities[vertex] == highest}, side, owners)
+    regions = _zielonka(edges, inside - near, priorities, owners)
+    if not regions[1 - side]:
+        return (inside, set()) if side == 0 else (set(), inside)
+    lost = _attractor(edges, inside, regions[1 - side], 1 - side, owners)
+    found = _zielonka(edges, inside - lost, priorities, owners)
+    return (found[0] | lost, found[1]) if side else (found[0], found[1] | lost)
+
+
+def _attractor(
+    edges: Mapping[Any, set[Any]], inside: set[Any], target: set[Any], side: int, owners: Mapping[Any, int]
+) -> set[Any]:
+    """The vertices of a subgame from which a side can force a visit of a target."""
+    sources: dict[Any, list[Any]] = {}
+    for vertex in inside:
+        for following in edges[vertex]:
+            if following in inside:
+                sources.setdefault(following, []).append(vertex)
+    left = {vertex: sum(item in inside for item in edges[vertex]) for vertex in inside}
+    found, queue = set(target), list(target)
+    for vertex in queue:
+        for source in sources.get(vertex, ()):
+            left[source] -= 1
+            if source not in found and (owners[source] == side or left[source] == 0):
+                found.add(source)
+                queue.append(source)
+    return found
+
+
+def unfair_goal(game: Game, decide: Callable[[Position, int], tuple[str | None, int]]) -> tuple[int, Any] | None:
+    """Return a goal that a strategy may miss for ever although all assumptions come true again and again, with where.
+
+    Args:
+        game: The game.
+        decide: Function that returns the request for a position and a mode, None for none, and the mode after it.
+    """
+    moves: dict[Any, set[Any]] = {}
+    turns: dict[Any, Any] = {}
+    queue: list[Any] = [(game.first, 0)]
+    for vertex in queue:
+        if vertex in moves:
+            continue
+        position, mode = vertex
+        if position == LOST:
+            return 0, vertex
+        event, after = decide(position, mode)
+        turns[vertex] = (position if event is None else game.choices[position][event], after)
+        moves[vertex] = {(target, mode) for target in game.successors[position]}
+        queue += [turns[vertex], *moves[vertex]]
+    return next((found for goal in range(len(game.goals)) if (found := _missed(game, goal, moves, turns))), None)
+
+
+def _missed(game: Game, goal: int, moves: dict[Any, set[Any]], turns: dict[Any, Any]) -> tuple[int, Any] | None:
+    """Return a goal, with a vertex of a cycle that misses it although every assumption is true on it."""
+    passing = {vertex: turn for vertex, turn in turns.items() if not game.holding(vertex[0], game.goals)[goal]}
+
+    def after(vertex: Any) -> set[Any]:
+        return {*moves[vertex], *([passing[vertex]] if vertex in passing else [])}
+
+    for component in _components(list(moves), after):
+        met = [vertex for vertex in component if vertex in passing and passing[vertex] in component]
+        holding = [game.holding(vertex[0], game.assumptions) for vertex in met]
+        if met and all(any(item[place] for item in holding) for place in range(len(game.assumptions))):
+            return goal, met[0]
+    return None
+
+
+def _components(vertices: list[Any], after: Callable[[Any], set[Any]]) -> Iterator[set[Any]]:
+    """The strongly connected components, by two searches (Kosaraju)."""
+    order: list[Any] = []
+    seen: set[Any] = set()
+    for root in vertices:
+        stack: list[tuple[Any, Iterator[Any]]] = [] if root in seen else [(root, iter(after(root)))]
+        seen.add(root)
+        while stack:
+            vertex, following = stack[-1]
+            found = next((item for item in following if item not in seen), None)
+            if found is None:
+                order.append(vertex)
+                stack.pop()
+            else:
+                seen.add(found)
+                stack.append((found, iter(after(found))))
+    sources: dict[Any, set[Any]] = {vertex: set() for vertex in vertices}
+    for vertex in vertices:
+        for item in after(vertex):
+            sources[item].add(vertex)
+    left = set(vertices)
+    for root in reversed(order):
+        if root in left:
+            left.discard(root)
+            component, queue = {root}, [root]
+            for vertex in queue:
+                for item in sources[vertex] & left:
+                    left.discard(item)
+                    component.add(item)
+                    queue.append(item)
+            yield component

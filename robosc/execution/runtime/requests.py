@@ -128,8 +128,9 @@ class Decisions:
         if enabled is None:
             enabled = self._steps.enabled = self._find_enabled()
         issued = None
+        # A strategy notes the goals that are true, also where it has nothing to choose.
+        candidates = self.policy.candidates(enabled)
         if enabled:
-            candidates = self.policy.candidates(enabled)
             if self._releases.waiting:
                 ending, others = self._split(candidates)
                 issued = self._issue_one_of(ending, now_s)

@@ -2,10 +2,12 @@
 
 from collections import Counter
 from random import Random
+from unittest.mock import Mock
 
 import pytest
 
 from robosc.automata.state import subjects
+from robosc.certification import make_supervisor
 from robosc.controller_properties import StrategyRun
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.settings import Settings, SettingsError
@@ -13,6 +15,7 @@ from robosc.expressions import Value
 from robosc.supervisor import Supervisor
 from support.controller_twin import World
 from support.execution import Bench
+from support.models import bundle_of
 from support.random_controllers import random_robot
 from support.random_goals import strategic_controller
 
@@ -65,6 +68,27 @@ def test_the_executor_issues_what_the_strategy_chooses() -> None:
             walk(supervisor, Random(seed), met)
             met["robots"] += 1
     assert met["robots"] > 60 and met["requests"] > 40 and met["waits"] > 1_000, met
+
+
+BLOCKED = """robot Blocked {
+    component Base {
+        incoming message go with type: none
+        behaviour { initial marked state here { } state there { on request to go } }
+    }
+    goal always eventually Base.here
+}"""
+
+
+def test_goals_are_noted_also_where_no_request_is_enabled(monkeypatch: pytest.MonkeyPatch) -> None:
+    outcome = make_supervisor(bundle_of(BLOCKED))
+    assert outcome.supervisor is not None
+    system = InterpretedSystem(outcome.supervisor)
+    bench = Bench(system)
+    decisions = Mock(side_effect=system.choose)
+    monkeypatch.setattr(system, "choose", decisions)
+    bench.executor.tick()
+    assert system.enabled_requests() == ()
+    assert decisions.call_count == 1
 
 
 def test_a_strategy_that_is_not_there_is_refused() -> None:

@@ -281,7 +281,7 @@ def test_a_goal_that_is_accepted_after_the_cleanup_is_cancelled(start: Callable[
     assert not cancelled.done()
     accepted.set_result(None)
     stage.until(cancelled.done, "the cancel")
-    # What still waited for its turn would reach the next test.
+    # Messages that still wait for their turn would reach the next test.
     stage.until(lambda: bool(ended), "the goal's end")
     stage.peer.spin_for(0.1)
     server.destroy()

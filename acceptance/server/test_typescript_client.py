@@ -61,7 +61,7 @@ def test_the_supervisor_is_that_of_the_command_line(answers: Any, tmp_path: Path
     found = answers["synthesis"]
     assert base64.b64decode(found["supervisor"]) == file.read_bytes()
     assert (found["status"], found["states"]) == ("SYNTHESIS_STATUS_SUPERVISOR", "16")
-    # How much is reported depends on how long it took.
+    # The number of reports depends on the time that it took.
     assert set(found["stages"]) <= {"check", "synthesis", "verification", "controller"}
     job = answers["job"]
     assert base64.b64decode(job["supervisor"]) == file.read_bytes()

@@ -198,7 +198,7 @@ class _Search:
         if target is None:
             self.lost = MissedGoal(None, self._trace(position))
             return
-        # What a goal of another action remembers stays.
+        # Bits that are held for goals of other actions stay.
         held = held if target == state else self._controller.forgotten(target, held)
         found = self._arrived((target, held), memory, after, position, (event,))
         if found is not None:

@@ -318,7 +318,7 @@ async def test_a_database_that_goes_and_comes_back(database_server: Postgresql, 
                 assert refused.value.reason is Reason.STORE_UNAVAILABLE
                 assert loop.time() - begun_s < 4.0
             assert not made.store.is_available
-            # What runs goes on, and ends.
+            # A running job goes on, and ends.
             gate.touch()
 
             async def is_through() -> bool:

@@ -22,7 +22,7 @@ from support.models import EXAMPLES, bundle_of
 COMBINATIONS = list(
     itertools.product(*map(get_args, (TurtleBot, template_module.DriveDriver, template_module.ScannerDriver)))
 )
-# What an engineer has to say: nothing on a robot shows it.
+# Facts that an engineer has to give: nothing on a robot shows them.
 OPEN = {
     "line_follower": set[str](),
     "line_follower_layer": set[str](),

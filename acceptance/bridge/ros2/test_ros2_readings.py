@@ -96,6 +96,14 @@ def until(peer: Peer, process: RosProcess) -> Callable[[Callable[[], bool], str]
     return lambda condition, what: peer.spin_until(condition, LIMIT_S, what, process)
 
 
+def other_threads_blocking(process: RosProcess, number: signal.Signals) -> list[bool]:
+    """Return, for each thread but the main one, whether it blocks a signal; the kernel shows it as a mask of bits."""
+    pid = process.popen.pid
+    tasks = [path for path in Path(f"/proc/{pid}/task").iterdir() if path.name != str(pid)]
+    masks = [re.search(r"^SigBlk:\s*(\w+)", (task / "status").read_text(), re.MULTILINE) for task in tasks]
+    return [bool(int(mask[1], 16) >> (number - 1) & 1) for mask in masks if mask]
+
+
 @pytest.mark.smoke
 def test_other_nodes_see_the_robot(robot: SimulatedTurtleBot3, peer: Peer, tmp_path: Path) -> None:
     with bridge_of(tmp_path, robot) as bridge:
@@ -156,6 +164,10 @@ def test_other_nodes_see_the_robot(robot: SimulatedTurtleBot3, peer: Peer, tmp_p
                 service.startswith(f"/{name}/get_type_description")
                 for service, _ in peer.node.get_service_names_and_types_by_node(name, "/")
             )
+            # The main thread waits for signals; one that any other thread took would kill the program.
+            blocking = other_threads_blocking(process, signal.SIGTERM)
+            assert len(blocking) > 4
+            assert all(blocking)
             process.signal(signal.SIGTERM)
             assert process.wait() == 0
             lines = process.stderr.splitlines()

@@ -107,6 +107,16 @@ _rate.__name__ = _metres.__name__ = "number"
 
 
 def _run(arguments: argparse.Namespace) -> int:
+    # Threads that are started from here on leave signals to this one, which waits for them. Imports start some, too:
+    # a single thread that does not block them would end the program whenever this one is busy.
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
+    try:
+        return _run_node(arguments)
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _run_node(arguments: argparse.Namespace) -> int:
     # gRPC and rclpy are imported where they are needed: help and wrong use are reported at once.
     from robosc_bridge.ros2.node import BridgeNode, MissingRosError, NodeError
     from robosc_bridge.ros2.relay import Relay
@@ -120,8 +130,6 @@ def _run(arguments: argparse.Namespace) -> int:
         arguments.frame_prefix,
     )
     scan = Place(*arguments.scan_at) if arguments.scan_at else None
-    # Threads that are started from here on leave signals to this one, which waits for them.
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, _SIGNALS)
     try:
         # Files that cannot be used are reported before anything is tried again and again.
         BridgeClient(arguments.address, credentials_of(arguments)).close()
@@ -137,8 +145,6 @@ def _run(arguments: argparse.Namespace) -> int:
     except (MissingRosError, NodeError, UnreachableError) as error:
         _say(str(error))
         return WRONG
-    finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _publish(arguments: argparse.Namespace, relay: Any) -> int:

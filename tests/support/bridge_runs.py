@@ -5,6 +5,7 @@ import subprocess
 import sys
 import threading
 from pathlib import Path
+from types import TracebackType
 from typing import Self
 
 from robosc_simulated import SimulatedTurtleBot3
@@ -87,8 +88,12 @@ class Running:
     def __enter__(self) -> Self:
         return self
 
-    def __exit__(self, *_: object) -> None:
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
         self.end()
+        if error is not None:
+            error.add_note(f"the bridge has written:\n{self.written}")
 
     def end(self) -> None:
         """Kill it."""

@@ -36,7 +36,8 @@ class Process:
                 stdout=output,
                 stderr=error,
                 cwd=folder,
-                start_new_session=True,
+                # No session of its own: the kernel shares out time among sessions, and a priority counts within one.
+                process_group=0,
             )
 
     @property
@@ -81,7 +82,7 @@ class Process:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        # It leads a session of its own.
+        # It leads a group of its own.
         with contextlib.suppress(ProcessLookupError):
             os.killpg(self.popen.pid, signal.SIGKILL)
         self.popen.wait()

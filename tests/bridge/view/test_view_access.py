@@ -25,7 +25,7 @@ from support.certificates import Authority
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed
 from support.pages_open import LIMIT_S, opened, token_of
 from support.view_servers import remotely_viewed
-from support.waiting import wait_until
+from support.waiting import until, wait_until
 
 
 @pytest.fixture
@@ -168,10 +168,8 @@ async def test_a_command_is_taken_back_when_its_page_leaves(endpoint: ViewEndpoi
     robot.refusal = None  # Nobody answers.
     async with opened(endpoint.url) as page:
         await page.send(type="command", command="resume", token=token_of(endpoint.url))
-        while not robot.orders:
-            await asyncio.sleep(0.002)
-    while len(robot.orders) < 2:
-        await asyncio.sleep(0.002)
+        await until(lambda: bool(robot.orders))
+    await until(lambda: len(robot.orders) == 2)
     assert [order.command for order in robot.orders] == [OperatorCommand.RESUME, OperatorCommand.STOP]
 
 
@@ -236,8 +234,7 @@ def test_large_binary_and_too_many_requests_end_the_stream(
 async def test_a_stop_of_a_page_that_closes_at_once_counts(endpoint: ViewEndpoint, robot: LiveRobot) -> None:
     async with opened(endpoint.url) as page:
         await page.send(type="stop")
-    while not robot.orders:
-        await asyncio.sleep(0.002)
+    await until(lambda: bool(robot.orders))
 
 
 def test_there_is_a_limit_of_pages_and_of_connections(

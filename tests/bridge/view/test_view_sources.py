@@ -20,6 +20,7 @@ from robosc_view.sources import RefusedError
 from support.live import LiveRobot, large_model, supervisor_without_synthesis, viewed_meanwhile
 from support.pages_open import opened, token_of
 from support.view_servers import remotely_viewed, served
+from support.waiting import until
 
 
 @pytest.fixture
@@ -41,7 +42,7 @@ async def test_a_bridge_that_ends_is_reported_and_found_again(
             assert (await page.told("gone"))["why"]
             await page.send(type="stop")
             assert "bridge" in (await page.told("refused"))["why"]
-            # Who comes now learns it, too.
+            # A page that comes now learns it, too.
             async with opened(server.url) as late:
                 assert (await late.next())["type"] == "gone"
             again = serve(robot.operations, RemoteSettings(endpoint.address))
@@ -58,7 +59,7 @@ async def test_a_bridge_that_ends_is_reported_and_found_again(
 
 async def test_a_robot_that_is_there_again_is_not_reported_as_lost() -> None:
     viewer = hub_module.Viewer()
-    # Who has not read for a while receives what is so now, and every answer.
+    # A viewer that has not read for a while receives the present state, and every answer.
     viewer.answer("refused")
     for _ in range(2 * hub_module.MAXIMUM_ANSWERS):
         viewer.source_lost("gone")
@@ -102,7 +103,7 @@ def test_both_ways_to_a_bridge_define_and_report_the_same(robot: LiveRobot) -> N
     response = convert.definition(robot.operations)
     near, far = RunningBridge(robot.operations).robot, robot_from(response)
     assert near == far
-    # As a bridge of before, which did not send its supervisor.
+    # An earlier bridge, which did not send its supervisor.
     response.supervisor = b""
     without = robot_from(response)
     assert (without.shape, without.table, without.communications, without.requests) == (
@@ -112,7 +113,7 @@ def test_both_ways_to_a_bridge_define_and_report_the_same(robot: LiveRobot) -> N
         near.requests,
     )
     assert without.supervisor is None
-    # As one of later, with another format.
+    # A later bridge, with another format.
     response.supervisor = b'{"format":"robosc-supervisor","version":99}'
     assert robot_from(response).supervisor is None
     response.definition = "[" * 100_000
@@ -142,8 +143,7 @@ async def test_the_feed_is_asked_only_while_somebody_looks(robot: LiveRobot) -> 
         async with opened(server.url) as page:
             await page.told("update")
             assert robot.feed.is_watched
-        while robot.feed.is_watched:
-            await asyncio.sleep(0.002)
+        await until(lambda: not robot.feed.is_watched)
         async with opened(server.url) as page:
             await page.told("update")
 

@@ -14,7 +14,7 @@ from robosc_view import remote_bridge
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
 from support.pages_open import LIMIT_S, OpenPage, opened
 from support.view_servers import remotely_viewed
-from support.waiting import wait_until
+from support.waiting import until, wait_until
 
 MOST_THREADS = 12
 
@@ -103,9 +103,11 @@ def asking() -> int:
 
 
 async def until_stopped(robot: LiveRobot, count: int) -> None:
-    async with asyncio.timeout(LIMIT_S):
-        while len(robot.orders) < count:
-            await asyncio.sleep(0.005)
+    await until(lambda: len(robot.orders) >= count)
+
+
+async def until_connected(gate: Gate, count: int) -> None:
+    await until(lambda: gate.connections >= count)
 
 
 async def press(page: OpenPage, count: int) -> None:
@@ -123,7 +125,7 @@ async def test_who_comes_and_goes_and_hammers_on_the_button_starts_few_threads(r
                 await press(page, 40)
             assert asking() <= MOST_THREADS
         assert robot.orders == []
-        # Of all those who have left at least one is heard, and who stays has an answer.
+        # One stop of the pages that have left is heard, at least, and a page that stays has an answer.
         async with opened(server.url) as page:
             await press(page, 3)
             gate.is_open.set()
@@ -161,12 +163,10 @@ async def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(
     # Whatever ends one, it is not its time.
     monkeypatch.setattr(client, "STOP_LIMIT_S", 10 * LIMIT_S)
     async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server, opened(server.url) as page:
-        # What the robot is, and a stop; then one after the other, each on a way of its own.
+        # The definition and a stop come first; then one after the other, each on a way of its own.
         for count in range(2, 5):
             await press(page, 1)
-            async with asyncio.timeout(LIMIT_S):
-                while gate.connections < count:
-                    await asyncio.sleep(0.005)
+            await until_connected(gate, count)
         await press(page, 1)
         assert not any(message.get("what") == "stop" for message in page.messages)
         assert robot.orders == []

@@ -317,7 +317,7 @@ def test_a_folder_that_is_not_trusted_starts_nothing_of_its_own(
         assert editor.do("open", file=folder / "follower.rscd") == {"language": "robosc"}
         editor.message("'robosc-lsp' is not there").wait_for()
         assert editor.command("explore", folder / "follower.rscd") is None
-        # What the user has set for all folders names nothing in this one, either.
+        # Settings of the user for all folders name nothing in this one, either.
         editor.do("command", name="notifications.clearAll")
         editor.do("set", name="robosc.programs", value=".venv/bin", everywhere=True)
         editor.do("command", name="robosc.restartServer")

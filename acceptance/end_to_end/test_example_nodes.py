@@ -282,7 +282,7 @@ def test_a_wrong_parameter_is_one_line_and_exit_status_2(at: Stage) -> None:
     processes = [at.helper(node, parameter) for node, parameter, _ in WRONG_PARAMETERS]
     for process, (node, _, complaint) in zip(processes, WRONG_PARAMETERS, strict=True):
         assert process.wait(60.0) == 2
-        # What rcl itself prints about its arguments comes before.
+        # Lines of rcl itself about its arguments come before.
         *others, line = process.stderr.splitlines()
         assert line.startswith(f"{node}: {complaint}")
         assert all(other.startswith("[ERROR]") for other in others)

@@ -225,7 +225,7 @@ def test_state_prefix_stale_sensors_and_other_scans(start: Start, peer: Peer) ->
 
     def see() -> None:
         robot.line()
-        # Of 720 beams the model's 360 are made.
+        # The model's 360 beams are made from 720.
         robot.scan(2.0, count=720)
 
     wait_until(lambda: robot.speed == 0.15, "the robot to move", repeat=see)

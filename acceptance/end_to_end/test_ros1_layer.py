@@ -95,7 +95,7 @@ def test_whatever_a_careless_controller_sends_the_robot_stands_still_unless_it_m
     require_that_a_careless_controller_is_supervised(porter)
     layer = porter.layer
     assert layer is not None
-    # What it asks for is answered by the layer, and the robot's sensors come through it.
+    # Its requests are answered by the layer, and the robot's sensors come through it.
     porter.until(
         lambda: {"reply", "goal", "scan"} <= {what for what, _ in received(layer.stdout)},
         "what the controller receives",

@@ -209,7 +209,7 @@ def test_a_service_that_is_lost_is_an_error_before_the_timeout(courier: Courier)
     courier.order("power", lambda: courier.value("Power", "failures") not in ("0", "1"))
     first, *others = courier.reasons_of("power.error")
     assert "the call of /power failed" in first
-    # As many as were ordered until the first of them was seen.
+    # Others are those that were ordered until the first of them was seen.
     assert others
     assert all("unable to connect" in reason for reason in others)
 

@@ -127,7 +127,7 @@ def test_messages_on_one_name_are_told_apart(porter: Porter) -> None:
     porter.until(lambda: porter.volumes[-1].data == 2.0, "a loud sound", lambda: sound(2.0))
 
 
-# When wheels stop.
+# Stops of the wheels.
 
 
 def test_a_controller_that_dies_leaves_a_robot_that_stands_still(porter: Porter) -> None:

@@ -73,7 +73,7 @@ class Stage:
         self._change = peer.node.create_client(ChangeState, f"/{PACKAGE}/change_state")
         self._get = peer.node.create_client(GetState, f"/{PACKAGE}/get_state")
         self.until(lambda: self._change.service_is_ready() and self._get.service_is_ready(), "the node's services")
-        # Who is found last is found after the other: a change is never asked for twice.
+        # Discovery of the last service ends after that of the other: a change is never requested twice.
         peer.ask(self._get, GetState.Request(), LIMIT_S, node)
 
     def until(self, condition: Callable[[], bool], what: str, repeat: Callable[[], object] = lambda: None) -> None:

@@ -293,7 +293,7 @@ def test_a_prefix_moves_every_topic(start: StartNode, peer: Peer) -> None:
 def test_a_wrong_parameter_is_one_line_and_exit_status_2(start: StartNode, parameter: str, complaint: str) -> None:
     node = start(parameter)
     assert node.wait() == 2
-    # What rcl itself prints about its arguments comes before.
+    # Lines of rcl itself about its arguments come before.
     *others, line = complaints(node)
     assert line.startswith(f"{PACKAGE}: {complaint}")
     assert all(other.startswith("[ERROR]") for other in others)

@@ -107,7 +107,7 @@ def test_other_nodes_see_a_turtlebot(serve: Callable[..., Served], tmp_path: Pat
     stamp = odometry[-1].header.stamp
     assert stamp.sec + stamp.nanosec / 1e9 == pytest.approx(times_s[-1], abs=1.0)
 
-    # What is said on its standard input happens to it.
+    # Commands on its standard input happen to it.
     behind_m = scans[-1].ranges[0]
     twin.send("obstacle box 1.2 0.0")
     twin.until(lambda: scans[-1].ranges[0] < behind_m - 0.3, "the box to be seen")

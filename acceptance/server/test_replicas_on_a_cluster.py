@@ -119,7 +119,7 @@ def done_elsewhere(ours: Client, theirs: Client, task: Task) -> Synthesis | Gene
     assert not seen[-1].from_store
     result = theirs.job_result(submitted.id)
     assert isinstance(result, Synthesis | Generation)
-    # What one has worked out the other one knows, and ends a job at once.
+    # A result of one server is known to the other one, which ends a job at once.
     again = theirs.submit(task).job
     assert (again.state, again.from_store, again.attempts) == (JobState.SUCCEEDED, True, 0)
     assert ours.get_job(again.id) == again

@@ -187,7 +187,7 @@ async def test_what_a_server_accepts_while_its_disk_is_full_is_kept_and_the_rest
                     assert (error.code(), reason_of(error)) == (grpc.StatusCode.UNAVAILABLE, "STORE_UNAVAILABLE")
             assert len(kept) < _MANY - 10
             await calls.becomes(False, True, False)
-            # What is there is read, and what needs no disk goes on.
+            # Stored results are read, and work that needs no disk goes on.
             assert await calls.result(before) == result_of("before")
             assert {job.id for job in await calls.jobs()} >= {before, running, *kept.values()}
             calls.open_gate("gate")

@@ -68,7 +68,7 @@ def model_differences(stored: Model, model: Model) -> tuple[str, ...]:
 
 
 def _differences(place: str, stored: Any, model: Any) -> Iterator[str]:
-    # As it is written down, 1 is neither 1.0 nor true.
+    # The number 1, in writing, is neither 1.0 nor true.
     if _ENCODER.encode(stored) == _ENCODER.encode(model):
         return
     if isinstance(stored, tuple) and isinstance(model, tuple):

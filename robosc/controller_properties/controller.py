@@ -108,7 +108,7 @@ class Controller:
     ) -> None:
         self.system: System = executable.executed_automata
         self.is_deterministic = self.system is executable.automata
-        # What is executed may have other automata than those that were given a meaning.
+        # An executed system may have other automata than those that were given a meaning.
         self._semantics = semantics if semantics and self.is_deterministic else Semantics(self.system)
         model = executable.model
         self._added = state_predicates(self.system, added)

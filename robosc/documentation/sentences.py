@@ -81,7 +81,7 @@ def _listed(start: str, meaning: str, conditions: Sequence[Expression]) -> str:
 def provide_sentences(communication: str, provides: Sequence[Provide]) -> str:
     """Describe the data that a request carries: one sentence, or a list of the cases in their order."""
     statements = list(provides)
-    # What stands behind a statement without condition never gives the data.
+    # Statements behind one without condition never give the data.
     final = next((number for number, item in enumerate(statements) if item.condition is None), None)
     reached = statements if final is None else statements[: final + 1]
     if final == 0:

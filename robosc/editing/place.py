@@ -61,7 +61,7 @@ def place_at(text: str, offset: int) -> Place | None:
     texts, kinds, starts = tokenize_broken(before)
     count = kinds.index(Kind.END)
     end = starts[count - 1] + len(texts[count - 1]) if count else 0
-    # Of what stands behind the last token, comments that are closed do not hold the cursor.
+    # Closed comments behind the last token do not hold the cursor.
     if "//" in _CLOSED.sub("", before[end:]).rpartition("\n")[2]:
         return None
     if count and kinds[count - 1] == Kind.OTHER:

@@ -64,7 +64,7 @@ def parse(file: SourceFile) -> Parsed:
     if hidden is not None:
         # Other findings may come of it: it is reported alone, and the rest read for the sake of its sound parts.
         tokens = readable_tokens(file.text)
-    # Whoever works with the tree walks it recursively too.
+    # Users of the tree walk it recursively too.
     allow_depth(MAXIMUM_NESTING, FRAMES_PER_LEVEL)
     parser = _Parser(file, tokens, places)
     tree = None
@@ -385,7 +385,7 @@ class _Parser(GoalParser):
             begin = next((at for at in read if texts[at : at + 2] == head), len(read))
             found = next((at for at in read[begin:] if texts[at] == "type"), None)
             return "" if found is None else texts[found + 2]
-        # Where an enum has the value, it is of that enum.
+        # A value that an enum has is of that enum.
         rule = next((at for at in read if texts[at : at + 2] == ["->", value]), 0)
         enum = next((at for at in range(rule, 0, -1) if texts[at] == "enum"), None)
         return "" if enum is None else texts[enum + 1]

@@ -217,7 +217,7 @@ def test_ctrl_d_at_the_prompt(folder: Path) -> None:
     with subprocess.Popen(
         command, stdin=other_end, stderr=subprocess.PIPE, text=True, start_new_session=True
     ) as process:
-        # What is typed before the prompt is there does not count.
+        # Keys that are typed before the prompt is there do not count.
         assert process.stderr is not None
         assert process.stderr.read(len("token: ")) == "token: "
         os.write(main_end, b"\x04")

@@ -78,7 +78,7 @@ def check_tokens(text: str, found: RobotScopes) -> None:
         behind = start + len(word)
         inside = [found[place] for place in range(start, behind) if text[place] != "\n"]
         if kind == Kind.OTHER:
-            # What is never closed goes on to the end.
+            # A comment or text that is never closed goes on to the end.
             never_closed = COMMENT if word.startswith("/*") else STRING if word[0] in "\"'" else None
             assert never_closed is None or all(has(scopes, never_closed) for scopes in inside), word
             continue

@@ -107,7 +107,7 @@ def test_an_unsaved_library_is_what_counts(editor: Editor, tmp_path: Path) -> No
 
 
 def test_a_text_that_is_odd_keeps_nobody_else_from_findings(editor: Editor) -> None:
-    # What an editor sends while somebody splits an emoji, and a mark that some put before every text.
+    # A text while a user splits an emoji, and a mark that some editors put before every text.
     editor.open("odd.rscd", "\ufeff// \ud83d\nrobot Odd { component c { incoming message m with type: nne } }")
     editor.open("other.rscd", "robot Other { component c { incoming message m with type: nne } }")
     for name in ("odd.rscd", "other.rscd"):
@@ -167,7 +167,7 @@ def test_warnings_of_synthesis_follow_and_are_those_of_the_text(tmp_path: Path) 
         unused = next(item for item in found if item.code == "unused-requirement")
         assert unused.severity is lsp.DiagnosticSeverity.Warning
         assert unused.range.start.line == ROBOT[: ROBOT.index("requirement {")].count("\n")
-        # What is in the library is reported there, too: here it has no line.
+        # Findings in the library are reported there, too: here they have no line.
         assert any("parts.rscd:" in item.message for item in found if item.code == "never-enabled")
         editor.replace("walker.rscd", "robot Empty { }")
         codes = editor.codes("walker.rscd")
@@ -364,7 +364,7 @@ def test_nothing_is_renamed_where_not_all_files_are_searched(editor: Editor, mon
 @pytest.mark.parametrize(
     "broken",
     [
-        # What the file imports from is not to be seen.
+        # The library that the file imports from is not to be seen.
         ROBOT.replace("from parts import", "from parts imprt"),
         ROBOT.replace("from parts import", "from parst import"),
         ROBOT.replace("from parts import", "from 'parts import"),
@@ -617,7 +617,7 @@ def test_a_fix_that_brings_more_errors_is_not_offered(editor: Editor) -> None:
     assert actions(editor, "double.rscd", "import Lm|p") == []
 
 
-# What is offered
+# Completion
 
 
 def test_behind_requirement_communications_are_offered(editor: Editor) -> None:

@@ -29,7 +29,7 @@ async def test_one_at_a_time_and_the_text_edited_last_first() -> None:
     ends["a"].set()
     await settled()
     assert had == ["a", "c"]
-    # Who does not want it any more keeps nobody waiting, be it while it waits or while it is at it.
+    # A cancelled task keeps no other one waiting, be it while it waits or while it runs.
     tasks["b"].cancel()
     await settled()
     assert had == ["a", "c"]

@@ -41,7 +41,7 @@ def test_a_person_is_found_wherever_the_scan_begins(
     scan = scan_of([(ahead, left, radius)], start_rad=start, sense=sense)
     person = find_person(scan)
     assert person is not None
-    # What is seen is the front, not the middle.
+    # The laser sees the front, not the middle.
     assert math.hypot(person.ahead_m - ahead, person.left_m - left) <= radius
     assert person.distance_m < distance
     assert person.confidence >= 0.6

@@ -12,7 +12,7 @@ pytest.importorskip("cv2", reason="OpenCV (the extra examples) is not installed"
 
 from robosc_examples.pictures import PictureError, colour_picture, grey_picture
 
-# Where each encoding has red, green and blue.
+# Places of red, green and blue in each encoding.
 ENCODINGS = {"rgb8": (0, 1, 2), "bgr8": (2, 1, 0), "rgba8": (0, 1, 2), "bgra8": (2, 1, 0), "mono8": (0, 0, 0)}
 CHANNELS = {"rgb8": 3, "bgr8": 3, "rgba8": 4, "bgra8": 4, "mono8": 1}
 

@@ -162,7 +162,7 @@ class TestWork:
         pid = int(next(call).progress.message)
         goes_on(pid)
         received: list[int] = []
-        # What is newest is sent in any case, and nothing is sent after what is newer.
+        # The newest progress is sent in any case, and nothing is sent after newer progress.
         for response in call:
             received.append(int(response.progress.message.removeprefix("step ")))
             if received[-1] == 19:

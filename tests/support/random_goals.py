@@ -41,7 +41,7 @@ def with_random_goals(model: Model, dice: Random) -> Model:
 
     goals = tuple(item(Goal, list(GoalForm)) for _ in range(dice.randint(1, 3)))
     if dice.random() < 0.5:
-        # What has to be in one state again and again, and in another one, must move.
+        # A component that has to be in one state again and again, and in another one, must move.
         goals = _rounds(model, dice)
     owed = [GoalForm.ALWAYS_EVENTUALLY, GoalForm.LEADS_TO]
     assumptions = tuple(item(Assumption, owed) for _ in range(dice.randint(0, 2)))

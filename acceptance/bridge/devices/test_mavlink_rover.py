@@ -31,7 +31,7 @@ def test_it_opens_disarmed_and_drives_as_commanded(any_bench: Bench) -> None:
     bench.drive_until(lambda reading: reading.velocity == STANDSTILL)
     reading = bench.drive(seconds=0.2)
     x_m, y_m, heading_rad = bench.world.pose
-    # As seen from where it was.
+    # The distance ahead, seen from its first place.
     ahead_m = (x_m - POSE[0]) * math.cos(POSE[2]) + (y_m - POSE[1]) * math.sin(POSE[2])
     left_m = (y_m - POSE[1]) * math.cos(POSE[2]) - (x_m - POSE[0]) * math.sin(POSE[2])
     assert (reading.pose.x_m, reading.pose.y_m) == pytest.approx((ahead_m, left_m), abs=0.001)

@@ -190,13 +190,13 @@ def test_set_points_move_the_wheels_as_far_as_the_layer_lets_them(tmp_path: Path
         _running(tmp_path, robot, remote, model, "layer") as process,
     ):
         there.beat("standby", lambda beat: beat.system_status == 3, START_LIMIT_S)
-        # What is asked for before it is armed comes to nothing.
+        # A velocity before it is armed comes to nothing.
         there.velocity(0.1)
         assert there.command(400, 1.0) == 0
         there.beat("arming", _armed)
         assert speeds(robot) == (0.0, 0.0)
         there.asking_for(0.1, lambda: min(speeds(robot)) > 0.0, "motion")
-        # Where the layer says no, the wheels stop although the set-points go on.
+        # Wheels stop when the layer refuses, although the set-points go on.
         count = joined_texts(there.heard).count(HELD_BACK)
         robot.world.place(1.5, 0.0, 0.0)
         there.asking_for(0.1, lambda: speeds(robot) == (0.0, 0.0), "standstill before a wall")

@@ -270,7 +270,7 @@ def heard(message):
 rclpy.init()
 node = rclpy.create_node("tf_listener")
 node.create_subscription(TFMessage, "/tf", heard, 100)
-# As tf2_ros listens.
+# The quality of service with which tf2_ros listens.
 latched = QoSProfile(depth=100, durability=DurabilityPolicy.TRANSIENT_LOCAL)
 node.create_subscription(TFMessage, "/tf_static", heard, latched)
 rclpy.spin(node)

@@ -25,7 +25,7 @@ def seen(browser: Browser, server: StandIn) -> Iterator[Visit]:
 
 def test_a_lost_connection_is_unmistakable_and_ends_by_itself(server: StandIn, seen: Visit) -> None:
     seen.page.get_by_label("Filter components by name").fill("Base")
-    # What the reader has chosen is done before the robot comes anew.
+    # Choices of the reader are made before the robot comes anew.
     seen.wait("() => document.querySelector('#components-count').textContent === '1 of 3'")
     server.away()
     seen.wait(FRESHNESS_IS, "lost")

@@ -36,7 +36,7 @@ def test_escape_stops_wherever_the_keyboard_is(server: StandIn, seen: Visit, foc
     if focus == "dialog":
         seen.page.get_by_role("button", name="Enlarge the graph of Base").click()
     elif focus != "body":
-        # What is not shown yet cannot have the keyboard.
+        # An element that is not shown yet cannot have the keyboard.
         seen.page.locator(focus).wait_for()
         seen.page.locator(focus).focus()
         assert seen.page.evaluate("(wanted) => document.activeElement.matches(wanted)", focus)
@@ -54,7 +54,7 @@ def test_a_graph_in_full_size_leaves_the_stop_and_the_age_in_reach(
         server.wait_for_pages(1)
         seen.page.get_by_role("button", name="Enlarge the graph of Base").click()
         dialog = seen.page.get_by_role("dialog", name="Base")
-        # Who opens it by the keyboard does not stop the robot with the next press.
+        # A user who opens it by the keyboard does not stop the robot with the next press.
         assert seen.page.evaluate("() => document.activeElement.id") == "large-close"
         # Clicked as a person does: what covers it would be hit instead.
         dialog.get_by_role("button", name="STOP").click()
@@ -91,7 +91,7 @@ def test_another_robot_closes_the_graph_in_full_size(server: StandIn, seen: Visi
     server.send(definition(robot="Another"), update())
     seen.wait("() => document.querySelector('#robot').textContent === 'Another'")
     seen.wait("() => !document.querySelector('dialog').open")
-    # Of the new one it is the graph that lives.
+    # The graph of the new robot lives.
     seen.page.get_by_role("button", name="Enlarge the graph of Base").click()
     server.send(update(components={"Base": {"state": "driving", "variables": {}}}))
     seen.wait("() => document.querySelector('dialog .state.is-active')?.dataset.state === 'driving'")

@@ -118,7 +118,7 @@ def test_filters_by_text_and_by_kind(server: StandIn, seen: Visit) -> None:
     seen.page.get_by_role("checkbox", name="fault").uncheck()
     seen.page.get_by_role("checkbox", name="controllable", exact=True).uncheck()
     counted(seen, "0 entries of 4")
-    # What comes is filtered, too.
+    # Later entries are filtered, too.
     server.send(events([entry(5), entry(6, controllable=False), entry(7, kind="stop", event="", text="a signal")]))
     counted(seen, "1 entry of 7")
     assert rows(seen) == [7]

@@ -103,7 +103,7 @@ async def test_a_server_is_killed_in_the_middle_of_fifty_jobs_and_nothing_is_los
         ids, jobs, results = await before(process, address)
     with job_server(state) as (_, address):
         async with stub_for(address) as stub:
-            # What had ended is as it was, with its result.
+            # Ended jobs are as they were, with their results.
             assert [await job_at(stub, job_id) for job_id in ids[:12]] == jobs[:12]
             assert [await result_at(stub, job_id) for job_id in ids[:12]] == results
             # The others are there, and what was begun twice is those that ran.
@@ -281,7 +281,7 @@ def test_a_full_disk_refuses_jobs_and_the_server_lives_on(tmp_path: Path) -> Non
                     refusals += 1
             assert refusals >= 10
             assert not made.store.is_available
-            # What is there is read.
+            # Stored results are read.
             assert (await made.manager.get(before.id, ME)).state is JobState.SUCCEEDED
             gate.touch()
 

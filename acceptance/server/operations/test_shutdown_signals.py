@@ -53,7 +53,7 @@ def test_an_end_that_hangs_is_forced_and_reported(how: str, words: str, tmp_path
         _, log = process.communicate(timeout=PATIENCE_S)
     assert process.returncode == 1, log
     assert words in log
-    # Where it hangs is in the program of this test, which is no file.
+    # The place where it hangs is in the program of this test, which is no file.
     assert "<string>" in log
 
 

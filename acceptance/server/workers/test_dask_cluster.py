@@ -292,7 +292,7 @@ def test_workers_that_are_lost_before_they_begin_are_not_the_tasks_fault(tmp_pat
         last.send_signal(signal.SIGCONT)
         assert said(future.result(60)) == "at last"
 
-        # What the server knows of its workers is as old as its last look: the losses are seen, then those that come.
+        # The server's knowledge of its workers is as old as its last look: losses are seen, then those that come.
         assert eventually(lambda: running.workers.capacity == 1)
         for _ in range(2):
             cluster.start_worker()

@@ -11,7 +11,7 @@ from robosc_bridge.skills.settings import EmergencyStopSettings, LineSettings, R
 
 _Text = Annotated[str, Meta(min_length=1, max_length=4096)]
 _Name = Annotated[str, Meta(min_length=1, max_length=255)]
-# Where a text ends: Python's `$` takes a line feed after it, and JSON Schema's expressions know no `\Z`.
+# The end of a text: Python's `$` takes a line feed after it, and JSON Schema's expressions know no `\Z`.
 _OptionName = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_]{0,39}(?![\s\S])", title="baud or watchdog_s")]
 _Address = Annotated[
     str, Meta(pattern=r"^(\[[0-9a-fA-F:.]{2,45}\]|[A-Za-z0-9._-]{1,253}):[0-9]{1,5}(?![\s\S])", title="HOST:PORT")

@@ -121,7 +121,7 @@ def _engine(supervisor: Supervisor) -> GeneratedFiles:
     try:
         return generate_c(supervisor, GenerateOptions())
     except UnsupportedModelError as error:
-        # What refuses the model is the target that this one is built on.
+        # The target that this one is built on refuses the model.
         raise UnsupportedModelError(str(error).replace("the target c99", "it")) from error
 
 

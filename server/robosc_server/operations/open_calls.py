@@ -126,7 +126,7 @@ class _CallSlots:
             )
         self._by_caller[caller] = count + 1
         self.taken += 1
-        # When the call has ended for gRPC as well: an unread response keeps it open after the handler has returned.
+        # The call has now ended for gRPC as well: an unread response keeps it open after the handler has returned.
         self._arrivals.begun(peer)
         context.add_done_callback(partial(self._release, caller, peer))
 

@@ -124,7 +124,7 @@ def main() -> int:
     mapping = map_channels(supervisor.model, loaded.configuration, loaded.document)
     machine = assemble(loaded.configuration, mapping, supervisor, NullLog(), starts_itself=True)
     noted_s = _watch_decisions(machine)
-    # As soon as the devices are there it would start.
+    # The bridge would start as soon as the devices are there.
     machine.daemon.post(OperatorCommand.STANDBY)
     loop = threading.Thread(target=machine.run)
     loop.start()

@@ -96,7 +96,7 @@ def turns(records: Sequence[Record], lidar: str) -> Iterator[tuple[float, bool]]
             revolution = builder.add(model.points(frame))
             if revolution:
                 ranges = nearest_by_degree(revolution.angles_deg, revolution.ranges_m)
-                # As the model has it: what is not measured is an obstacle.
+                # The model's rule: a beam without a measurement is an obstacle.
                 yield record.time_s, not all(ranges[degree] > NEAREST_M for degree in AHEAD)
 
 

@@ -296,7 +296,7 @@ def test_devices_that_are_not_there_are_reported(monkeypatch: pytest.MonkeyPatch
     )
     (line,) = errors_of(model, "channels: {/m: {channel: button, name: buton_1}}")
     assert line.endswith("the drive 'opencr' has no button 'buton_1'; did you mean 'button_1'?")
-    # What a plug-in declares counts, and where it declares nothing, all may be there.
+    # Declarations of a plug-in count, and without any, all may be there.
     driver_registry.register(
         driver_registry.Driver(
             driver_registry.Kind.DRIVE_BASE, "cart", "a cart", object, driver_registry.DriverFeatures(("button_7",))

@@ -42,7 +42,7 @@ def error_of(text: str | bytes) -> str:
         (".5", 0.5),
         ("1e-3", 0.001),
         ("-2.E+2", -200.0),
-        # What YAML 1.1 makes something else of.
+        # Words that YAML 1.1 takes for something else.
         ("on", "on"),
         ("No", "No"),
         ("1:30", "1:30"),

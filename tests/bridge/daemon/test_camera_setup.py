@@ -150,7 +150,7 @@ def test_the_model_gets_the_cameras_faults_and_the_robot_is_not_stopped_for_them
         "blind.response",
         "broken.response",
     ]
-    # What only repeats it is no news.
+    # A mere repetition is no news.
     assert scene.report(DeviceDown(Device.CAMERA, "gone", 1.0, False)) == []
     assert scene.report(DeviceUp(Device.CAMERA)) == ["sees.response"]
     assert scene.daemon.state is State.RUNNING

@@ -35,7 +35,7 @@ class Bug(Exception):
     """A bug in a part of the bridge."""
 
 
-# What a line may do without any harm.
+# Faults of a line that do no harm.
 HARMLESS = (
     {"split_s": 0.0},
     {"garbage": b"\xff\xff\xfd\x00\x01"},
@@ -118,7 +118,7 @@ def test_a_disturbed_line_does_not_stop_the_wheels_for_good(base: str, wire: dic
         assert (bridge.state, bridge.log.events().count("lost.response")) == (State.RUNNING, 0)
 
 
-# What the supervisor asks for.
+# Requests of the supervisor.
 
 
 @pytest.mark.parametrize("base", BASES)
@@ -138,7 +138,7 @@ def test_no_wheel_is_commanded_more_than_its_limit_nor_at_once(base: str, veloci
             # Servos and OpenCR take whole steps: 0.8 mm/s of a wheel, and 0.01 m/s and 0.01 rad/s.
             assert abs(linear_m_s) <= 0.1 + 1e-3
             assert abs(angular_rad_s) <= 0.8 + 1e-2
-            # Of what happened at the same speed before, the device hears a little later.
+            # The device hears a little later of events at the same speed before.
             since_s = at_s - commands[0][0] + reach_s
             assert abs(linear_m_s) <= linear_m_s2 * since_s
             assert abs(angular_rad_s) <= angular_rad_s2 * since_s
@@ -235,7 +235,7 @@ def test_a_thread_that_is_halted_between_decision_and_writing_sends_no_old_veloc
         monkeypatch.setattr(SafetyLayer, "output", output)
         bridge.until(lambda: ends and _orders(bridge, base, ends[0]), "the first order after the gap")
         assert _orders(bridge, base, ends[0])[0]
-        # What follows is decided anew, and begins at standstill.
+        # Later requests are decided anew, and begin at standstill.
         before = len(bridge.trace.told)
         bridge.host.sleep(1.0)
         assert all(max(map(abs, wheels)) < 0.05 for _, *wheels in bridge.trace.told[before : before + 1])

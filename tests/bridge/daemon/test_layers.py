@@ -169,7 +169,7 @@ def test_a_caller_that_falls_silent_is_released_though_the_loop_repeats_what_it_
     assert scene.out.linear_m_s == 0.1
     scene.live(0.2, 2.0)
     assert scene.out == STANDSTILL
-    # What is repeated goes on.
+    # A repeated request goes on.
     for _ in range(10):
         program.say(MessageRequested, "/cmd_vel", FORWARD)
         scene.live(0.2, 2.0)
@@ -572,7 +572,7 @@ def test_programs_may_come_and_go_in_the_middle_of_everything(steps: list[tuple[
     assert scene.out == STANDSTILL
     scene.live(1.0, 2.0)
     assert (scene.out, scene.daemon.state) == (STANDSTILL, State.RUNNING)
-    # Whoever comes finds everything free.
+    # A program that comes finds everything free.
     late = come()
     late.say(GoalRequested, "face", "1", {"angle": 10})
     assert GoalTaken("1") in late.told

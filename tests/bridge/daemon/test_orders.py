@@ -104,7 +104,7 @@ NOT_STOPPED = "no operator has stopped the robot"
 ENDED = "the bridge has ended"
 LATCHED = "An operator has stopped the robot. Resume or reset it first."
 
-# What each command is answered in each state, and the state some time later.
+# Answers to each command in each state, and the state some time later.
 TABLE: list[tuple[Callable[[], Operated], OperatorCommand, str, State]] = [
     (starting, OperatorCommand.START, "the robot is starting: the scanner is not there", State.STARTING),
     (starting, OperatorCommand.STANDBY, DONE, State.STARTING),
@@ -196,7 +196,7 @@ def test_a_stop_wins_over_what_was_ordered_before_it(command: OperatorCommand, b
         scene.live(0.02, 2.0)
         moved.append(scene.out)
     assert set(moved) == {STANDSTILL}
-    # Who may go on, or is reset, may be put to rest as well; only an operator's stop says otherwise.
+    # A robot that may go on, or is reset, may be put to rest as well; only an operator's stop says otherwise.
     is_done = (
         command is not OperatorCommand.STOP
         if before is OperatorCommand.RESUME

@@ -247,7 +247,7 @@ def test_what_a_program_was_asked_for_fails_when_it_is_gone(start: Any) -> None:
     server, asked = start(scene)
     server.leave()
     assert state(scene) == "failed"
-    # What it sends afterwards is nobody's.
+    # Later messages of it belong to no request.
     server.say(Replied, asked.number, True)
     server.say(MessageReceived, "/go", 0)
     assert (len(server.told), variable(scene, "wanted")) == (0, 2 if start is called else 3)

@@ -68,7 +68,7 @@ def test_the_memory_of_what_waits_is_bounded(data: Any, monkeypatch: pytest.Monk
     *kept, last = taken(box)
     assert 1 <= len(kept) < 20
     assert last == Overflowed(sender, lost=20 - len(kept))
-    # There is room again.
+    # Room is free again.
     box.put(MessageReceived(sender, "/mood", data()))
     assert isinstance(box.take(), MessageReceived)
 

@@ -8,7 +8,7 @@ import pytest
 
 from support.promises import GOES_ON_S, HEAD, PAGE, PROMISES, Promise, PromiseBrokenError, measured_s
 
-# What a busy machine may add in real time, where the page was measured, in seconds.
+# Time that a busy machine may add in real time, where the page was measured, in seconds.
 BUSY_S = 0.06
 
 

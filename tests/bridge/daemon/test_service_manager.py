@@ -169,7 +169,7 @@ def test_a_step_that_takes_too_long_is_a_thread_that_hangs() -> None:
     worker.step(base.now_s)
     assert base.seen == [True, False]
     assert worker.is_cycling(base.now_s)
-    # What it brings is nothing: the driver fails.
+    # The worker brings nothing: the driver fails.
     worker.step(base.now_s)
     assert base.seen[2:] == [True, False]
     assert worker.is_cycling(base.now_s + 29.0)

@@ -94,7 +94,7 @@ def test_one_that_stays_silent_is_restarted_so_often_and_then_opened_anew(scene:
     # Each restart is one byte, and so is its end: it was closed, which stops its motor.
     assert scene.robot.scanner_line.received == before + RESTART_LIMIT + 1
     assert not scene.robot.scanner.is_spinning
-    # As soon as it speaks again, it is there again.
+    # The scanner is there again as soon as it speaks.
     scene.robot.scanner.is_stalled = False
     scene.reports.clear()
     assert scene.until(lambda: DeviceUp(Device.SCANNER) in scene.reports) == pytest.approx(0.5 + 0.4, abs=0.2)

@@ -375,7 +375,7 @@ def test_what_a_server_makes_is_checked_kept_and_taken_again_without_it(tmp_path
     # Another model has none.
     other = Source(written(tmp_path, GATE.replace("0.2", "0.3"), "other"), CONTROLLER, address, kept)
     assert "none is kept of an earlier start" in refusal(other)
-    # What was kept is not trusted for being there.
+    # A kept supervisor is not trusted for being there.
     file.write_bytes(encode(supervisor_of(written(tmp_path, GATE.replace("needs Gate.opened", "needs true"), "bad"))))
     assert "that can be trusted" in refusal(source)
 

@@ -208,7 +208,7 @@ def test_torque_comes_before_motion_and_goes_after_it(scene: Scene) -> None:
     scene.base.torque_takes_s = 0.7
     scene.step()
     assert scene.taken() == [("torque", True), ("exchange", FORWARD)]
-    # What is let through is asked again after so long.
+    # The gate asks again for what it lets through after so long.
     assert scene.gate.asked == [100.0, 100.7]
     scene.step()
     assert scene.taken() == [("exchange", FORWARD)]
@@ -446,7 +446,7 @@ def test_a_reset_is_done_once_before_the_next_exchange(scene: Scene) -> None:
     scene.worker.reset()
     scene.step()
     assert scene.taken() == ["reset", ("torque", True), ("exchange", STANDSTILL)]
-    # When it is reported, it is known how the motors are.
+    # The state of the motors is known when the device is reported.
     assert scene.reports[0] == scene.gate.readings[-1]
     assert scene.reports[1] == ResetDone()
     scene.step()

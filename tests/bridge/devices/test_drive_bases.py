@@ -339,7 +339,7 @@ def test_answers_that_are_late_for_a_while_are_never_taken_for_new_ones(bench: R
                 assert bench.host.monotonic() < end_s
                 continue
             break
-        # What OpenCR reports is at most 20 ms old, and the wheels slip nowhere.
+        # Reports of OpenCR are at most 20 ms old, and the wheels slip nowhere.
         assert before_m - 0.1 * 0.045 <= reading.pose.x_m <= bench.robot.world.pose[0] + 1e-4
 
 

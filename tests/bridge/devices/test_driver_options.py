@@ -43,7 +43,7 @@ def test_the_page_lists_every_option_and_its_default(kind: Kind, name: str) -> N
         documented = {
             option: documented[option] for option in list(documented)[: list(documented).index("motion_limit_s")]
         }
-    # As JSON has them: tuples are lists there.
+    # Values in JSON: tuples are lists there.
     assert {option: json.loads(json.dumps(parameters[option].default)) for option in types} == documented
 
 

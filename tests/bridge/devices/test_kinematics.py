@@ -71,7 +71,7 @@ def test_both_wheels_are_slowed_alike(linear: float, angular: float, robot: Robo
 def test_opencr_makes_nothing_of_it_that_a_servo_refuses(linear: float, angular: float, robot: Robot) -> None:
     limits = robot.limits(robot.motor.velocity_limit_raw)
     words = opencr_words(Velocity(linear, angular), limits, robot.wheel_separation_m)
-    # As the firmware computes, before any of its clamps.
+    # The firmware's computation, before any of its clamps.
     speeds = wheel_speeds(Velocity(words[0] / 100, words[1] / 100), robot.wheel_separation_m)
     assert max(abs(speed) * FIRMWARE_RAW_PER_M_S for speed in speeds) <= robot.motor.velocity_limit_raw
     firmware_m_s = robot.firmware_rpm * 2 * math.pi / 60 * robot.wheel_radius_m

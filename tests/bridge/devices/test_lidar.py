@@ -57,7 +57,7 @@ class Kit:
     start: bytes
     stop: bytes
     revolutions_per_s: float
-    # What a distance of 1 m is after correction.
+    # Range of a distance of 1 m after correction.
     range_m: float
 
 
@@ -226,7 +226,7 @@ def test_of_several_turns_in_one_read_the_newest_is_reported(rig_lds01: Rig) -> 
     assert rig_lds01.lidar.counters.scans == 2
 
 
-# How it sits
+# Place and direction
 
 
 @pytest.mark.parametrize(

@@ -16,7 +16,7 @@ from robosc_simulated import SimulatedTurtleBot3, VirtualHost, Walls, room
 from support.pausing_host import PausingHost
 
 MAKERS: dict[str, Callable[..., Lidar[Any]]] = {"lds01": make_lds01, "lds02": make_lds02, "lds03": make_lds03}
-# Of an LDS-02, the correction moves neighbouring points apart where a wall comes nearer: a bin may lie between.
+# The correction of an LDS-02 moves neighbouring points apart where a wall comes nearer: a bin may lie between.
 FULL = {"lds01": BINS, "lds02": BINS - 6, "lds03": BINS}
 POSE = (0.3, 0.2, 0.7)
 each_lidar = pytest.mark.parametrize("name", MAKERS)

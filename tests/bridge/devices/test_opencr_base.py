@@ -483,7 +483,7 @@ def test_torque_that_is_gone_is_a_fault_that_stays_until_torque_is_switched_on_a
 def test_a_reading_has_the_velocity_that_the_wheels_were_commanded(bench: Rig) -> None:
     bench.start()
     reading = bench.base.exchange(Velocity(0.1, 0.5))
-    # As the firmware casts them: 75 and 176.
+    # The firmware casts them to 75 and 176.
     assert reading.goals_m_s == pytest.approx((75 * BURGER.raw_m_s, 176 * BURGER.raw_m_s))
     bench.base.set_torque(False)
     assert bench.base.exchange(Velocity(0.1)).goals_m_s is None

@@ -20,7 +20,7 @@ from robosc_simulated import BODIES, Noise, Scene, SimulatedTurtleBot3, VirtualH
 from robosc_simulated.robots import find_body
 from support.drive import PATIENT_S, PERIOD_S
 
-# As a cart with large wheels, behind toothed belts, whose servos are mounted the other way round than a TurtleBot3's.
+# A cart with large wheels, behind toothed belts, whose servos are mounted the other way round than a TurtleBot3's.
 CART = replace(
     BODIES["burger"],
     name="cart",
@@ -133,7 +133,7 @@ def test_it_drives_a_square_and_its_odometry_agrees_with_the_world(name: str) ->
         bench.start()
         reading = bench.square(0.5, 0.15, 0.8)
         way_m, heading_rad = bench.errors(reading.pose)
-        # Of a way of 2 m and a whole turn.
+        # Errors after a way of 2 m and a whole turn.
         assert way_m < 0.002
         assert heading_rad < 0.005
         x_m, y_m, turned_rad = bench.robot.world.pose

@@ -70,7 +70,7 @@ def test_a_report_is_written(asked: list[tuple[Any, ...]], capsys: pytest.Captur
 def test_a_line_is_followed_on_each_of_its_scenes_or_on_the_one_that_is_wanted(
     asked: list[tuple[Any, ...]], capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # Why another connection cannot be used is reported once for all scenes.
+    # The reason against another connection is reported once for all scenes.
     assert call("--experiment", "line", "--connection", "serial", "--connection", "ros1", "--no-cycles", "--json") == 1
     assert asked == [("line-serial-1", "line-oval", 2.0, 0), ("line-serial-2", "line-curves", 2.0, 0)]
     found = json.loads(capsys.readouterr().out)

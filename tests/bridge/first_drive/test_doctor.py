@@ -68,7 +68,7 @@ def test_a_port_without_permission_is_reported(
 ) -> None:
     port = tmp_path / "ttyACM0"
     port.touch()
-    # Who runs the tests may be root, who may do everything.
+    # The user of the tests may be root, who may do everything.
     monkeypatch.setattr(os, "access", lambda path, mode: False)
     assert main(["doctor", "--config", str(configured(tmp_path, str(port)))]) == 1
     assert "usermod -aG dialout" in capsys.readouterr().out

@@ -28,7 +28,7 @@ def test_a_refusal_comes_after_its_reason(talk: Talk) -> None:
     ]
     assert joined_texts(found) == ["Not armed: the robot is starting: no scanner"]
     assert of_type("COMMAND_ACK", found)[0].result == 1
-    # Whoever asks again is answered again.
+    # A repeated command is answered again.
     assert joined_texts(talk.ask(400, 1.0)) == ["Not armed: the robot is starting: no scanner"]
 
 
@@ -89,7 +89,7 @@ def test_a_flood_of_stops_is_answered_each_and_ordered_seldom(talk: Talk) -> Non
     found = talk.say(b"".join(talk.station.command(400, 0.0) for _ in range(300)))
     assert len(of_type("COMMAND_ACK", found)) == 300
     assert talk.daemon.commands == [OperatorCommand.STANDBY]
-    # What starts in between is stopped all the same.
+    # A start in between is stopped all the same.
     talk.ask(400, 1.0)
     talk.ask(400, 0.0)
     assert talk.daemon.commands == [OperatorCommand.STANDBY, OperatorCommand.START, OperatorCommand.STANDBY]
@@ -130,7 +130,7 @@ def test_what_was_accepted_before_a_stop_is_not_accepted_again(
     assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [1]
     assert any("the robot was stopped meanwhile; send it anew." in text for text in joined_texts(found))
     assert len(talk.daemon.orders) == orders
-    # As a command of its own it is done; and so is a repetition long after the stop.
+    # A command of its own is done; and so is a repetition long after the stop.
     assert talk.results(*change) == []
     assert len(talk.daemon.orders) == orders + 1
     talk.daemon.orders[-1].answer("no")

@@ -164,7 +164,7 @@ def test_the_time_of_packets_follows_the_clock_and_is_kept_ahead(
     session.step(BEGIN_S + 1.0)
     stamp = (1_700_003_600 - 1_420_070_400) * 100_000
     assert stamp <= session._codec.timestamp < stamp + 100
-    # Whoever is killed now has used nothing beyond it.
+    # A session that is killed now has used nothing beyond it.
     assert session._codec.timestamp < int(kept.read_text()) <= stamp + 1_000_100
     session.end(BEGIN_S + 2.0)
     assert int(kept.read_text()) == session._codec.timestamp
@@ -291,7 +291,7 @@ def test_the_command_of_the_page_makes_a_key(tmp_path: Path, caplog: pytest.LogC
     assert caplog.text == ""
 
 
-# What a configuration says.
+# Settings of a configuration.
 
 
 def _settings(remote: str, scanner: str = "") -> GroundSettings | None:

@@ -212,7 +212,7 @@ def test_blocked_requests_are_counted_and_reported_once(talk: Talk) -> None:
     assert values[-1] == 100
 
 
-# What stations ask when they connect.
+# Questions of stations that connect.
 
 
 def test_what_stations_ask_is_answered(talk: Talk) -> None:
@@ -270,7 +270,7 @@ def test_the_worked_arming_is_answered_byte_for_byte() -> None:
     for _ in range(7):
         talk.session._codec.encode(lambda library: library.heartbeat_encode(10, 0, 0, 0, 0))
     arm = bytes.fromhex("fd 20 00 00 00 ff be 4c 00 00 00 00 80 3f" + " 00" * 24 + " 90 01 01 bf e0 ee")
-    # What it says by itself comes beside it.
+    # Texts of its own come beside the answer.
     talk.session._texts._bucket.take(100.0)
     found = talk.session.step(talk.now_s, arm)
     assert found[:22].hex(" ") == "fd 0a 00 00 07 01 bf 4d 00 00 90 01 00 00 00 00 00 00 ff be 90 1a"

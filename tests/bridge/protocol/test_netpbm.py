@@ -33,7 +33,7 @@ def test_however_a_stream_is_split_every_picture_is_found(
     cuts = sorted(data.draw(st.sets(st.integers(0, len(stream)))))
     parts = [stream[a:b] for a, b in zip([0, *cuts], [*cuts, len(stream)], strict=True)]
     found = fed(parts)
-    # Of several that one part completes, the newest.
+    # The newest of several pictures that one part completes.
     ends = [sum(len(encoded(each)) for each in pictures[: k + 1]) for k in range(len(pictures))]
     expected, at = [], 0
     for part in parts:

@@ -352,7 +352,7 @@ class TestHostilePrograms:
             daemon.program()
         # Its connection is closed, without a word.
         assert wait_until(lambda: daemon.of(programs.Detached))[0].program is daemon.program()
-        # What the loop still sends it goes nowhere.
+        # Later messages of the loop go nowhere.
         daemon.program().send(programs.CallMade("open", 1, None))
 
     def test_a_program_that_hangs_with_its_whole_machine_is_taken_for_gone(

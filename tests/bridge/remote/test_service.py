@@ -167,7 +167,7 @@ class TestStatus:
     def test_ages_are_by_the_clock_of_the_devices(
         self, daemon: FakeDaemon, stub: Any, monkeypatch: pytest.MonkeyPatch
     ) -> None:
-        # As after the computer was suspended for a day.
+        # The clock after the computer was suspended for a day.
         monkeypatch.setattr(time, "clock_gettime", lambda clock: time.monotonic() + 86_400.0)
         daemon.show(reading=replace(READING, time_s=SYSTEM_HOST.monotonic() - 100.0))
         assert status(stub).snapshot.drive.age_s == pytest.approx(100.0, abs=PATIENCE_S)

@@ -33,7 +33,7 @@ def test_connections_that_take_all_places_are_reported(
     monkeypatch.setattr(endpoint_module, "IDLE_S", 3600.0)
     monkeypatch.setattr(endpoint_module, "_LOOK_S", 0.01)
     monkeypatch.setattr(endpoint_module, "MAXIMUM_CONNECTIONS", 3)
-    # Where connections are watched, those without a call give way before all places are taken.
+    # Watched connections without a call give way before all places are taken.
     monkeypatch.setattr(connection_watch, "can_watch", lambda: False)
     with served(daemon) as endpoint, strangers(endpoint.address, 3):
         wait_until(lambda: "all 3 connections of the remote endpoint are taken" in caplog.text)

@@ -124,7 +124,7 @@ def test_a_reading_that_a_better_offset_dates_later_does_not_go_on_again(bench: 
     bench.pass_s(29.9)
     bench.take(read_s=129.8, turned_s=129.8, delay_s=0.2)
     assert bench.stamps_s() == [129.8]
-    # What measured the offset best is too old to count.
+    # The best measurement of the offset is too old to count.
     bench.pass_s(0.2)
     bench.take(read_s=129.8, turned_s=129.8, delay_s=0.2)
     assert (len(bench.drives), len(bench.scans)) == (1, 1)
@@ -141,7 +141,7 @@ def test_what_is_stale_does_not_go_on(age_s: float, is_published: bool, bench: B
 def test_what_waited_on_its_way_is_stale(bench: Bench) -> None:
     bench.take()
     bench.pass_s(2.0)
-    # As where this process was stopped, and finds what was sent meanwhile.
+    # A process that was stopped finds what was sent meanwhile.
     bench.take(read_s=98.99, delay_s=1.0)
     assert bench.drives == []
 

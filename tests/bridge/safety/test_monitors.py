@@ -255,7 +255,7 @@ def test_a_wheel_is_compared_with_the_goal_as_its_motor_goes_there() -> None:
     held: list[Read] = [(goals, (0.0, 0.0), 10.0 + step / 8) for step in range(33)]
     # 0.03125 m/s are reached after 0.25 s, and exceeded after 0.375 s.
     assert astray(*held, acceleration_m_s2=0.125).index(True) == 3 + 5
-    # What brakes is slower than commanded as well, and one that does not brake is found.
+    # A braking wheel is slower than commanded as well, and one that does not brake is found.
     braked: list[Read] = [((0.0, 0.0), (0.5 - step / 64, 0.5 - step / 64), 10.0 + step / 8) for step in range(33)]
     assert not any(astray(*braked, acceleration_m_s2=0.125))
     assert any(astray(*[(goals, (0.5, 0.5), time_s) for goals, _, time_s in braked], acceleration_m_s2=0.125))
@@ -277,7 +277,7 @@ def test_wheels_that_stood_still_may_not_rotate_by_themselves(speeds: tuple[floa
     rest: Read = (ZERO, (0.015625, -0.015625), 9.0)
     moves: list[Read] = [(ZERO, speeds, time_s) for time_s in (10.0, 10.25, math.nextafter(10.25, 11), 11.0)]
     assert unbidden(rest, *moves) == [False, False, False, True, True]
-    # What comes to rest between begins anew; so does a clock that goes back.
+    # A wheel that comes to rest between begins anew; so does a clock that goes back.
     assert unbidden(rest, *moves[:2], rest, *moves[:2]) == [False] * 6
     assert unbidden(rest, moves[3], *moves[:2]) == [False] * 4
 

@@ -47,7 +47,7 @@ class Sequence(RuleBasedStateMachine):
             changes |= {"scan_timeout_s": None, "operator_timeout_s": None}
         self.limits = LIMITS.__class__(**{**LIMITS.__dict__, **changes})
         self.layer, self.twin = SafetyLayer(self.limits), SafetyTwin(self.limits)
-        # What must be reset before anything may move again; whether it is enabled.
+        # Reasons that must be reset before anything may move again; then whether it is enabled.
         self.stopped: set[Reason] = set()
         self.is_enabled = False
         if is_driving:
@@ -217,7 +217,7 @@ class Sequence(RuleBasedStateMachine):
         v, w = found.velocity.linear_m_s, found.velocity.angular_rad_s
         assert v == pytest.approx(expected.velocity.linear_m_s, abs=1e-12)
         assert w == pytest.approx(expected.velocity.angular_rad_s, abs=1e-12)
-        # What must hold whatever the twin says.
+        # Facts that hold whatever the twin says.
         assert self.stopped <= set(found.reasons)
         assert not set(found.reasons) & set(LATCHING) or found.velocity == STANDSTILL
         if found.velocity == STANDSTILL:

@@ -159,7 +159,7 @@ def test_linear_and_angular_are_clamped_apart_and_each_wheel_at_337(waffle: Stat
     waffle.command(100, 1000)
     waffle.update(0.5)
     # The left one stands: both clamps are the same speed of a wheel.
-    # What 77 rpm at 12 V allow is 336 raw.
+    # The limit by 77 rpm at 12 V is 336 raw.
     assert waffle.wheels() == (0, 336)
     assert [servo.table["goal velocity"] for servo in (waffle.robot.left, waffle.robot.right)] == [0, 337]
 

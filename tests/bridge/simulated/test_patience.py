@@ -12,7 +12,7 @@ from robosc_simulated import SimulatedTurtleBot3
 from robosc_simulated.timebase import Timebase
 from support.waiting import wait_until
 
-# As much as the line discipline holds.
+# Bytes that the line discipline holds.
 _HELD = 4095
 
 
@@ -25,7 +25,7 @@ def test_time_passes_until_the_patience_is_over_and_goes_on_when_the_host_is_hea
     assert time.world_s() == pytest.approx(0.5)
     clock.advance(5.0)
     assert time.world_s() == pytest.approx(0.5)
-    # What it has waited for is not made up for.
+    # Time that it has waited is not made up for.
     time.host_sent()
     clock.advance(0.03)
     assert time.world_s() == pytest.approx(0.8)

@@ -110,10 +110,10 @@ def test_a_maze_has_one_exit_and_its_goal_is_outside(columns: int, rows: int, se
     goal = scene.goal
     assert goal is not None
     closed = sum(math.dist(wall[:2], wall[2:]) for wall in scene.walls.segments)
-    # As long as all walls of a tree's maze less the gap.
+    # The length of all walls of a tree's maze less the gap.
     assert closed == pytest.approx(columns * (rows + 1) + rows * (columns + 1) - (columns * rows - 1) - 1)
     assert goal.y_m - goal.radius_m > rows - 0.5
-    # Who is 0.3 m from the corner of the way out, and turns around it.
+    # A robot 0.3 m from the corner of the way out turns around it.
     assert all(goal.is_reached(goal.x_m + aside_m, rows - 0.5 + 0.2) for aside_m in (-0.2, 0.2))
     inside = scene.walls.cast(np.array([(goal.x_m, goal.y_m)]), np.array([(0.0, -1.0)]))
     assert inside[0] > 0.9

@@ -274,7 +274,7 @@ def test_a_restart_is_silent_and_forgets(station: Station) -> None:
     assert station.read(TORQUE, 1) == 0
     assert 0 <= station.read(132, 4) < 4096
     assert station.write(TORQUE, 1, 1) == (0, 0)
-    # What is in the EEPROM has stayed.
+    # Values in the EEPROM have stayed.
     assert station.read(11, 1) == 1
 
 

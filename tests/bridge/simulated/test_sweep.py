@@ -36,7 +36,7 @@ def require_agreement(walls: Walls, discs: Discs, x_m: float, y_m: float, headin
     rays = heading_rad + _DEGREES
     around = [one_by_one(walls, discs, (x_m, y_m), rays + turn) for turn in (-_TURN_RAD, 0.0, _TURN_RAD)]
     shortest, longest = np.minimum.reduce(around), np.maximum.reduce(around)
-    # How much the length of a ray changes with its direction, on the most slanted of the walls.
+    # Change of a ray's length with its direction, on the most slanted of the walls.
     slants = [apart / seen for apart, seen in _seen(walls, x_m, y_m) if seen > _NEARLY]
     seen_m = np.where(np.isinf(found), 0.0, found)
     slack_m = 1e-9 + (1e-9 + 2 * _TURN_RAD * max(slants, default=0.0) * seen_m) * seen_m
@@ -139,7 +139,7 @@ def test_who_is_in_line_with_a_wall_sees_its_near_end(heading_rad: float) -> Non
     assert Sweep(walls).lengths_m(0.0, 0.0, heading_rad, NOTHING)[[0, 180, 90]].tolist() == pytest.approx(
         [1.0, 3.0, math.inf]
     )
-    # Whoever is beside the line by a hair sees what is behind.
+    # A ray beside the line by a hair meets the wall behind.
     aside = walls.cast_from(-1e-6 * sine, 1e-6 * cosine, directions[:1])
     assert aside.tolist() == pytest.approx([5.0])
 

@@ -206,13 +206,13 @@ def test_a_world_that_takes_too_long_to_live_passes_more_slowly() -> None:
     world.watch(dawdle, lambda world_s, happening: None)
     clock.now_s = 1.0
     for _ in range(3):
-        # What it has taken to live a part is no more than that part again.
+        # Time that it takes to live a part is no more than that part again.
         before_s = world.lived_s
         world.catch_up()
         assert world.lived_s - before_s == pytest.approx(10.0)
         assert time.world_s() - world.lived_s == pytest.approx(10.0)
 
-    # What takes but a moment is made up for.
+    # A short delay is made up for.
     clock.now_s = 0.0
     time = Timebase(clock, factor=10.0)
     world = World(BODIES["burger"], Walls(()), time)

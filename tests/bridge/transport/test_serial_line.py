@@ -164,7 +164,7 @@ def test_a_signal_handler_may_wake_a_line_that_its_own_thread_is_waking(
     def interrupted(file: int, data: bytes) -> int:
         if not handled:
             handled.append(data)
-            # As the handler would, in the midst of it.
+            # The handler would do this, in the midst of it.
             line.wake()
         return real(file, data)
 

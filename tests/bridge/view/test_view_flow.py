@@ -127,7 +127,7 @@ async def test_the_lit_transitions_lead_from_state_to_state() -> None:
         for entry in page.entries():
             for transition in entry["transitions"]:
                 edge = edges[transition["component"], transition["id"]]
-                # What happens before the first one of a component cannot be known.
+                # Events before the first one of a component cannot be known.
                 assert edge["from"] == states[transition["component"]]
                 states[transition["component"]] = edge["to"]
                 lit += 1

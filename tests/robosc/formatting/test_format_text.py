@@ -46,7 +46,7 @@ FILES = {
 }
 
 
-# What must stay
+# Texts that must stay
 
 
 def tree_without_places(text: str) -> str:
@@ -153,7 +153,7 @@ def test_comments_anywhere_keep_their_place(name: str, seed: int) -> None:
     assert_only_the_layout_changes(relaid(FILES[name], Random(seed)))
 
 
-# What must not matter
+# Differences that must not matter
 
 
 def with_other_blanks(text: str, random: Random) -> str:

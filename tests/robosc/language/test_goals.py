@@ -22,7 +22,7 @@ ROBOT = """robot R {
 
 
 @pytest.mark.parametrize(
-    ("wrong", "column", "told", "meant"),
+    ("wrong", "column", "advice", "meant"),
     [
         ("goal Door.open", 10, "Write 'always eventually' before it.", "goal always eventually Door.open"),
         ("goal Door.open => Door.shut", 10, "Write 'always", "goal always eventually Door.open => Door.shut"),
@@ -60,13 +60,13 @@ ROBOT = """robot R {
         ),
     ],
 )
-def test_what_is_told_is_obeyed(wrong: str, column: int, told: str, meant: str) -> None:
+def test_advice_that_is_followed_is_right(wrong: str, column: int, advice: str, meant: str) -> None:
     text = ROBOT.replace("§", wrong)
     (found,) = checked(text).diagnostics
     assert found.location is not None
     assert (found.location.line, found.location.column) == (9, column)
     assert found.code == "syntax-error"
-    assert found.fix.startswith(told)
+    assert found.fix.startswith(advice)
     while (error := first_error(text)) is not None:
         text = obeyed(text, error) or ""
     assert " ".join(text.split()) == " ".join(ROBOT.replace("§", meant).split())

@@ -79,7 +79,7 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
         or "a type's name" in fault.message
         or fault.fix.startswith("Write 'not'")
     ):
-        # Of a condition behind its `goto`, a ROS type with its package and a `NOT`, all is reported.
+        # Reports are complete for a condition behind its `goto`, a ROS type with its package and a `NOT`.
         return stops is not None and stops > here
     if fault.fix == "Write '->' instead of '=>'.":
         # Only what follows shows that it ends a condition.
@@ -112,7 +112,7 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
     if token == "if" and tokens.texts[at - 1] == "not":
         # Without its end it is no conditional, so that `not` is a name.
         return True
-    # What follows shows that `3 needs x` wants a name, and `integer < x` something else than this word; and that an
+    # The next token shows that `3 needs x` wants a name, and `integer < x` something else than this word; and that an
     # item begins behind a name `not`.
     is_next = offset(text, *stops) == tokens.starts[at + 1]
     is_item = token in ("goal", "assume") and tokens.texts[at - 1] == "not"

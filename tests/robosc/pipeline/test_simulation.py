@@ -150,7 +150,7 @@ def test_a_run_step_by_step(run: robosc.Run) -> None:
         "Sensor.word": "free",
         "Sensor.number": 1,
     }
-    # What was not given is unknown, as it would be to the robot.
+    # Data that was not given is unknown, as it would be to the robot.
     assert step.unknown == ("value.word is free by default: an earlier rule is unknown",)
     assert run.step("scan.response", {"front": 0.7, "class": 1}).skipped == ("Sensor.back",)
     assert run.enabled == ("move.request",)
@@ -319,7 +319,7 @@ def test_what_was_taken_back_is_not_remembered_of_goals() -> None:
         run.step(run.event_called(event))
     assert (run.history[-1].reached, run.reached, run.chosen) == ((1,), (True,), None)
     run.undo()
-    # What comes instead finds the goal as it was before.
+    # Another event instead finds the goal as it was before.
     assert run.step("arrived.response").chosen == "enter.request"
     assert run.reached == (False,)
     run.undo()

@@ -210,7 +210,7 @@ def at(value: Any, place: Any) -> Any:
     return value
 
 
-# What is changed (a path into `supervisor`, its new value) and words of the message.
+# Changes (a path into `supervisor`, its new value) and words of the message.
 INCONSISTENT = [
     ("model.components.0.name", "sensor", "communication scan: there is no component Sensor"),
     ("model.components.2.name", "base", "two components"),

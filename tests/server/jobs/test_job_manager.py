@@ -115,7 +115,7 @@ async def test_cancelling_ends_what_waits_and_what_runs(tmp_path: Path) -> None:
         await until(lambda: has_begun(made, jobs[2].id, tasks=2))
         assert made.workers.killed == 1
         assert [text[-1] for text in made.workers.begun] == ["0", "2"]
-        # What has ended stays as it is.
+        # An ended job stays as it is.
         again = await made.manager.cancel(jobs[0].id, ME)
         assert again == await made.manager.get(jobs[0].id, ME)
         assert await refusal_of(made.manager.cancel("no such", ME)) is Reason.NO_SUCH_JOB
@@ -164,7 +164,7 @@ async def test_watchers_see_each_state_and_what_workers_report(tmp_path: Path) -
         assert [record.state for record in rest] == [JobState.SUCCEEDED]
         revisions.append(rest[0].revision)
         assert revisions == sorted(set(revisions))
-        # Who comes back with what it has seen receives what is new, or the end.
+        # A watcher that comes back with what it has seen receives what is new, or the end.
         assert [r.state async for r in made.manager.watch(job.id, ME, revisions[0])] == [JobState.SUCCEEDED]
         assert [r.state async for r in made.manager.watch(job.id, ME, 2**64 - 1)] == [JobState.SUCCEEDED]
 
@@ -353,7 +353,7 @@ async def test_jobs_wait_beside_the_line_while_their_owner_has_spent_too_much(
         assert record.state is JobState.QUEUED
         assert record.progress == Report("waiting", "nothing is left")
         assert record.attempts == 0
-        # Whoever else comes finds the line empty.
+        # Another caller finds the line empty.
         you = Caller("you")
         others = [(await made.manager.submit(task_of(f"{gate}\n{n}"), you))[0] for n in range(3)]
         for job in others:

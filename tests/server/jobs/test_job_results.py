@@ -128,7 +128,7 @@ async def test_what_waits_to_be_written_is_bounded_and_what_is_beyond_stays_in_m
     assert all(results.in_memory(key) for key in "abcd")
     async with results:
         await until(lambda: is_written(store, "b"))
-    # What was written makes room.
+    # Written results make room.
     results.keep("e", _KIND, Result((bytes(1000),)), "me")
     assert results.unwritten("e") is not None
     assert await store.find_result("c") is None

@@ -104,7 +104,7 @@ async def test_bounds_hold_and_say_when_to_come_back() -> None:
     with pytest.raises(RefusedError) as refused:
         scheduler.enter("late")
     assert refused.value.reason is Reason.SERVER_BUSY
-    # What was accepted before is not bounded.
+    # Jobs that were accepted before are not bounded.
     adopted = scheduler.enter_unbounded("greedy")
     clock.now_s = 4.0
     scheduler.leave(first)

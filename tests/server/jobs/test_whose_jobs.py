@@ -90,7 +90,7 @@ async def test_a_job_is_ended_by_its_own_server_alone_and_once(
     assert ended.ended_us == store.now_us()
     assert ended.expires_us == store.now_us() + 10_000_000
     assert ended.replica is None
-    # What comes too late changes nothing.
+    # A result that comes too late changes nothing.
     for late in (_RESULT, _FAILURE):
         assert await store.end("a", "ours", late) is None
     assert await store.cancel("a") == ended

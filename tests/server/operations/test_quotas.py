@@ -145,7 +145,7 @@ async def test_the_line_before_the_workers_keeps_to_a_tokens_own_bound_and_notes
     assert refused(quotas, "timed").retry_after_s == pytest.approx(30 * 60)
     for place in (little, at_work):
         scheduler.leave(place)
-    # What was admitted before, and has its turn now, comes too late.
+    # A call that was admitted before, and has its turn now, comes too late.
     with pytest.raises(RefusedError) as caught:
         await overtaken
     assert caught.value.reason is Reason.QUOTA_EXCEEDED

@@ -103,5 +103,5 @@ def test_a_process_that_hangs_is_ended_and_reports_where() -> None:
     )
     assert done.returncode == 1, done.stderr
     assert "Timeout" in done.stderr
-    # Where it hangs is in this program, which is no file.
+    # The place where it hangs is in this program, which is no file.
     assert "<string>" in done.stderr

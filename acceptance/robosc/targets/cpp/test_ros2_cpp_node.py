@@ -88,7 +88,7 @@ def test_the_other_way_of_comparing_can_fail(maze: Supervisor, maze_node: Path, 
 
 def test_orders_of_the_courier_end_in_every_way(courier: Supervisor, courier_node: Path, tmp_path: Path) -> None:
     lines = [
-        # There is no server.
+        # No server runs.
         "message /order/power",
         "message /order/count",
         "message /allowed 1",
@@ -218,7 +218,7 @@ WATCHED = ("period:=0.025", "publish_state:=true")
 
 def test_a_lost_goal_is_cancelled_when_its_server_is_seen_again(courier_node: Path, tmp_path: Path) -> None:
     lines = [*DRIVING, "accept /count", "server /count 0", *A_WHILE, "server /count 1", "wait cancel /count"]
-    # Of another one it becomes known only later that it was accepted.
+    # Acceptance of another one becomes known only later.
     lines += ["refuse /count 3", "result /count 5", "message /order/count", "wait goal /count", "server /count 0"]
     lines += [*A_WHILE, "accept /count", "wait cancel /count", "refuse /count 0", END]
     done = run(courier_node, lines, *WATCHED, f"log_folder:={tmp_path}")

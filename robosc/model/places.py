@@ -23,6 +23,9 @@ class Places:
         invariants: In the order of the model's invariants.
         goals: In the order of the model's goals.
         assumptions: In the order of the model's assumptions.
+        missions: In the order of the model's missions.
+        visits: For each mission the places of its visits, then those of each detour's visits.
+        preferences: In the order of the model's preferences.
         identifiers: By communication; where its identifier is written, or its name.
     """
 
@@ -39,4 +42,7 @@ class Places:
     invariants: list[Location] = field(default_factory=list)
     goals: list[Location] = field(default_factory=list)
     assumptions: list[Location] = field(default_factory=list)
+    missions: list[Location] = field(default_factory=list)
+    visits: list[tuple[Location, ...]] = field(default_factory=list)
+    preferences: list[Location] = field(default_factory=list)
     identifiers: dict[str, Location] = field(default_factory=dict)

@@ -325,6 +325,57 @@ class Assumption(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
         return (self.condition,) if self.trigger is None else (self.trigger, self.condition)
 
 
+class Detour(msgspec.Struct, frozen=True, gc=False):
+    """Visits that come before the others of a mission once a condition holds (language C.3).
+
+    Attributes:
+        trigger: Condition that begins the detour, wherever the mission is.
+        visits: Conditions that are to hold, one after the other; at least one.
+    """
+
+    trigger: Expression
+    visits: tuple[Expression, ...]
+
+    @property
+    def expressions(self) -> tuple[Expression, ...]:
+        """Its expressions, in the order of the text."""
+        return (self.trigger, *self.visits)
+
+
+class Mission(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
+    """Conditions that the robot is to reach one after the other, round after round (language C.3).
+
+    Attributes:
+        name: Name, unique among the missions of a robot.
+        visits: Conditions that are to hold, one after the other; at least one.
+        condition: The condition behind `while`: the mission is asked for as long as it holds. None for always.
+        detours: Detours, in source order.
+    """
+
+    name: Name
+    visits: tuple[Expression, ...]
+    condition: Expression | None = None
+    detours: tuple[Detour, ...] = ()
+
+    @property
+    def expressions(self) -> tuple[Expression, ...]:
+        """Its expressions, in the order of the text."""
+        first = () if self.condition is None else (self.condition,)
+        return (*first, *self.visits, *(part for item in self.detours for part in item.expressions))
+
+
+class Preference(msgspec.Struct, frozen=True, gc=False):
+    """Requests that a strategy chooses rather than others, where both lead to its goals (language C.4).
+
+    Attributes:
+        preferred: Names of the communications whose requests are chosen.
+        others: Names of those whose requests come after them.
+    """
+
+    preferred: tuple[Name, ...]
+    others: tuple[Name, ...]
+
+
 class ObjectValue(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="object"):
     """Data given property by property; a missing property keeps the middleware's default."""
 
@@ -343,7 +394,7 @@ class Provide(msgspec.Struct, frozen=True, gc=False):
 
 
 class Model(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """A checked robot; without goals and assumptions, its encoded form has no fields for them."""
+    """A checked robot; its encoded form has fields for goals, assumptions, missions and preferences only if needed."""
 
     name: Name
     components: tuple[Component, ...]
@@ -355,6 +406,8 @@ class Model(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     invariants: tuple[Invariant, ...]
     goals: tuple[Goal, ...] = ()
     assumptions: tuple[Assumption, ...] = ()
+    missions: tuple[Mission, ...] = ()
+    preferences: tuple[Preference, ...] = ()
 
     def component(self, name: str) -> Component:
         """The component called `name` (KeyError if there is none)."""
@@ -415,6 +468,7 @@ __all__ = [
     "CommunicationKind",
     "Component",
     "Deployment",
+    "Detour",
     "EnumDefinition",
     "EnumRule",
     "EventKind",
@@ -422,9 +476,11 @@ __all__ = [
     "GoalForm",
     "Interface",
     "Invariant",
+    "Mission",
     "Model",
     "ObjectDefinition",
     "ObjectValue",
+    "Preference",
     "Property",
     "Provide",
     "ProvidedValue",

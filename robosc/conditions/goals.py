@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from robosc.conditions.rendering import Formulas, in_words
 from robosc.expressions import Expression
-from robosc.model.structure import Assumption, Goal, GoalForm
+from robosc.model.structure import Assumption, Goal, GoalForm, Model
 from robosc.supervisor import DecisionDiagram, Supervisor
 from robosc.supervisor.diagram import diagram_domains
 
@@ -33,6 +33,16 @@ def goal_text(goal: Goal) -> str:
 def assumption_text(assumption: Assumption) -> str:
     """Return an assumption as a user writes it, without the word `assume`."""
     return f"{'allow ' if assumption.is_allowed else ''}{_aim_text(assumption)}"
+
+
+def aims_in_words(model: Model) -> tuple[tuple[str, str], ...]:
+    """Return name and words of what the strategy of a model aims at, in the order of its modes."""
+    return tuple((f"goal {number}", goal_text(goal)) for number, goal in enumerate(model.goals, start=1))
+
+
+def assumptions_in_words(model: Model) -> tuple[tuple[str, str], ...]:
+    """Return name and words of each assumption of a model."""
+    return tuple((f"assumption {number}", _aim_text(item)) for number, item in enumerate(model.assumptions, start=1))
 
 
 def goals_in_words(supervisor: Supervisor) -> tuple[GoalInWords, ...]:

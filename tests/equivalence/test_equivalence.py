@@ -1,5 +1,6 @@
 """Every target does what the reference executor does: the same runs, compared step by step."""
 
+from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
 from itertools import islice
@@ -26,6 +27,7 @@ from support.equivalence.scenario import Action, Scenario
 from support.equivalence.targets import compare
 from support.equivalence.worlds import WORLDS, live, robot_supervisor
 from support.generated import load_module, loaded_file
+from support.goal_porter import porter_supervisor
 from support.models import model_of
 from support.random_controllers import random_controller, random_robot
 from support.random_goals import strategic_controller
@@ -126,7 +128,10 @@ def test_random_robots_in_c(tmp_path_factory: pytest.TempPathFactory, seed: int)
 
 
 def _strategic(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
-    """Yield random robots whose strategies choose requests, with a run of each under its strategy."""
+    """Yield the porter and random robots whose strategies choose requests, with a run of each under its strategy."""
+    porter = porter_supervisor()
+    scenario = random_scenario(porter, first, 400)
+    yield porter, replace(scenario, settings={**scenario.settings, "assumption_timeout_s": 0.25})
     for seed in range(first, first + 1_500):
         supervisor = strategic_controller(seed)
         if supervisor is not None and supervisor.strategy and any(supervisor.strategy.modes):
@@ -134,24 +139,26 @@ def _strategic(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
 
 
 def test_strategies_in_python() -> None:
-    requests = 0
+    requests, told = 0, Counter[str]()
     for supervisor, scenario in _strategic(0):
         expected = observe(supervisor, scenario)
         compare(generated_python(supervisor, load_module(supervisor)), scenario, expected)
         requests += sum(len(item.issued) for item in expected)
-    assert requests > 50
+        told.update(line["kind"] for item in expected for line in item.log)
+    assert requests > 50 and all(told[kind] > 5 for kind in ("reached", "approach", "owed", "met")), told
 
 
 @needs_gcc
 def test_strategies_in_c(tmp_path: Path) -> None:
-    requests = 0
+    requests, told = 0, Counter[str]()
     for number, (supervisor, scenario) in enumerate(islice(_strategic(1_500), 6)):
         expected = observe(supervisor, scenario)
         # Some with sanitizers, which take the compiler three times as long.
         options = () if number % 4 == 0 else ("-O0",)
         compare(C99Target(supervisor, tmp_path / str(number), *options), scenario, expected)
         requests += sum(len(item.issued) for item in expected)
-    assert requests > 5
+        told.update(line["kind"] for item in expected for line in item.log)
+    assert requests > 5 and all(told[kind] for kind in ("reached", "approach", "owed", "met")), told
 
 
 TWO_WHEELS = """robot TwoWheels {

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 from robosc.conditions.rendering import Formulas, in_words
 from robosc.expressions import Expression
-from robosc.model.structure import Assumption, Goal, GoalForm
+from robosc.model.structure import Assumption, Goal, GoalForm, Model
 from robosc.supervisor import DecisionDiagram, Supervisor
 from robosc.supervisor.diagram import diagram_domains
 
@@ -37,6 +37,19 @@ def assumption_text(assumption: Assumption) -> str:
     return f"{'allow ' if assumption.is_allowed else ''}{_aim_text(assumption)}"
 
 
+def aims_in_words(supervisor: Supervisor) -> tuple[tuple[str, str], ...]:
+    """Return name and words of each goal and visit of a supervisor's model, in the order of a strategy's modes."""
+    return tuple(
+        (aim.name, goal_text(supervisor.model.goals[aim.number]) if aim.visit is None else in_words(aim.visit, ()))
+        for aim in supervisor.executable.obligations.aims
+    )
+
+
+def assumptions_in_words(model: Model) -> tuple[tuple[str, str], ...]:
+    """Return name and words of each assumption of a model."""
+    return tuple((f"assumption {number}", _aim_text(item)) for number, item in enumerate(model.assumptions, start=1))
+
+
 def goals_in_words(supervisor: Supervisor) -> tuple[GoalInWords, ...]:
     """Return each goal and visit of a supervisor with what its strategy chooses; nothing where it has no strategy."""
     if supervisor.strategy is None:
@@ -44,11 +57,11 @@ def goals_in_words(supervisor: Supervisor) -> tuple[GoalInWords, ...]:
     formulas = Formulas(diagram_domains(supervisor.executable.remembering_automata))
     return tuple(
         GoalInWords(
-            aim.name,
-            goal_text(supervisor.model.goals[aim.number]) if aim.visit is None else in_words(aim.visit, ()),
+            name,
+            words,
             tuple((choice.event, choice.condition, formulas.formula(choice.condition)) for choice in mode),
         )
-        for aim, mode in zip(supervisor.executable.obligations.aims, supervisor.strategy.modes, strict=True)
+        for (name, words), mode in zip(aims_in_words(supervisor), supervisor.strategy.modes, strict=True)
     )
 
 

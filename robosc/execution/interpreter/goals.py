@@ -107,9 +107,11 @@ class GoalsOfSystem:
                     name = f"requirement {number} of {communication.name} was met"
                     self._held.append((f"{communication.name}.cancel", name, held))
                     self._kept[name] = held
+        self._assumptions: list[_Item] = []
         for number, assumption in enumerate(model.assumptions, start=1):
             owed = _Item(assumption, f"assumption {number}")
             self._kept[owed.name] = owed
+            self._assumptions.append(owed)
         self._goals = [_Item(goal, f"goal {number}") for number, goal in enumerate(model.goals, start=1)]
         self._kept |= {item.name: item for item in self._goals}
         self._missions = [MissionOfSystem(mission) for mission in model.missions]
@@ -139,6 +141,16 @@ class GoalsOfSystem:
         for event, name, held in self._held:
             if held.has_fallen(self._account.kept[name], state):
                 yield event
+
+    def are_met(self, state: State) -> tuple[bool, ...]:
+        """Return for each goal, visit and assumption True if it is met in a stable state that was taken in."""
+        owed = (item.is_true(self._account.kept[item.name], state) for item in self._assumptions)
+        return (*self._is_nothing_wanted(state), *owed)
+
+    @property
+    def mode(self) -> int:
+        """Number of the goal or visit whose turn it is."""
+        return self._account.mode
 
     def are_true(self, state: State) -> tuple[bool, ...]:
         """Return for each goal True if it counts as come true in a stable state that was taken in."""

@@ -202,10 +202,17 @@ class InterpretedSystem:
         """Return the location of a service or action; an unknown name is a KeyError."""
         return str(self._state[communication_plant_name(self._model.communication(communication)), None])
 
-    def observe(self) -> None:
-        """Take in a stable state, for what the strategy remembers."""
-        if self._goals is not None:
-            self._goals.observe(self._state)
+    def observe(self) -> tuple[bool, ...]:
+        """Take in a stable state, for what the strategy remembers; for each aim and assumption, whether it is met."""
+        if self._goals is None:
+            return ()
+        self._goals.observe(self._state)
+        return self._goals.are_met(self._state)
+
+    @property
+    def mode(self) -> int:
+        """Number of the aim whose turn it is."""
+        return 0 if self._goals is None else self._goals.mode
 
     def choose(self) -> int | None:
         """Number of the request that the strategy chooses in this stable state, or None if it waits."""

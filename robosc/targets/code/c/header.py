@@ -187,6 +187,11 @@ def counts(layout: Layout) -> dict[str, int]:
         "RECEIVED": len(uncontrollable),
         "CONJUNCT": max((info.conjunct_count for info in infos), default=0),
         "REQUIREMENT": max((info.requirement_count for info in infos if info.kind == "action"), default=0),
+        **(
+            {}
+            if layout.supervisor.strategy is None
+            else {"AIM": len(layout.description.aims), "ASSUMPTION": len(layout.description.assumptions)}
+        ),
         **({"WHEN": sum(item.when is not None for item in model.communications)} if layout.is_layer else {}),
     }
 

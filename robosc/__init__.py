@@ -53,6 +53,7 @@ if TYPE_CHECKING:
     from robosc.pipeline.results import (
         Explained,
         Generation,
+        GoalSummary,
         NoSupervisor,
         NothingGeneratedError,
         Summary,
@@ -87,6 +88,7 @@ _HOMES = {
     "Findings": "pipeline.findings",
     "GenerateOptions": "targets",
     "Generation": "pipeline.results",
+    "GoalSummary": "pipeline.results",
     "GoalApproach": "pipeline.goals",
     "Goals": "pipeline.goals",
     "InternalError": "errors",
@@ -152,6 +154,7 @@ __all__ = [
     "GenerateOptions",
     "Generation",
     "GoalApproach",
+    "GoalSummary",
     "Goals",
     "InternalError",
     "InvalidSupervisorError",

@@ -54,6 +54,7 @@ if TYPE_CHECKING:
     from robosc.pipeline.results import (
         Explained,
         Generation,
+        GoalSummary,
         NoSupervisor,
         NothingGeneratedError,
         Summary,
@@ -89,6 +90,7 @@ _HOMES = {
     "Findings": "pipeline.findings",
     "GenerateOptions": "targets",
     "Generation": "pipeline.results",
+    "GoalSummary": "pipeline.results",
     "GoalApproach": "pipeline.goals",
     "Goals": "pipeline.goals",
     "InternalError": "errors",
@@ -156,6 +158,7 @@ __all__ = [
     "GenerateOptions",
     "Generation",
     "GoalApproach",
+    "GoalSummary",
     "Goals",
     "InternalError",
     "InvalidSupervisorError",

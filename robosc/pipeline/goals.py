@@ -3,10 +3,11 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from robosc.conditions.goals import goals_in_words
+from robosc.conditions.goals import aims_in_words, assumptions_in_words, goals_in_words
 from robosc.conditions.literals import Vocabulary
 from robosc.conditions.summary import ELSEWHERE, condition_line, short_diagrams
 from robosc.pipeline.conditions import Condition
+from robosc.pipeline.results import GoalSummary
 from robosc.supervisor import Supervisor
 from robosc.supervisor.diagram import diagram_domains
 from robosc.tables import html_table
@@ -105,3 +106,13 @@ def goals_of(supervisor: Supervisor) -> Goals:
         )
         for item in found
     )
+
+
+def goal_summary(supervisor: Supervisor) -> GoalSummary | None:
+    """Return the goals of a supervisor's robot in figures and words; None where it has none."""
+    aims = tuple(words for _, words in aims_in_words(supervisor.model))
+    if not aims:
+        return None
+    assumptions = tuple(words for _, words in assumptions_in_words(supervisor.model))
+    strategy = supervisor.strategy
+    return GoalSummary(aims, assumptions, strategy is not None, 0 if strategy is None else len(strategy.modes))

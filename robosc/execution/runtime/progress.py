@@ -9,7 +9,7 @@ states, and all times are those of the executor's clock.
 from __future__ import annotations
 
 import math
-from typing import Callable, List, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple
 
 from robosc.execution.runtime.protocol import Aim, StrategicSystem
 from robosc.execution.runtime.recorder import Recorder
@@ -57,6 +57,16 @@ class Progress(NamedTuple):
     is_followed: bool
     approached: Optional[str]
     chosen: Optional[str]
+
+    def plain(self) -> Dict[str, Any]:
+        """Return it as values that JSON knows, by name."""
+        found: Dict[str, Any] = {**self._asdict(), 'overdue': list(self.overdue)}
+        for kind in ('aims', 'assumptions'):
+            found[kind] = [
+                {**item._asdict(), 'unmet_s': item.unmet_s and round(item.unmet_s, 3)}
+                for item in found[kind]
+            ]
+        return found
 
 
 class ProgressAccount:

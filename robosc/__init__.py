@@ -48,6 +48,7 @@ if TYPE_CHECKING:
     from robosc.pipeline.goals import Choice, GoalApproach, Goals
     from robosc.pipeline.loading import LoadedAutomata, LoadedModel, load
     from robosc.pipeline.manual_run import EventNotPossibleError, NoStrategyError, UnknownEventError
+    from robosc.pipeline.missions import DetourProgress, MissionProgress
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.received_data import DataError
     from robosc.pipeline.results import (
@@ -78,6 +79,7 @@ _HOMES = {
     "Conditions": "pipeline.conditions",
     "DataError": "pipeline.received_data",
     "Deployment": "model.structure",
+    "DetourProgress": "pipeline.missions",
     "Diagnostic": "errors",
     "DrawingUnavailableError": "graphviz",
     "EventNotPossibleError": "pipeline.manual_run",
@@ -95,6 +97,7 @@ _HOMES = {
     "LanguageError": "errors",
     "LoadedAutomata": "pipeline.loading",
     "LoadedModel": "pipeline.loading",
+    "MissionProgress": "pipeline.missions",
     "NoStrategyError": "pipeline.manual_run",
     "NoSupervisor": "pipeline.results",
     "NodeLimitError": "errors",
@@ -142,6 +145,7 @@ __all__ = [
     "Conditions",
     "DataError",
     "Deployment",
+    "DetourProgress",
     "Diagnostic",
     "DrawingUnavailableError",
     "EventNotPossibleError",
@@ -159,6 +163,7 @@ __all__ = [
     "LanguageError",
     "LoadedAutomata",
     "LoadedModel",
+    "MissionProgress",
     "NoStrategyError",
     "NoSupervisor",
     "NodeLimitError",

@@ -1,6 +1,6 @@
 """Every target does what the reference executor does: the same runs, compared step by step."""
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -28,6 +28,7 @@ from support.equivalence.worlds import WORLDS, live, robot_supervisor
 from support.generated import load_module, loaded_file
 from support.models import model_of
 from support.random_controllers import random_controller, random_robot
+from support.random_couriers import strategic_courier
 from support.random_goals import strategic_controller
 from support.random_supervisors import CERTIFICATE, random_supervisor
 
@@ -133,25 +134,34 @@ def _strategic(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
             yield supervisor, random_scenario(supervisor, seed, 80)
 
 
-def test_strategies_in_python() -> None:
+def _couriers(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
+    """Yield random robots with missions, with a run of each under its strategy."""
+    for seed in range(first, first + 60):
+        supervisor = strategic_courier(seed)
+        if supervisor is not None:
+            yield supervisor, random_scenario(supervisor, seed, 80)
+
+
+@pytest.mark.parametrize(("robots", "least"), [(_strategic, 50), (_couriers, 300)])
+def test_strategies_in_python(robots: Callable[[int], Iterator[tuple[Supervisor, Scenario]]], least: int) -> None:
     requests = 0
-    for supervisor, scenario in _strategic(0):
+    for supervisor, scenario in robots(0):
         expected = observe(supervisor, scenario)
         compare(generated_python(supervisor, load_module(supervisor)), scenario, expected)
         requests += sum(len(item.issued) for item in expected)
-    assert requests > 50
+    assert requests > least
 
 
 @needs_gcc
 def test_strategies_in_c(tmp_path: Path) -> None:
     requests = 0
-    for number, (supervisor, scenario) in enumerate(islice(_strategic(1_500), 6)):
+    for number, (supervisor, scenario) in enumerate((*islice(_strategic(1_500), 4), *islice(_couriers(60), 6))):
         expected = observe(supervisor, scenario)
         # Some with sanitizers, which take the compiler three times as long.
         options = () if number % 4 == 0 else ("-O0",)
         compare(C99Target(supervisor, tmp_path / str(number), *options), scenario, expected)
         requests += sum(len(item.issued) for item in expected)
-    assert requests > 5
+    assert requests > 30
 
 
 TWO_WHEELS = """robot TwoWheels {

@@ -20,8 +20,8 @@ def observing(executable: ExecutableSystem, scope: ExpressionWriter, namer: Name
 
 
 def reached(executable: ExecutableSystem, number: int, scope: ExpressionWriter) -> Block:
-    """Return the statements that say whether a goal is true."""
-    return [Return(scope.truth(executable.obligations.goals[number]))]
+    """Return the statements that say whether a goal is true, or a visit of a mission is not wanted now."""
+    return [Return(scope.truth(executable.obligations.aims[number].condition))]
 
 
 def choosing(executable: ExecutableSystem, strategy: Strategy, number: int, diagrams: Diagrams, nothing: Code) -> Block:
@@ -30,7 +30,7 @@ def choosing(executable: ExecutableSystem, strategy: Strategy, number: int, diag
     Args:
         executable: Executable system of the robot.
         strategy: Its strategy.
-        number: Number of the goal.
+        number: Number of the goal or visit.
         diagrams: Writer of the conditions.
         nothing: Result where nothing is chosen.
     """

@@ -6,7 +6,7 @@ from itertools import groupby
 
 from robosc._version import __version__
 from robosc.automata.executable import CALLED_KINDS
-from robosc.automata.goal_memory import MEMORY
+from robosc.automata.goal_memory import MEMORY, counted
 from robosc.automata.plants import PLANT_LOCATIONS, communication_plant_name
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import (
@@ -339,8 +339,8 @@ def _state(layout: Layout) -> list[str]:
     if layout.supervisor.strategy is not None:
         places = layout.executable.obligations.places
         body += [f"bool {layout.variables[MEMORY, place.name][0]}; /* {place.name} */" for place in places]
-        goals = len(layout.supervisor.strategy.modes)
-        body.append(f"{width(goals)} {layout.mode}; /* goal that is approached, of {goals} */")
+        aims = layout.executable.obligations.aims
+        body.append(f"{width(len(aims))} {layout.mode}; /* number of what is approached, of {counted(aims)} */")
     return [
         "/* The state: where everything is. */",
         "typedef struct {",

@@ -1,10 +1,11 @@
-"""Generated functions of a strategy: its memory of goals, and its choices."""
+"""Generated functions of a strategy: its memory of goals and missions, and its choices."""
 
-from robosc.automata.goal_memory import MEMORY
+from robosc.automata.goal_memory import MEMORY, AimKind
 from robosc.supervisor import Strategy
 from robosc.targets.code.c.conditions import CConditions
 from robosc.targets.code.c.naming import CNamer
 from robosc.targets.code.c.statements import unused
+from robosc.targets.code.c.text import comment
 from robosc.targets.code.c.unit import Reading, Unit
 from robosc.targets.code.expressions import FALSE_CODE, integer, variable
 from robosc.targets.code.statements import Assign, Statement
@@ -12,7 +13,7 @@ from robosc.targets.code.strategy import choosing, observing, reached
 
 
 def forgotten(unit: Unit) -> list[Statement]:
-    """The assignments by which nothing is remembered of goals."""
+    """The assignments by which nothing is remembered of goals and missions."""
     scope, layout = Reading(unit), unit.layout
     places = (scope.variable_place(MEMORY, place.name) for place in layout.executable.obligations.places)
     return [*(Assign(place, FALSE_CODE) for place in places), Assign(variable(f"s->{layout.mode}"), integer(0))]
@@ -30,11 +31,13 @@ def strategy_functions(unit: Unit, conditions: CConditions, strategy: Strategy) 
     count = len(strategy.modes)
     taken = observing(executable, scope, CNamer(frozenset({"s"})))
     found = [unit.definition("static void observe_for_strategy(state_t *s)", [*unused("s"), *taken])]
-    for number in range(count):
+    for number, aim in enumerate(executable.obligations.aims):
         body = [*unused("s"), *reached(executable, number, scope)]
-        found.append(unit.definition(f"static bool is_goal_{number + 1}_reached(const state_t *s)", body))
+        words = comment(aim.name if aim.kind is AimKind.GOAL else f"{aim.name}: also true where it is not wanted now")
+        found.append([*words, *unit.definition(f"static bool is_reached_{number + 1}(const state_t *s)", body)])
         body = [*unused("s"), *choosing(executable, strategy, number, conditions, integer(-1))]
-        found.append(unit.definition(f"static int approach_goal_{number + 1}(const state_t *s)", body))
+        words = comment(f"the request that approaches {aim.name}, or -1 to wait")
+        found.append([*words, *unit.definition(f"static int approach_{number + 1}(const state_t *s)", body)])
     lines = [
         "/* The request that the strategy chooses in a stable state, or -1 to wait. */",
         "static int choose_by_strategy(state_t *s)",
@@ -45,8 +48,8 @@ def strategy_functions(unit: Unit, conditions: CConditions, strategy: Strategy) 
     for number in range(count):
         lines += [
             f"        case {number}:",
-            f"            if (!is_goal_{number + 1}_reached(s)) {{",
-            f"                return approach_goal_{number + 1}(s);",
+            f"            if (!is_reached_{number + 1}(s)) {{",
+            f"                return approach_{number + 1}(s);",
             "            }",
             "            break;",
         ]

@@ -1,5 +1,6 @@
-"""Generated methods of a strategy: its memory of goals, and its choices."""
+"""Generated methods of a strategy: its memory of goals and missions, and its choices."""
 
+from robosc.automata.goal_memory import AimKind
 from robosc.supervisor import Strategy
 from robosc.targets.code.expressions import Sort, literal
 from robosc.targets.code.python.naming import PythonNamer
@@ -11,18 +12,18 @@ _NOTHING = literal("None", Sort.INTEGER)
 
 
 def forgetting_lines(writer: Writer) -> list[str]:
-    """Statements that forget all that was remembered of goals."""
+    """Statements that forget all that was remembered of goals and missions."""
     if writer.layout.supervisor.strategy is None:
         return []
     return [*(f"self.{attribute} = False" for attribute in writer.layout.memory.values()), "self._mode = 0"]
 
 
 def mode_tables(strategy: Strategy) -> list[str]:
-    """Statements of the constructor: the methods of each goal."""
+    """Statements of the constructor: the methods of each goal and visit."""
     numbers = range(1, len(strategy.modes) + 1)
     return [
-        "self._is_reached = (" + "".join(f"self._is_goal_{number}_reached, " for number in numbers).rstrip() + ")",
-        "self._approach = (" + "".join(f"self._approach_goal_{number}, " for number in numbers).rstrip() + ")",
+        "self._is_reached = (" + "".join(f"self._is_reached_{number}, " for number in numbers).rstrip() + ")",
+        "self._approach = (" + "".join(f"self._approach_{number}, " for number in numbers).rstrip() + ")",
     ]
 
 
@@ -41,10 +42,12 @@ def choose(self):
         self._mode = (self._mode + 1) % {count}
     return None'''.splitlines(),
     ]
-    for number in range(count):
-        name = f"goal {number + 1}"
+    for number, aim in enumerate(executable.obligations.aims):
         body = choosing(executable, strategy, number, writer.conditions, _NOTHING)
         is_reached = reached(executable, number, scope)
-        methods.append(method(f"_is_goal_{number + 1}_reached", f"Return True if {name} is true.", is_reached))
-        methods.append(method(f"_approach_goal_{number + 1}", f"Return the request that approaches {name}.", body))
+        words = f"Return True if {aim.name} is true, or not wanted now."
+        if aim.kind is AimKind.GOAL:
+            words = f"Return True if {aim.name} is true."
+        methods.append(method(f"_is_reached_{number + 1}", words, is_reached))
+        methods.append(method(f"_approach_{number + 1}", f"Return the request that approaches {aim.name}.", body))
     return methods

@@ -10,8 +10,9 @@ from typing import Any
 
 from robosc.automata import ExecutableSystem
 from robosc.strategies.arena import ControllerArena
+from robosc.strategies.counter_strategy import CounterStage, CounterStrategy, oppose
 from robosc.strategies.gr1 import Solution, solve
-from robosc.supervisor import AddedCondition, Choice, Strategy
+from robosc.supervisor import AddedCondition, Choice, DecisionDiagram, Strategy
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.monitor import ProgressMonitor
@@ -107,6 +108,39 @@ class StrategySynthesis:
             positions=self._count(self.arena.positions),
             winning=self._count(solution.winning),
             rounds=solution.rounds,
+        )
+
+    def counter(self, goals: Sequence[int]) -> CounterStrategy:
+        """Return how the surroundings keep goals from coming true together, which cannot be reached.
+
+        Args:
+            goals: Numbers of the goals.
+
+        Raises:
+            UnsupportedModelError: It would be too large.
+        """
+        denied = [self.goals[item] for item in goals]
+        positions, false = self.arena.positions, self._manager.false
+        lost = positions & ~self._solved(self.assumptions, denied).winning
+
+        def is_enough(found: Any) -> bool:
+            return not self.arena.can_begin(positions & ~found)
+
+        def diagram(predicate: Any) -> DecisionDiagram:
+            return extract(self._encoding, predicate)
+
+        stages = oppose(
+            self.arena, self.assumptions, denied, lost, is_enough, false=false, check_stop=self._monitor.check_stop
+        )
+        return CounterStrategy(
+            tuple(
+                CounterStage(
+                    goals[stage.goal],
+                    diagram(stage.positions),
+                    tuple(tuple(map(diagram, layers)) for layers in stage.layers),
+                )
+                for stage in stages
+            )
         )
 
     def _solution(self, assumptions: Iterable[int], goals: Iterable[int]) -> Solution:

@@ -11,11 +11,13 @@ from robosc.automata import ExecutableSystem
 from robosc.automata.goal_memory import Obligations
 from robosc.controller_properties.goals import check_strategy
 from robosc.model.structure import Deployment, GoalForm, Model
+from robosc.strategies.counter_strategy import CounterPlayer, CounterStage, CounterStrategy
 from robosc.strategies.gr1 import solve
 from robosc.strategies.synthesize import StrategyResult, StrategySynthesis
-from robosc.supervisor import Strategy
+from robosc.supervisor import DecisionDiagram, Strategy
 from robosc.supervisor.predicates import state_predicate
 from robosc.synthesis.workspace import workspace
+from support.counter_twin import fault_of_counter
 from support.goal_twin import LOST, NEVER, Game, Position, game_of, unfair_goal, winning_positions
 from support.random_controllers import random_controller
 from support.random_goals import with_random_goals
@@ -68,6 +70,7 @@ def compare(seed: int, engine: str, met: Counter[str]) -> None:
         result = synthesis.result(allowed=every)
         strategy = result.strategy
         preventable = synthesis.result().preventable
+        counter = synthesis.counter(result.unreached) if result.unreached else None
     is_won = game.first != LOST and game.first in won
     assert (strategy is not None) == is_won, seed
     if game.first != LOST:
@@ -78,6 +81,8 @@ def compare(seed: int, engine: str, met: Counter[str]) -> None:
     met["models"] += 1
     met["positions"] += len(game.choices)
     met["won" if is_won else "lost"] += 1
+    if counter is not None and game.first != LOST:
+        compare_counter(game, executable, counter, result.unreached, seed, met)
     if strategy is None:
         return
     modes = [[(item.event, state_predicate(system, item.condition)) for item in mode] for mode in strategy.modes]
@@ -138,6 +143,32 @@ def compare_reasons(game: Game, result: StrategyResult, seed: int, met: Counter[
         met["needed"] += bool(needed)
 
 
+def compare_counter(
+    game: Game,
+    executable: ExecutableSystem,
+    counter: CounterStrategy,
+    unreached: tuple[int, ...],
+    seed: int,
+    met: Counter[str],
+) -> None:
+    """Check that a counter-strategy keeps the goals from coming true, and that a damaged one is seen not to."""
+    owed, model = executable.obligations, executable.model
+
+    def values(position: Position) -> tuple[Any, ...]:
+        return values_of(position, model, owed)
+
+    def fault(counter: CounterStrategy) -> str:
+        player = CounterPlayer.of(executable.remembering_automata, owed, counter)
+        return fault_of_counter(game, unreached, player, values)
+
+    assert fault(counter) == "", seed
+    met["counter-strategies"] += 1
+    # A counter-strategy that only gives the controller its turn.
+    everywhere = DecisionDiagram((), 1)
+    idle = CounterStage(0, everywhere, ((everywhere,),) * max(1, len(game.assumptions)))
+    met["idle, seen"] += bool(fault(CounterStrategy((idle,))))
+
+
 @pytest.mark.parametrize("first", range(0, 2_400, 400))
 def test_random_robots_agree(first: int, record_property: Callable[[str, object], None]) -> None:
     met: Counter[str] = Counter()
@@ -146,6 +177,7 @@ def test_random_robots_agree(first: int, record_property: Callable[[str, object]
     for name, count in sorted(met.items()):
         record_property(name, count)
     assert met["models"] > 100 and min(met["won"], met["lost"]) > 30 and met["with requests"] > 1, met
+    assert met["counter-strategies"] > 30 and met["idle, seen"] > 2, met
 
 
 def test_engines_agree() -> None:

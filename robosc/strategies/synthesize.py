@@ -98,17 +98,30 @@ class StrategySynthesis:
         solution = self._solution(range(len(self.assumptions)), range(len(self.goals)))
         is_won = self.arena.can_begin(solution.winning)
         unreached = () if is_won else self._unreached()
-        preventable = self._preventable(allowed)
+        preventable = self.preventable(allowed)
         return StrategyResult(
             strategy=self._strategy(solution) if is_won and not preventable else None,
             unreached=unreached,
-            is_hopeless=bool(unreached) and not self._can_be_reached(unreached),
+            is_hopeless=bool(unreached) and not self.can_be_reached(unreached),
             preventable=preventable,
             unneeded=self._unneeded() if is_won else (),
             positions=self._count(self.arena.positions),
             winning=self._count(solution.winning),
             rounds=solution.rounds,
         )
+
+    @property
+    def false(self) -> Any:
+        """The predicate that is true nowhere."""
+        return self._manager.false
+
+    def diagram(self, predicate: Any) -> DecisionDiagram:
+        """Return a predicate as a diagram over the state and the memory.
+
+        Raises:
+            UnsupportedModelError: It would be too large.
+        """
+        return extract(self._encoding, predicate)
 
     def counter(self, goals: Sequence[int]) -> CounterStrategy:
         """Return how the surroundings keep goals from coming true together, which cannot be reached.
@@ -120,24 +133,23 @@ class StrategySynthesis:
             UnsupportedModelError: It would be too large.
         """
         denied = [self.goals[item] for item in goals]
-        positions, false = self.arena.positions, self._manager.false
+        positions = self.arena.positions
         lost = positions & ~self._solved(self.assumptions, denied).winning
 
         def is_enough(found: Any) -> bool:
             return not self.arena.can_begin(positions & ~found)
 
-        def diagram(predicate: Any) -> DecisionDiagram:
-            return extract(self._encoding, predicate)
-
         stages = oppose(
-            self.arena, self.assumptions, denied, lost, is_enough, false=false, check_stop=self._monitor.check_stop
+            *(self.arena, self.assumptions, denied, lost, is_enough),
+            false=self.false,
+            check_stop=self._monitor.check_stop,
         )
         return CounterStrategy(
             tuple(
                 CounterStage(
                     goals[stage.goal],
-                    diagram(stage.positions),
-                    tuple(tuple(map(diagram, layers)) for layers in stage.layers),
+                    self.diagram(stage.positions),
+                    tuple(tuple(map(self.diagram, layers)) for layers in stage.layers),
                 )
                 for stage in stages
             )
@@ -149,7 +161,8 @@ class StrategySynthesis:
     def _solved(self, assumptions: Sequence[Any], goals: Sequence[Any]) -> Solution:
         return solve(self.arena, assumptions, goals, false=self._manager.false, check_stop=self._monitor.check_stop)
 
-    def _is_won(self, assumptions: Iterable[int], goals: Iterable[int]) -> bool:
+    def is_won(self, assumptions: Iterable[int], goals: Iterable[int]) -> bool:
+        """Return True if some goals can be reached under some assumptions."""
         return self.arena.can_begin(self._solution(assumptions, goals).winning)
 
     def _unreached(self) -> tuple[int, ...]:
@@ -158,11 +171,11 @@ class StrategySynthesis:
         kept = list(range(len(self.goals)))
         for item in reversed(range(len(self.goals))):
             fewer = [number for number in kept if number != item]
-            if fewer and not self._is_won(every, fewer):
+            if fewer and not self.is_won(every, fewer):
                 kept = fewer
         return tuple(kept)
 
-    def _can_be_reached(self, goals: Sequence[int]) -> bool:
+    def can_be_reached(self, goals: Sequence[int]) -> bool:
         """Return True if both sides together can make goals true again and again."""
         found = self.arena.positions
         before = None
@@ -183,15 +196,18 @@ class StrategySynthesis:
         kept = list(range(len(self.assumptions)))
         for item in reversed(range(len(self.assumptions))):
             fewer = [number for number in kept if number != item]
-            if self._is_won(fewer, goals):
+            if self.is_won(fewer, goals):
                 kept = fewer
         return tuple(item for item in range(len(self.assumptions)) if item not in kept)
 
-    def _preventable(self, allowed: Collection[int]) -> tuple[int, ...]:
+    def preventable(self, allowed: Collection[int]) -> tuple[int, ...]:
         """Return assumptions that the robot can make false for ever, in a state that it can get to.
 
         A robot that does so reaches its goals in name alone. Such assumptions are not well separated from the goals:
         U. Klein and A. Pnueli, "Revisiting synthesis of GR(1) specifications", HVC 2010, LNCS 6504, pp. 161-181.
+
+        Args:
+            allowed: Numbers of assumptions that are not looked at.
         """
         found = []
         for item, assumption in enumerate(self.assumptions):

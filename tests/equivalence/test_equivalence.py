@@ -127,7 +127,7 @@ def test_random_robots_in_c(tmp_path_factory: pytest.TempPathFactory, seed: int)
 
 def _strategic(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
     """Yield random robots whose strategies choose requests, with a run of each under its strategy."""
-    for seed in range(first, first + 1_500):
+    for seed in range(first, first + 60):
         supervisor = strategic_controller(seed)
         if supervisor is not None and supervisor.strategy and any(supervisor.strategy.modes):
             yield supervisor, random_scenario(supervisor, seed, 80)
@@ -139,7 +139,7 @@ def test_strategies_in_python() -> None:
         expected = observe(supervisor, scenario)
         compare(generated_python(supervisor, load_module(supervisor)), scenario, expected)
         requests += sum(len(item.issued) for item in expected)
-    assert requests > 50
+    assert requests > 150
 
 
 @needs_gcc
@@ -151,7 +151,7 @@ def test_strategies_in_c(tmp_path: Path) -> None:
         options = () if number % 4 == 0 else ("-O0",)
         compare(C99Target(supervisor, tmp_path / str(number), *options), scenario, expected)
         requests += sum(len(item.issued) for item in expected)
-    assert requests > 5
+    assert requests > 8
 
 
 TWO_WHEELS = """robot TwoWheels {

@@ -12,10 +12,12 @@ from typing import Any
 
 from robosc.automata import ExecutableSystem
 from robosc.automata.compile import NO_DATA, Function, compile_expression
+from robosc.automata.goal_memory import Obligations
 from robosc.automata.state import subjects
 from robosc.controller_properties.controller import Controller, Node
-from robosc.model.structure import Assumption, Goal, GoalForm
-from robosc.supervisor import AddedCondition
+from robosc.model.structure import Assumption, Goal, GoalForm, Model
+from robosc.supervisor import AddedCondition, Strategy
+from robosc.supervisor.predicates import state_predicate
 
 Marks = tuple[bool, ...]
 """Memory of each assumption, then of each goal: that an answer is owed, or that it came true."""
@@ -227,12 +229,50 @@ def _attractor(
     return found
 
 
-def unfair_goal(game: Game, decide: Callable[[Position, int], tuple[str | None, int]]) -> tuple[int, Any] | None:
+Decide = Callable[[Position, int], tuple[str | None, int]]
+"""Function that returns the request for a position and a mode, None for none, and the mode after it."""
+
+
+def deciding(game: Game, executable: ExecutableSystem, strategy: Strategy) -> Decide:
+    """Return what a strategy decides in the positions of a game."""
+    model, owed, system = executable.model, executable.obligations, executable.remembering_automata
+    modes = [[(item.event, state_predicate(system, item.condition)) for item in mode] for mode in strategy.modes]
+
+    def decide(position: Position, mode: int) -> tuple[str | None, int]:
+        holding = game.holding(position, game.goals)
+        following = [(mode + step) % len(holding) for step in range(len(holding))]
+        number = next((number for number in following if not holding[number]), None)
+        if number is None:
+            return None, mode
+        values = values_of(position, model, owed)
+        return next((event for event, condition in modes[number] if condition(values)), None), number
+
+    return decide
+
+
+def values_of(position: Position, model: Model, owed: Obligations) -> tuple[Any, ...]:
+    """Return a position of the explicit game as a state of the automata with their memory."""
+    (state, held), marks = position
+    memory: dict[str, bool] = {}
+    for cancel, mask in zip(owed.cancels, held, strict=True):
+        memory |= {place.name: bool(mask >> bit & 1) for bit, place in enumerate(cancel.places)}
+    names = [f"assumption {number} is owed" for number, _ in enumerate(model.assumptions, start=1)]
+    names += [
+        f"goal {number} {'was reached' if goal.form is GoalForm.ONCE else 'is owed'}"
+        for number, goal in enumerate(model.goals, start=1)
+    ]
+    memory |= dict(zip(names, marks, strict=True))
+    return (*state, "only", *(memory[place.name] for place in owed.places))
+
+
+def unfair_goal(game: Game, decide: Decide) -> tuple[int, Any] | None:
     """Return a goal that a strategy may miss for ever although all assumptions come true again and again, with where.
+
+    A request that is not enabled where it is chosen misses the first one.
 
     Args:
         game: The game.
-        decide: Function that returns the request for a position and a mode, None for none, and the mode after it.
+        decide: Decisions of the strategy.
     """
     moves: dict[Any, set[Any]] = {}
     turns: dict[Any, Any] = {}
@@ -244,6 +284,8 @@ def unfair_goal(game: Game, decide: Callable[[Position, int], tuple[str | None, 
         if position == LOST:
             return 0, vertex
         event, after = decide(position, mode)
+        if event is not None and event not in game.choices[position]:
+            return 0, vertex
         turns[vertex] = (position if event is None else game.choices[position][event], after)
         moves[vertex] = {(target, mode) for target in game.successors[position]}
         queue += [turns[vertex], *moves[vertex]]

@@ -4,12 +4,16 @@ from random import Random
 
 import msgspec
 
-from robosc.automata import ExecutableSystem
+from robosc.automata import ExecutableSystem, to_automata
 from robosc.expressions import Binary, BooleanType, EnumType, EnumValue, Expression, StateTest, Unary, VariableRead
 from robosc.model.structure import Assumption, Deployment, Goal, GoalForm, Model
 from robosc.strategies import synthesize_strategy
 from robosc.supervisor import Supervisor
+from robosc.synthesis import SynthesisStatus, synthesize
+from support.execution import supervisor_of
+from support.failing import made, model_files
 from support.random_controllers import random_controller
+from support.random_errands import random_errands
 
 
 def strategic_controller(seed: int) -> Supervisor | None:
@@ -17,10 +21,9 @@ def strategic_controller(seed: int) -> Supervisor | None:
 
     It may keep its assumptions from coming true.
     """
-    supervisor = random_controller(seed)
+    supervisor, model = wanting_robot(seed)
     if supervisor is None:
         return None
-    model = with_random_goals(supervisor.model, Random(seed))
     allowed = tuple(msgspec.structs.replace(item, is_allowed=True) for item in model.assumptions)
     model = msgspec.structs.replace(model, assumptions=allowed)
     executable = ExecutableSystem(model, Deployment.CONTROLLER)
@@ -29,6 +32,23 @@ def strategic_controller(seed: int) -> Supervisor | None:
         return None
     certificate = msgspec.structs.replace(supervisor.certificate, goals="not checked")
     return msgspec.structs.replace(supervisor, model=model, strategy=strategy, certificate=certificate)
+
+
+def wanting_robot(seed: int) -> tuple[Supervisor | None, Model]:
+    """Return the supervisor of a random robot, or None if there is none, and its model with goals.
+
+    Of five robots four are of those that have something to do.
+    """
+    if seed % 5:
+        model = random_errands(seed)
+        result = synthesize(to_automata(model, Deployment.CONTROLLER))
+        made("random_errands", seed, lambda: model_files(model))
+        is_empty = result.status is SynthesisStatus.EMPTY
+        return None if is_empty else supervisor_of(model, added=result.added), model
+    supervisor = random_controller(seed)
+    if supervisor is None:
+        return None, random_errands(seed)
+    return supervisor, with_random_goals(supervisor.model, Random(seed))
 
 
 def with_random_goals(model: Model, dice: Random) -> Model:

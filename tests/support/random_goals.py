@@ -6,7 +6,7 @@ import msgspec
 
 from robosc.automata import ExecutableSystem, to_automata
 from robosc.expressions import Binary, BooleanType, EnumType, EnumValue, Expression, StateTest, Unary, VariableRead
-from robosc.model.structure import Assumption, Deployment, Goal, GoalForm, Model
+from robosc.model.structure import Assumption, Component, Deployment, Goal, GoalForm, Model
 from robosc.strategies import synthesize_strategy
 from robosc.supervisor import Supervisor
 from robosc.synthesis import SynthesisStatus, synthesize
@@ -60,16 +60,16 @@ def with_random_goals(model: Model, dice: Random) -> Model:
         return kind(form, _condition(model, dice), trigger)
 
     goals = tuple(item(Goal, list(GoalForm)) for _ in range(dice.randint(1, 3)))
-    if dice.random() < 0.5:
+    moving = [item for item in model.components if item.behaviour and len(item.behaviour.states) > 1]
+    if moving and dice.random() < 0.5:
         # A component that has to be in one state again and again, and in another one, must move.
-        goals = _rounds(model, dice)
+        goals = _rounds(dice.choice(moving), dice)
     owed = [GoalForm.ALWAYS_EVENTUALLY, GoalForm.LEADS_TO]
     assumptions = tuple(item(Assumption, owed) for _ in range(dice.randint(0, 2)))
     return msgspec.structs.replace(model, goals=goals, assumptions=assumptions)
 
 
-def _rounds(model: Model, dice: Random) -> tuple[Goal, ...]:
-    component = dice.choice([item for item in model.components if item.behaviour])
+def _rounds(component: Component, dice: Random) -> tuple[Goal, ...]:
     assert component.behaviour
     states = dice.sample([state.name for state in component.behaviour.states], 2)
     return tuple(Goal(GoalForm.ALWAYS_EVENTUALLY, StateTest(component.name, state)) for state in states)

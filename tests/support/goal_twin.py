@@ -29,7 +29,7 @@ LOST = "lost"
 
 
 @dataclass
-class _Item:
+class Item:
     """A goal or an assumption over explicit states."""
 
     form: GoalForm
@@ -51,7 +51,7 @@ def _is_true(function: Function) -> Callable[[Any], bool]:
     return lambda state: function(state, NO_DATA) is True
 
 
-NEVER = _Item(GoalForm.ALWAYS_EVENTUALLY, lambda state: False, lambda state: False)
+NEVER = Item(GoalForm.ALWAYS_EVENTUALLY, lambda state: False, lambda state: False)
 """A goal that is never true."""
 
 
@@ -65,18 +65,18 @@ class Game:
         first: The position in which the executor begins, or None if it never gets to one.
     """
 
-    assumptions: list[_Item]
-    goals: list[_Item]
+    assumptions: list[Item]
+    goals: list[Item]
     successors: dict[Position, set[Any]] = field(default_factory=dict)
     choices: dict[Position, dict[str, Any]] = field(default_factory=dict)
     first: Any = None
-    asked: tuple[list[_Item], list[_Item]] | None = None
+    asked: tuple[list[Item], list[Item]] | None = None
 
-    def asking(self, assumptions: list[_Item], goals: list[_Item]) -> "Game":
+    def asking(self, assumptions: list[Item], goals: list[Item]) -> "Game":
         """Return the same game about other assumptions and goals, of those that it keeps account of."""
         return replace(self, asked=(assumptions, goals))
 
-    def holds(self, position: Position, item: _Item) -> bool:
+    def holds(self, position: Position, item: Item) -> bool:
         """Return True if an assumption or a goal counts as come true in a position."""
         (state, _), marks = position
         place = next((place for place, kept in enumerate((*self.assumptions, *self.goals)) if kept is item), None)
@@ -94,7 +94,19 @@ class Game:
             for component in _components(list(following), following.__getitem__)
         )
 
-    def holding(self, position: Position, items: list[_Item]) -> tuple[bool, ...]:
+    def possible(self, item: Item) -> set[Position]:
+        """Return the positions from which both sides together can make an assumption or a goal true again and again."""
+        following = {
+            position: {*self.successors[position], *self.choices[position].values(), position} - {LOST}
+            for position in self.choices
+        }
+        components = _components(list(following), following.__getitem__)
+        found = {at for group in components if any(self.holds(one, item) for one in group) for at in group}
+        while wider := {position for position, targets in following.items() if targets & found} - found:
+            found |= wider
+        return found
+
+    def holding(self, position: Position, items: list[Item]) -> tuple[bool, ...]:
         (state, _), marks = position
         offset = 0 if items is self.assumptions else len(self.assumptions)
         return tuple(item.holds(marks[offset + place], state) for place, item in enumerate(items))
@@ -107,9 +119,9 @@ def game_of(executable: ExecutableSystem, added: Iterable[AddedCondition], limit
     controller._choices.clear()
     places = {subject: place for place, subject in enumerate(subjects(controller.system))}
 
-    def items(given: tuple[Goal, ...] | tuple[Assumption, ...]) -> list[_Item]:
+    def items(given: tuple[Goal, ...] | tuple[Assumption, ...]) -> list[Item]:
         return [
-            _Item(
+            Item(
                 item.form,
                 _is_true(compile_expression(item.condition, places)),
                 (lambda state: False) if item.trigger is None else _is_true(compile_expression(item.trigger, places)),

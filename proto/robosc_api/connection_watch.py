@@ -35,6 +35,7 @@ from typing import Any, NamedTuple, Self
 from urllib.parse import unquote
 
 from robosc_api.layers import Layer, behaviour_of, with_behaviour
+from robosc_api.peers import peer_of
 
 _log = logging.getLogger(__name__)
 
@@ -308,11 +309,11 @@ class Arrivals(Layer):
         behaviour = behaviour_of(inner)
 
         def noted(request: Any, context: Any) -> Any:
-            self._arrived.add(context.peer())
+            self._arrived.add(peer_of(context))
             return behaviour(request, context)
 
         def noted_each(requests: Any, context: Any) -> Any:
-            return behaviour(self._each(requests, context.peer()), context)
+            return behaviour(self._each(requests, peer_of(context)), context)
 
         return with_behaviour(inner, noted_each if inner.request_streaming else noted)
 
@@ -371,7 +372,7 @@ class CallsByConnection(Layer):
         behaviour, arrivals, is_check = behaviour_of(inner), self._arrivals, is_health_check(method)
 
         def noted(request: Any, context: Any) -> Any:
-            peer = context.peer()
+            peer = peer_of(context)
             arrivals.begun(peer)
             context.add_done_callback(lambda _: arrivals.ended(peer, is_check=is_check))
             return behaviour(request, context)
@@ -538,7 +539,7 @@ def can_watch() -> bool:
     return True
 
 
-def peer_of(text: str) -> Peer | None:
+def address_of(text: str) -> Peer | None:
     """Return the other end of a connection from gRPC's words for it; None: it is no TCP connection."""
     kind, _, rest = unquote(text).partition(":")
     host, _, port = rest.rpartition(":")
@@ -549,7 +550,7 @@ def peer_of(text: str) -> Peer | None:
 
 def _by_peer(calls: CallsSince[str]) -> CallsSince[Peer]:
     """Return calls by the other end of their connection, without those over other lines than TCP."""
-    peers = {text: peer_of(text) for text in {*calls.asked, *calls.ended, *calls.open}}
+    peers = {text: address_of(text) for text in {*calls.asked, *calls.ended, *calls.open}}
     ended, opened = (
         {peer: count for text, count in counts.items() if (peer := peers[text]) is not None}
         for counts in (calls.ended, calls.open)

@@ -6,10 +6,13 @@ Each interceptor of grpc.aio adds a coroutine to every call; layers do not.
 from abc import abstractmethod
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import aclosing
+from itertools import groupby
 from typing import Any
 
 import grpc
 import grpc.aio
+
+from robosc_api.peers import begin_call
 
 
 class Layer(grpc.aio.ServerInterceptor):
@@ -56,14 +59,41 @@ class Layers(grpc.aio.ServerInterceptor):
     """
 
     def __init__(self, *layers: Layer) -> None:
-        self._inside_out = layers[::-1]
+        self._inside_out: list[Layer] = []
+        for is_same, run in groupby(layers[::-1], _is_same_for_each_call):
+            found = list(run)
+            self._inside_out += [_Joined(found)] if is_same and len(found) > 1 else found
 
     async def intercept_service(self, continuation: Callable[[Any], Awaitable[Any]], handler_call_details: Any) -> Any:
         """Return the handler of a call, wrapped in all layers."""
+        begin_call()
         handler = await continuation(handler_call_details)
         for layer in self._inside_out:
             handler = layer.handler(handler, handler_call_details)
         return handler
+
+
+def _is_same_for_each_call(layer: Layer) -> bool:
+    """Return True if a layer only wraps the handlers of methods, and looks at no call before its handler begins."""
+    return type(layer).handler is Layer.handler
+
+
+class _Joined(Layer):
+    """Neighbouring layers whose handlers are looked up together.
+
+    Args:
+        inside_out: The innermost first.
+    """
+
+    def __init__(self, inside_out: list[Layer]) -> None:
+        super().__init__()
+        self._layers = inside_out
+
+    def wrap(self, inner: Any, method: str) -> Any:
+        """Wrap a handler in all of them."""
+        for layer in self._layers:
+            inner = layer.wrap(inner, method)
+        return inner
 
 
 async def write_responses(made: Awaitable[Any] | AsyncIterator[Any], context: Any) -> None:

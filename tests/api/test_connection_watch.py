@@ -17,8 +17,8 @@ from robosc_api.connection_watch import (
     Ledger,
     Peer,
     Traffic,
+    address_of,
     can_watch,
-    peer_of,
 )
 from robosc_api.layers import Layer, Layers, behaviour_of, with_behaviour
 from robosc_api.request_timeouts import RequestTimeouts
@@ -176,7 +176,7 @@ def test_what_is_sent_explains_nothing_without_calls() -> None:
     ],
 )
 def test_the_other_end_in_the_words_of_grpc(text: str, expected: Any) -> None:
-    assert peer_of(text) == expected
+    assert address_of(text) == expected
 
 
 LARGEST_BYTES = 128 * KIB

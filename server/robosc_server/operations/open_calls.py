@@ -7,6 +7,7 @@ from typing import Any
 
 from robosc_api.connection_watch import Arrivals, is_health_check
 from robosc_api.layers import Layer, behaviour_of, with_behaviour
+from robosc_api.peers import peer_of
 from robosc_api.security import ENTRY, caller_of, is_loopback_peer, network_of
 from robosc_server.tasks.task import Reason, RefusedError
 
@@ -76,7 +77,7 @@ class OpenCalls(Layer):
             return behaviour(request, context)
 
         def counted_health_check(request: Any, context: Any) -> Any:
-            is_own = is_loopback_peer(context.peer())
+            is_own = is_loopback_peer(peer_of(context))
             slots = self._own_health_slots if is_own else self._health_slots
             slots.take(network_of(identify(context)), context)
             return behaviour(request, context)
@@ -111,7 +112,7 @@ class _CallSlots:
         Raises:
             RefusedError: There is no slot for this caller; none is taken.
         """
-        peer = context.peer()
+        peer = peer_of(context)
         count = self._by_caller.get(caller, 0)
         entry = ENTRY.get()
         limit = self._limits.per_caller if entry is None or entry.quota.calls is None else entry.quota.calls

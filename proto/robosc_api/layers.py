@@ -3,6 +3,7 @@
 Each interceptor of grpc.aio adds a coroutine to every call; layers do not.
 """
 
+import asyncio
 from abc import abstractmethod
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import aclosing
@@ -94,6 +95,19 @@ class _Joined(Layer):
         for layer in self._layers:
             inner = layer.wrap(inner, method)
         return inner
+
+
+def when_call_ends(callback: Callable[[Any], None]) -> None:
+    """Call a function when the call whose handler runs has ended for gRPC as well, and its response is on its way.
+
+    gRPC's context offers the same, but then refers to itself: the context, its metadata and its state in gRPC would
+    stay until the garbage collector finds them, and each call would take new memory.
+
+    Args:
+        callback: Function of the call's task, in which gRPC runs handlers.
+    """
+    task: Any = asyncio.current_task()
+    task.add_done_callback(callback)
 
 
 async def write_responses(made: Awaitable[Any] | AsyncIterator[Any], context: Any) -> None:

@@ -6,7 +6,7 @@ from functools import partial
 from typing import Any
 
 from robosc_api.connection_watch import Arrivals, is_health_check
-from robosc_api.layers import Layer, behaviour_of, with_behaviour
+from robosc_api.layers import Layer, behaviour_of, when_call_ends, with_behaviour
 from robosc_api.peers import peer_of
 from robosc_api.security import ENTRY, caller_of, is_loopback_peer, network_of
 from robosc_server.tasks.task import Reason, RefusedError
@@ -127,15 +127,15 @@ class _CallSlots:
             )
         self._by_caller[caller] = count + 1
         self.taken += 1
-        # The call has now ended for gRPC as well: an unread response keeps it open after the handler has returned.
+        # An unread response keeps the call open after the handler has returned.
         self._arrivals.begun(peer)
-        context.add_done_callback(partial(self._release, caller, peer))
+        when_call_ends(partial(self._release, caller, peer))
 
     def _refused(self, peer: str) -> None:
         if not self._are_checks:
             self._arrivals.refused(peer)
 
-    def _release(self, caller: str, peer: str, context: Any) -> None:
+    def _release(self, caller: str, peer: str, task: Any) -> None:
         self._arrivals.ended(peer, is_check=self._are_checks)
         self.taken -= 1
         left = self._by_caller[caller] - 1

@@ -3,7 +3,7 @@
 Usage: run.py [NAME...]                       (all of them without an argument)
        run.py cif DIR [--against FILE]    (a folder of CIF models: see cif.py)
 
-Names: cold-start, conditions, editor, execution, goals, gr1, language, synthesis; of the service: service-load,
+Names: cold-start, conditions, editor, execution, goals, gr1, language, synthesis; of the service: service-load, call-cpu,
 isolation, task-cpu; of the bridge: decoders, drive-bases, live-view, live-view-pixels, loop-period, maze, reaction,
 endurance, shipped, twin.
 """
@@ -35,9 +35,10 @@ import goals
 import gr1
 import language
 import synthesis
-from service import isolation, load, task_cpu
+from service import call_cpu, isolation, load, task_cpu
 
 TABLES: dict[str, Callable[[], str]] = {
+    "call-cpu": call_cpu.table,
     "cold-start": cold_start.table,
     "conditions": conditions.table,
     "decoders": decoders.table,

@@ -21,6 +21,7 @@ from robosc.named_on_use import named_on_use
 
 if TYPE_CHECKING:
     from robosc.certification import Progress
+    from robosc.certification.goals import GoalExplanation
     from robosc.diagnostics import UnknownCodeError
     from robosc.errors import (
         Diagnostic,
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from robosc.model.structure import Deployment
     from robosc.pipeline.checking import check
     from robosc.pipeline.conditions import Condition, Conditions
+    from robosc.pipeline.counter_run import CounterRun, NoCounterStrategyError
     from robosc.pipeline.explaining import explain
     from robosc.pipeline.exploring import Exploration, explore
     from robosc.pipeline.files import FileAccessError
@@ -76,6 +78,7 @@ _HOMES = {
     "ChoiceError": "pipeline.system_runs",
     "Condition": "pipeline.conditions",
     "Conditions": "pipeline.conditions",
+    "CounterRun": "pipeline.counter_run",
     "DataError": "pipeline.received_data",
     "Deployment": "model.structure",
     "Diagnostic": "errors",
@@ -88,6 +91,7 @@ _HOMES = {
     "GenerateOptions": "targets",
     "Generation": "pipeline.results",
     "GoalApproach": "pipeline.goals",
+    "GoalExplanation": "certification.goals",
     "Goals": "pipeline.goals",
     "InternalError": "errors",
     "InvalidSupervisorError": "errors",
@@ -95,6 +99,7 @@ _HOMES = {
     "LanguageError": "errors",
     "LoadedAutomata": "pipeline.loading",
     "LoadedModel": "pipeline.loading",
+    "NoCounterStrategyError": "pipeline.counter_run",
     "NoStrategyError": "pipeline.manual_run",
     "NoSupervisor": "pipeline.results",
     "NodeLimitError": "errors",
@@ -140,6 +145,7 @@ __all__ = [
     "ChoiceError",
     "Condition",
     "Conditions",
+    "CounterRun",
     "DataError",
     "Deployment",
     "Diagnostic",
@@ -152,6 +158,7 @@ __all__ = [
     "GenerateOptions",
     "Generation",
     "GoalApproach",
+    "GoalExplanation",
     "Goals",
     "InternalError",
     "InvalidSupervisorError",
@@ -159,6 +166,7 @@ __all__ = [
     "LanguageError",
     "LoadedAutomata",
     "LoadedModel",
+    "NoCounterStrategyError",
     "NoStrategyError",
     "NoSupervisor",
     "NodeLimitError",

@@ -14,6 +14,7 @@ VALUES = [
         "Choice",
         "Condition",
         "Conditions",
+        "CounterRun",
         "Deployment",
         "Diagnostic",
         "Explained",
@@ -31,7 +32,15 @@ VALUES = [
         "SystemSupervisor",
         "SystemSynthesis",
     ),
-    *("GoalApproach", "Goals", "Verification", "VerificationStatus", "WalkFinding", "WalkFindingKind"),
+    *(
+        "GoalApproach",
+        "GoalExplanation",
+        "Goals",
+        "Verification",
+        "VerificationStatus",
+        "WalkFinding",
+        "WalkFindingKind",
+    ),
 ]
 ERRORS = [
     *(
@@ -46,6 +55,7 @@ ERRORS = [
     *(
         "InvalidSystemError",
         "LanguageError",
+        "NoCounterStrategyError",
         "NoStrategyError",
         "NodeLimitError",
         "NothingGeneratedError",

@@ -3,9 +3,9 @@
 Usage: run.py [NAME...]                       (all of them without an argument)
        run.py cif DIR [--against FILE]    (a folder of CIF models: see cif.py)
 
-Names: cold-start, conditions, editor, execution, goals, gr1, language, synthesis; of the service: service-load, call-cpu,
-isolation, task-cpu; of the bridge: decoders, drive-bases, live-view, live-view-pixels, loop-period, maze, reaction,
-endurance, shipped, twin.
+Names: cold-start, conditions, editor, execution, goals, gr1, language, synthesis; of the service: service-load,
+call-cpu, isolation, task-cpu; of the bridge: decoders, drive-bases, live-view, live-view-pixels, loop-period, maze,
+reaction, endurance, shipped, twin.
 """
 
 import sys

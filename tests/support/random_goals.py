@@ -117,6 +117,37 @@ def _moving(model: Model) -> list[Component]:
     return [item for item in model.components if item.behaviour and len(item.behaviour.states) > 1]
 
 
+def random_text(dice: Random) -> str:
+    """Return a robot whose components go on by requests and by responses, with requirements and goals."""
+    sizes = [dice.randint(2, 4) for _ in range(dice.randint(2, 3))]
+    lines: list[str] = []
+    requests: list[str] = []
+    for number, size in enumerate(sizes):
+        messages, states = [], []
+        for state in range(size):
+            marks = "initial marked" if state == 0 else "marked"
+            steps = ""
+            for place in range(dice.randint(1, 2)):
+                name, target = f"m{number}{state}{place}", (state + 1) % size if place == 0 else dice.randrange(size)
+                is_request = dice.random() < 0.8
+                messages.append(f"{'incoming' if is_request else 'outgoing'} message {name} with type: none")
+                steps += f" on {'request to' if is_request else 'response from'} {name} goto s{target}"
+                requests += [name] if is_request else []
+            states.append(f"{marks} state s{state} {{{steps} }}")
+        lines.append(f"component C{number} {{ {' '.join(messages)} behaviour {{ {' '.join(states)} }} }}")
+
+    def test() -> str:
+        number = dice.randrange(len(sizes))
+        return f"C{number}.s{dice.randrange(sizes[number])}"
+
+    lines += [f"requirement {name} needs {test()}" for name in dice.sample(requests, min(len(requests), 5))]
+    if dice.random() < 0.6:
+        lines.append(f"requirement never {test()} and {test()}")
+    lines += [f"goal always eventually {test()} and {test()}" for _ in range(dice.randint(1, 2))]
+    lines += [f"assume {test()} leads to {test()}" for _ in range(dice.randint(0, 1))]
+    return "robot R {\n" + "\n".join(lines) + "\n}"
+
+
 def _rounds(component: Component, dice: Random) -> tuple[Goal, ...]:
     assert component.behaviour
     states = dice.sample([state.name for state in component.behaviour.states], 2)

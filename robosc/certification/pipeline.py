@@ -14,6 +14,7 @@ import msgspec
 
 from robosc import explanation as explanations
 from robosc.automata import ExecutableSystem, Semantics
+from robosc.automata.goal_memory import counted
 from robosc.certification.certify import certify
 from robosc.certification.progress import Progress
 from robosc.controller_properties import check_controller, check_strategy, controller_findings
@@ -23,7 +24,7 @@ from robosc.model.layers import layer_findings, without_controller_findings
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
-from robosc.strategies import goal_findings, layer_goal_findings, synthesize_strategy
+from robosc.strategies import goal_findings, goals_and_missions, layer_goal_findings, synthesize_strategy
 from robosc.supervisor import CheckResult, Supervisor
 from robosc.synthesis import (
     EngineOptions,
@@ -40,9 +41,6 @@ if TYPE_CHECKING:
     from robosc.explanation import EmptyExplanation
 
 LIVELOCK_REASON = "no supervisor is made, because silent steps never end (--allow-livelock overrides this)"
-
-
-GOALS_REASON = "no strategy is made for the goals"
 
 
 class OutcomeStatus(StrEnum):
@@ -201,15 +199,16 @@ def make_supervisor(
         return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, LIVELOCK_REASON)
     certificate = msgspec.structs.replace(certificate, controller=properties.certified())
     strategy = None
-    if model.goals and deployment is Deployment.CONTROLLER:
-        on_progress(Progress("strategy", f"{len(model.goals)} goal{'s' if len(model.goals) > 1 else ''}"))
+    if (model.goals or model.missions) and deployment is Deployment.CONTROLLER:
+        on_progress(Progress("strategy", counted(problem.system.obligations.aims)))
         found = synthesize_strategy(
             problem.system, result.added, engine=engine, should_stop=should_stop, on_progress=report
         )
         diagnostics = sorted_diagnostics((*diagnostics, *goal_findings(places, found)))
         strategy = found.strategy
         if strategy is None:
-            return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, GOALS_REASON)
+            reason = f"no strategy is made for the {goals_and_missions(model)}"
+            return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, reason)
         check = check_strategy(problem.system, result.added, strategy, semantics=semantics, should_stop=should_stop)
         if check.missed is not None:
             raise InternalError(f"the strategy misses a goal after {', '.join(check.missed.trace)}")

@@ -45,6 +45,23 @@ class NothingGeneratedError(RoboscError):
 
 
 @dataclass(frozen=True, slots=True)
+class GoalSummary:
+    """Goals of a robot, and the strategy that reaches them.
+
+    Attributes:
+        aims: Everything that the robot aims at, in the words of the model and in the order of the strategy.
+        assumptions: Everything that it assumes of its surroundings, in the words of the model.
+        has_strategy: True if there is a strategy that reaches the goals; a supervision layer has none.
+        modes: Number of modes of the strategy, one for each aim.
+    """
+
+    aims: tuple[str, ...]
+    assumptions: tuple[str, ...]
+    has_strategy: bool
+    modes: int
+
+
+@dataclass(frozen=True, slots=True)
 class Summary:
     """A supervisor in figures and words.
 
@@ -55,6 +72,7 @@ class Summary:
         transitions: Transitions between them, or None if they were not counted.
         added: Each controllable event with the condition that the supervisor adds.
         text: The summary as `robosc synth` prints it.
+        goals: Goals of the robot, or None if it has none.
     """
 
     controllable_events: int
@@ -63,6 +81,7 @@ class Summary:
     transitions: int | None
     added: tuple[tuple[str, str], ...]
     text: str
+    goals: GoalSummary | None = None
 
     def __str__(self) -> str:
         return self.text.rstrip()

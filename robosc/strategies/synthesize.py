@@ -1,7 +1,8 @@
 """Synthesis of a strategy: what the controller does next, of what its supervisor allows, so that its goals come true.
 
 The supervisor stays as it is: a strategy only chooses among the requests that it enables, or waits. In each mode one
-goal is approached; once it is true the next one in turn is.
+goal or visit of a mission is approached; once it is true the next one in turn is. In this package a visit counts as a
+goal: that the mission is not at it any more.
 """
 
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -9,8 +10,10 @@ from dataclasses import dataclass
 from typing import Any
 
 from robosc.automata import ExecutableSystem
+from robosc.automata.goal_memory import Aim
 from robosc.strategies.arena import ControllerArena
 from robosc.strategies.gr1 import Solution, solve
+from robosc.strategies.preferences import preferred_order
 from robosc.supervisor import AddedCondition, Choice, Strategy
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.engines import EngineOptions
@@ -27,7 +30,7 @@ class StrategyResult:
 
     Attributes:
         strategy: The strategy, or None where there is none.
-        unreached: Numbers of goals that cannot be reached together, a set of which none can be left out; empty where
+        unreached: Goals and visits that cannot be reached together, a set of which none can be left out; empty where
             there is a strategy.
         is_hopeless: True if these goals cannot be reached even if the surroundings do all they can for it.
         preventable: Numbers of assumptions that the robot itself can keep from coming true, though nobody allows it.
@@ -38,7 +41,7 @@ class StrategyResult:
     """
 
     strategy: Strategy | None
-    unreached: tuple[int, ...]
+    unreached: tuple[Aim, ...]
     is_hopeless: bool
     preventable: tuple[int, ...]
     unneeded: tuple[int, ...]
@@ -58,7 +61,7 @@ def synthesize_strategy(
     """Synthesize a strategy that reaches every goal of a model while its assumptions come true.
 
     Args:
-        executable: Executable system of the robot, with at least one goal.
+        executable: Executable system of the robot, with at least one goal or mission.
         added: The conditions that its supervisor adds.
         engine: Name of the engine for decision diagrams, or its options.
         should_stop: Function called before each step of the work; once it returns true, the work ends.
@@ -84,8 +87,11 @@ class StrategySynthesis:
         self._manager = place.encoding.manager
         self._monitor: ProgressMonitor = place.monitor
         self._seconds = place.condition_seconds
-        self.arena = ControllerArena(executable, added, owed.places, owed.cancels, place.encoding, place.monitor)
-        self.goals = [self.arena.condition(item) for item in owed.goals]
+        self.arena = ControllerArena(executable, added, owed, place.encoding, place.monitor)
+        ordered = preferred_order(executable.requests, executable.model.preferences)
+        self._requests = tuple(event for event in ordered if event in self.arena.requests)
+        self._aims = owed.aims
+        self.goals = [self.arena.condition(item.condition) for item in owed.aims]
         self.assumptions = [self.arena.condition(item) for item in owed.assumptions]
 
     def result(self, allowed: Collection[int] = ()) -> StrategyResult:
@@ -100,7 +106,7 @@ class StrategySynthesis:
         preventable = self._preventable(allowed)
         return StrategyResult(
             strategy=self._strategy(solution) if is_won and not preventable else None,
-            unreached=unreached,
+            unreached=tuple(self._aims[number] for number in unreached),
             is_hopeless=bool(unreached) and not self._can_be_reached(unreached),
             preventable=preventable,
             unneeded=self._unneeded() if is_won else (),
@@ -188,14 +194,14 @@ class StrategySynthesis:
         decided = self.goals[number]
         for approach in solution.approaches[number]:
             here = approach.positions & ~approach.nearer
-            for event in self.arena.requests:
+            for event in self._requests:
                 found = here & ~decided & self.arena.choice(event, approach.nearer)
                 if found != self._manager.false:
                     chosen[event] = chosen.get(event, self._manager.false) | found
                     decided = decided | found
         care = solution.winning & self.arena.observed & ~self.goals[number]
         choices: list[Choice] = []
-        for event in self.arena.requests:
+        for event in self._requests:
             if event in chosen and chosen[event] & care != self._manager.false:
                 condition = simplifier.condition(chosen[event], care)
                 if condition is None:

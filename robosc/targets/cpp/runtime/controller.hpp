@@ -679,9 +679,48 @@ private:
             reasons_.clear();
             write("restart", "what", "");
             return;
+#if ROBOT_HAS_STRATEGY
+        case ROBOT_LOG_REACHED:
+            write_item("reached", "aim", what);
+            return;
+        case ROBOT_LOG_APPROACH:
+            write_item("approach", "aim", what);
+            return;
+        case ROBOT_LOG_OWED:
+            write_item("owed", "assumption", ROBOT_AIM_COUNT + what);
+            return;
+        case ROBOT_LOG_MET:
+            write_item("met", "assumption", ROBOT_AIM_COUNT + what);
+            return;
+#endif
         }
     }
 
+#if ROBOT_HAS_STRATEGY
+    /* Write what has happened to an aim or an assumption; -1: there is none. */
+    void write_item(const char* kind, const char* key, int number)
+    {
+        if (!log_.is_active()) {
+            return;
+        }
+        std::string line = head(kind) + ",\"" + key + "\":";
+        if (number < 0) {
+            log_.write(line + "null,\"what\":\"all are met\"}");
+            return;
+        }
+        const robot_standing_t found = robot_standing(&robot_, number, robot_.now_us);
+        put_json(line, found.name);
+        if (number >= ROBOT_AIM_COUNT) {
+            line += ",\"owed_s\":" + number_text(static_cast<double>(found.unmet_us / 1000) / 1000.0);
+        } else if (std::string(kind) == "reached") {
+            line += ",\"count\":" + std::to_string(found.count);
+        }
+        line += ",\"what\":";
+        put_json(line, found.words);
+        log_.write(line + "}");
+    }
+
+#endif
     static std::string stale_key(int communication) { return "stale " + std::to_string(communication); }
 
     std::string fault_text(robot_fault_t fault)

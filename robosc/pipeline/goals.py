@@ -110,7 +110,10 @@ def goals_of(supervisor: Supervisor) -> Goals:
 
 def goal_summary(supervisor: Supervisor) -> GoalSummary | None:
     """Return the goals of a supervisor's robot in figures and words; None where it has none."""
-    aims = tuple(words for _, words in aims_in_words(supervisor.model))
+    aims = tuple(
+        words if aim.mission is None else f"{words} ({name})"
+        for aim, (name, words) in zip(supervisor.executable.obligations.aims, aims_in_words(supervisor), strict=True)
+    )
     if not aims:
         return None
     assumptions = tuple(words for _, words in assumptions_in_words(supervisor.model))

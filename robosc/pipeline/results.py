@@ -12,6 +12,7 @@ from robosc.source import visible
 from robosc.tables import html_table, html_text
 
 if TYPE_CHECKING:
+    from robosc.certification.goals import GoalExplanation
     from robosc.explanation import EmptyExplanation, Explanation
     from robosc.targets import GeneratedFiles, Written
 
@@ -123,9 +124,9 @@ class Outcome:
         """The product of the task, or None."""
         return None
 
-    def _why(self) -> "EmptyExplanation | None":
+    def _why(self) -> "EmptyExplanation | GoalExplanation | None":
         """An explanation, in addition to the reason, of why there is no product; None if there is none."""
-        explanation: EmptyExplanation | NoSupervisor | None = getattr(self, "explanation", None)
+        explanation: EmptyExplanation | GoalExplanation | NoSupervisor | None = getattr(self, "explanation", None)
         return None if isinstance(explanation, NoSupervisor) else explanation
 
     def __repr__(self) -> str:

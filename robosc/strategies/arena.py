@@ -171,6 +171,20 @@ class ControllerArena:
             found = found | (self.positions & inside)
         return found
 
+    def whatever_was(self, condition: Any) -> Any:
+        """Return the states in which a condition is true once they are observed, whatever was remembered before."""
+        if not self._observed:
+            return condition
+        return ~self._manager.exist(self._observed, ~self._manager.let(self._observed, condition))
+
+    def behaviours(self, predicate: Any) -> Any:
+        """Return the states from which the behaviours alone, without requirements, have an event into a predicate."""
+        found = self._manager.false
+        for steps in self._steps.values():
+            self._monitor.check_stop()
+            found = found | (steps.plant & steps.some(predicate))
+        return found
+
     def can_begin(self, predicate: Any) -> bool:
         """Return True if the first position of the executor is in a predicate, wherever the system begins."""
         return bool(self.start & ~self.arriving(predicate) == self._manager.false)

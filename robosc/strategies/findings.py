@@ -3,23 +3,29 @@
 from collections.abc import Sequence
 
 from robosc.automata.goal_memory import Aim, AimKind
+from robosc.conditions.goals import assumption_text
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Location
+from robosc.strategies.blame import GoalBlame
 from robosc.strategies.synthesize import StrategyResult
 
 
-def goal_findings(places: Places, result: StrategyResult) -> tuple[Diagnostic, ...]:
+def goal_findings(
+    aims: Sequence[Aim], places: Places, result: StrategyResult, blame: GoalBlame | None = None
+) -> tuple[Diagnostic, ...]:
     """Return the diagnostics about a model's goals, missions and assumptions.
 
     Args:
+        aims: Goals and visits of the model.
         places: Source locations of the model's parts.
         result: Result of the synthesis of a strategy.
+        blame: Findings about what is to blame for goals that are not reached; None if nobody has looked for it.
     """
     found: list[Diagnostic] = []
     if result.unreached:
-        found.append(_unreached(places, result))
+        found.append(_unreached(aims, places, result, blame))
     for number in result.preventable:
         found.append(
             Diagnostic(
@@ -71,27 +77,48 @@ def goals_and_missions(model: Model) -> str:
     return " and ".join(word for word, items in (("goals", model.goals), ("missions", model.missions)) if items)
 
 
-def _unreached(places: Places, result: StrategyResult) -> Diagnostic:
+def _unreached(aims: Sequence[Aim], places: Places, result: StrategyResult, blame: GoalBlame | None) -> Diagnostic:
     """Return the finding about what cannot be reached together.
 
     It stands at the last visit of a mission where there is one: the others are those that come before it.
     """
-    *others, last = result.unreached
-    first, *others = result.unreached if last.kind is AimKind.GOAL else (last, *others)
-    what = f"this {_word(first)}" if not others else f"these {_words(result.unreached)} together"
+    unreached = [aims[number] for number in result.unreached]
+    *others, last = unreached
+    first, *others = unreached if last.kind is AimKind.GOAL else (last, *others)
+    what = f"this {_word(first)}" if not others else f"these {_words(unreached)} together"
     if result.is_hopeless:
-        message = (
-            f"{what} cannot be reached again and again, whatever the surroundings do: the model or its requirements "
-            "exclude it"
-        )
+        message = f"{what} cannot be reached again and again, whatever the surroundings do"
         advice = (
             f"Look for the requirement or the transition that keeps the robot from it, or change the {_word(first)}."
         )
     else:
         message = f"the surroundings can keep {what} from coming true, for ever"
-        advice = "Say what the surroundings owe the robot, for example 'assume Arm.moving leads to Arm.done'."
+        advice = (
+            "Assume what the surroundings do once the robot has done its part, look for what excludes the "
+            f"{_word(first)}, or change it."
+        )
     related = _related([(f"this {_word(aim)} belongs to them", _place(places, aim)) for aim in others])
+    if blame is not None:
+        message += _blamed(blame, is_hopeless=result.is_hopeless)
+        found = [places.requirements[number] for number in blame.requirements]
+        found += [places.invariants[number] for number in blame.invariants]
+        related += _related([("this requirement is to blame", place) for place in found])
+        if blame.helpful:
+            written = " and ".join(f"'assume {assumption_text(item)}'" for item in blame.helpful)
+            advice = f"Write {written}, if that is what the surroundings do, or change the {_word(first)}."
     return Diagnostic(Severity.ERROR, "unreachable-goal", message, _place(places, first), advice, related)
+
+
+def _blamed(blame: GoalBlame, *, is_hopeless: bool) -> str:
+    """Return the end of a message: which requirements are to blame."""
+    count = len(blame.requirements) + len(blame.invariants)
+    if not blame.is_known:
+        return "; which requirements are to blame is not known: the search was given up"
+    if count == 0:
+        return ": the behaviours exclude it, without any requirement" if is_hopeless else ", even without requirements"
+    if count == 1:
+        return ": one requirement alone is enough for that"
+    return f": {count} requirements are enough for that, and each of them is needed"
 
 
 def _word(aim: Aim) -> str:

@@ -30,7 +30,7 @@ LOST = "lost"
 
 
 @dataclass
-class _Item:
+class Item:
     """A goal or an assumption over explicit states."""
 
     name: str
@@ -78,7 +78,7 @@ def _is_true(function: Function) -> Callable[[Any], bool]:
     return lambda state: function(state, NO_DATA) is True
 
 
-NEVER = _Item("never", GoalForm.ALWAYS_EVENTUALLY, lambda state: False, lambda state: False)
+NEVER = Item("never", GoalForm.ALWAYS_EVENTUALLY, lambda state: False, lambda state: False)
 """A goal that is never true."""
 
 
@@ -92,18 +92,18 @@ class Game:
         first: The position in which the executor begins, or None if it never gets to one.
     """
 
-    assumptions: list[_Item]
-    goals: list[_Item | _Visit]
+    assumptions: list[Item]
+    goals: list[Item | _Visit]
     successors: dict[Position, set[Any]] = field(default_factory=dict)
     choices: dict[Position, dict[str, Any]] = field(default_factory=dict)
     first: Any = None
-    asked: tuple[list[_Item], list[_Item | _Visit]] | None = None
+    asked: tuple[list[Item], list[Item | _Visit]] | None = None
 
-    def asking(self, assumptions: list[_Item], goals: list[_Item | _Visit]) -> "Game":
+    def asking(self, assumptions: list[Item], goals: list[Item | _Visit]) -> "Game":
         """Return the same game about other assumptions and goals, of those that it keeps account of."""
         return replace(self, asked=(assumptions, goals))
 
-    def holds(self, position: Position, item: _Item | _Visit) -> bool:
+    def holds(self, position: Position, item: Item | _Visit) -> bool:
         """Return True if an assumption or a goal counts as come true in a position."""
         (state, _), marks = position
         place = next((place for place, kept in enumerate((*self.assumptions, *self.goals)) if kept is item), None)
@@ -118,7 +118,7 @@ class Game:
         # Each position can be waited in: a turn at which a goal is true is a turn in its component.
         return any(
             all(any(self.holds(position, self.goals[item]) for position in component) for item in goals)
-            for component in _components(list(following), following.__getitem__)
+            for component in components(list(following), following.__getitem__)
         )
 
     def memory(self, position: Position) -> dict[str, bool]:
@@ -128,7 +128,7 @@ class Game:
             found |= item.memory(mark)
         return found
 
-    def holding(self, position: Position, items: Sequence[_Item | _Visit]) -> tuple[bool, ...]:
+    def holding(self, position: Position, items: Sequence[Item | _Visit]) -> tuple[bool, ...]:
         (state, _), marks = position
         offset = 0 if items is self.assumptions else len(self.assumptions)
         return tuple(item.holds(marks[offset + place], state) for place, item in enumerate(items))
@@ -144,9 +144,9 @@ def game_of(executable: ExecutableSystem, added: Iterable[AddedCondition], limit
     def test(condition: Expression) -> Callable[[Any], bool]:
         return _is_true(compile_expression(condition, places))
 
-    def items(given: Sequence[Goal | Assumption], word: str) -> list[_Item]:
+    def items(given: Sequence[Goal | Assumption], word: str) -> list[Item]:
         return [
-            _Item(
+            Item(
                 f"{word} {number}",
                 item.form,
                 test(item.condition),
@@ -300,7 +300,7 @@ def _missed(game: Game, goal: int, moves: dict[Any, set[Any]], turns: dict[Any, 
     def after(vertex: Any) -> set[Any]:
         return {*moves[vertex], *([passing[vertex]] if vertex in passing else [])}
 
-    for component in _components(list(moves), after):
+    for component in components(list(moves), after):
         met = [vertex for vertex in component if vertex in passing and passing[vertex] in component]
         holding = [game.holding(vertex[0], game.assumptions) for vertex in met]
         if met and all(any(item[place] for item in holding) for place in range(len(game.assumptions))):
@@ -308,8 +308,8 @@ def _missed(game: Game, goal: int, moves: dict[Any, set[Any]], turns: dict[Any, 
     return None
 
 
-def _components(vertices: list[Any], after: Callable[[Any], set[Any]]) -> Iterator[set[Any]]:
-    """The strongly connected components, by two searches (Kosaraju)."""
+def components(vertices: list[Any], after: Callable[[Any], set[Any]]) -> Iterator[set[Any]]:
+    """Yield the strongly connected components, by two searches (Kosaraju)."""
     order: list[Any] = []
     seen: set[Any] = set()
     for root in vertices:

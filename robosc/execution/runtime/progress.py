@@ -69,6 +69,24 @@ class Progress(NamedTuple):
         return found
 
 
+def standing_text(item: Standing) -> str:
+    """Return the state of an aim or assumption, in words."""
+    if item.unmet_s is None:
+        state = 'true' if item.is_met else 'not known'
+    else:
+        state = 'not for {:.0f} s'.format(item.unmet_s)
+    return '{}, reached {} times: {}'.format(state, item.times, item.words)
+
+
+def owed_texts(progress: Progress) -> List[str]:
+    """Return in words for how long each assumption is owed that is owed for too long."""
+    return [
+        '{} has been owed for {:.0f} s: {}'.format(item.name, item.unmet_s or 0.0, item.words)
+        for item in progress.assumptions
+        if item.name in progress.overdue
+    ]
+
+
 class ProgressAccount:
     """
     Account of a strategy's progress, which costs time only when something changes.

@@ -11,11 +11,13 @@ from robosc.automata import ExecutableSystem
 from robosc.automata.goal_memory import Obligations
 from robosc.controller_properties.goals import check_strategy
 from robosc.model.structure import Deployment, Model
+from robosc.strategies.counter_strategy import CounterPlayer, CounterStage, CounterStrategy
 from robosc.strategies.gr1 import solve
 from robosc.strategies.synthesize import StrategyResult, StrategySynthesis
-from robosc.supervisor import AddedCondition, Strategy
+from robosc.supervisor import AddedCondition, DecisionDiagram, Strategy
 from robosc.supervisor.predicates import state_predicate
 from robosc.synthesis.workspace import workspace
+from support.counter_twin import fault_of_counter
 from support.goal_twin import LOST, NEVER, Game, Position, distances, game_of, unfair_goal, winning_positions
 from support.random_controllers import random_controller
 from support.random_couriers import random_courier
@@ -74,16 +76,19 @@ def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> N
         result = synthesis.result(allowed=every)
         strategy = result.strategy
         preventable = synthesis.result().preventable
+        counter = synthesis.counter(result.unreached) if result.unreached else None
     is_won = game.first != LOST and game.first in won
     assert (strategy is not None) == is_won, seed
     if game.first != LOST:
-        compare_reasons(game, result, [owed.aims.index(item) for item in result.unreached], seed, met)
+        compare_reasons(game, result, result.unreached, seed, met)
         prevented = [item for item in every if winning_positions(game.asking([game.assumptions[item]], [NEVER]))]
         assert list(preventable) == prevented, seed
         met["preventable"] += bool(prevented)
     met["models"] += 1
     met["positions"] += len(game.choices)
     met["won" if is_won else "lost"] += 1
+    if counter is not None and game.first != LOST:
+        compare_counter(game, executable, counter, result.unreached, seed, met)
     if strategy is None:
         return
     modes = [[(item.event, state_predicate(system, item.condition)) for item in mode] for mode in strategy.modes]
@@ -174,6 +179,32 @@ def compare_reasons(game: Game, result: StrategyResult, unreached: Sequence[int]
         met["needed"] += bool(needed)
 
 
+def compare_counter(
+    game: Game,
+    executable: ExecutableSystem,
+    counter: CounterStrategy,
+    unreached: tuple[int, ...],
+    seed: int,
+    met: Counter[str],
+) -> None:
+    """Check that a counter-strategy keeps the goals from coming true, and that a damaged one is seen not to."""
+    owed = executable.obligations
+
+    def values(position: Position) -> tuple[Any, ...]:
+        return values_of(game, position, owed)
+
+    def fault(counter: CounterStrategy) -> str:
+        player = CounterPlayer.of(executable.remembering_automata, owed, counter)
+        return fault_of_counter(game, unreached, player, values)
+
+    assert fault(counter) == "", seed
+    met["counter-strategies"] += 1
+    # A counter-strategy that only gives the controller its turn.
+    everywhere = DecisionDiagram((), 1)
+    idle = CounterStage(0, everywhere, ((everywhere,),) * max(1, len(game.assumptions)))
+    met["idle, seen"] += bool(fault(CounterStrategy((idle,))))
+
+
 @pytest.mark.parametrize("first", range(0, 2_400, 400))
 def test_random_robots_agree(first: int, record_property: Callable[[str, object], None]) -> None:
     met: Counter[str] = Counter()
@@ -182,6 +213,7 @@ def test_random_robots_agree(first: int, record_property: Callable[[str, object]
     for name, count in sorted(met.items()):
         record_property(name, count)
     assert met["models"] > 100 and min(met["won"], met["lost"]) > 30, met
+    assert met["counter-strategies"] > 30 and met["idle, seen"] > 2, met
 
 
 @pytest.mark.parametrize("first", range(0, 300, 100))

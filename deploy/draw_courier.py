@@ -100,7 +100,7 @@ def driven(folder: Path) -> tuple[Scene, list[Point], list[Note]]:
                 twin.tell("/order", ORDERED)
                 note(f"somebody calls it to the {ORDERED}")
             for component, location, text in (
-                ("Door", "opening", "tells the door to open, and waits"),
+                ("Door", "opening", "tells the door to open"),
                 ("Tray", "offered", "offers its tray"),
             ):
                 if state[component]["state"] == location != before[component]["state"]:

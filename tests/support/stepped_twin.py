@@ -13,9 +13,9 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
 
-from robosc.conditions.goals import goal_text
 from robosc.event_logs import check_log, read_log
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.interpreter.missions import MissionPlace
 from robosc.execution.runtime.clock import ManualClock
 from robosc.execution.runtime.event_log import open_event_log
 from robosc.execution.runtime.executor import Executor
@@ -149,14 +149,10 @@ class SteppedTwin:
         """Time of the world, in seconds."""
         return self._time.world_s()
 
-    def is_reached(self, goal: str) -> bool:
-        """Return True if a goal of the model counts as come true in this state.
-
-        Args:
-            goal: Goal, as the model says it, without the word `goal`.
-        """
-        goals = [goal_text(item) for item in self.supervisor.model.goals]
-        return self._system.reached()[goals.index(goal)]
+    @property
+    def missions(self) -> tuple[MissionPlace, ...]:
+        """Places of the missions since the last decision."""
+        return self._system.missions()
 
     @property
     def state(self) -> dict[str, dict[str, Any]]:

@@ -143,7 +143,7 @@ def test_a_definition_is_gone_to(nvim: Neovim) -> None:
     nvim.go("on response from power goto |on_")
     nvim.type("<C-]>")
     assert eventually(lambda: nvim.lua(where) == ["walker.rscd", "on_ { on response from power goto off }"])
-    # In a file that is not open.
+    # The definition is in a file that is not open.
     nvim.go("Base.|calm")
     nvim.type("<C-]>")
     assert eventually(lambda: nvim.lua(where)[0] == "parts.rscd" and nvim.lua(where)[1].startswith("calm {"))

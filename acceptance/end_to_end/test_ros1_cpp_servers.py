@@ -130,7 +130,7 @@ def test_what_is_sent_is_as_the_model_says_and_stamped(ready: Carrier, superviso
     ready.until("carry.response")
     ready.node.signal(signal.SIGINT)
     assert ready.node.wait() == 0
-    # Whatever came in whatever order: what followed from it is what the reference executor does.
+    # The effects of all data, in any order, are those in the reference executor.
     entries = ready.entries
     kinds = {entry["event"] for entry in entries if entry["kind"] == "event"}
     assert {"calibrate.response", "carry.feedback", "carry.response", "creep.request", "said.request"} <= kinds
@@ -189,7 +189,7 @@ def test_goals_end_in_every_way(ready: Carrier) -> None:
     ready.until("carry.error", 2)
     wait_until(lambda: len(peer.of("goal", "/move_base")) >= 3, "another goal")
     peer.tell("accept", "/move_base")
-    # Something stands in the way: the goal is cancelled.
+    # An obstacle is in the way: the goal is cancelled.
     ready.until("carry.cancel", repeat=lambda: ready.scan(0.2))
     wait_until(lambda: bool(peer.of("cancel", "/move_base")), "the cancel")
     peer.tell("canceled", "/move_base")

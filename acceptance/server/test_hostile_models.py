@@ -98,7 +98,7 @@ def is_refused_while_others_are_answered(served: Server, text: str, ending: tupl
         assert refusal.result() == ending
         assert meanwhile
         served.answers_another()
-        # What a process had of memory is given back before it is gone.
+        # Memory of a process is given back before the process is gone.
         assert eventually(lambda: served.busy_workers() == [])
 
 

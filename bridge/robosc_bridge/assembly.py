@@ -340,7 +340,7 @@ def _require_endpoints(configuration: Configuration, mapping: ChannelMapping) ->
         except (SecurityError, ValueError) as error:
             raise AssemblyError(f"view: {error}") from error
         if page.scene is not None:
-            # Where nobody wants one, nothing of the simulator is loaded.
+            # The simulator is imported only for a map that is wanted.
             from robosc_view.scene_map import scene_map
 
             try:

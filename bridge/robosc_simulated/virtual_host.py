@@ -192,7 +192,7 @@ class VirtualHost(Closing):
 
     def _next(self) -> _Slot:
         for slot in self._waiting:
-            # Nobody is left waiting whose time is over, so that it can be stated of any run that it ends.
+            # Waiters whose time is over go first, so that every run can be shown to end.
             if slot.end_s <= self._now_s or slot.is_ready():
                 break
         else:

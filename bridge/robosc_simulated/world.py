@@ -23,10 +23,10 @@ from robosc_simulated.timebase import Timebase
 from robosc_simulated.walls import Floats, Walls
 
 STEP_S = 0.005
-# What a motor can do at all, and how soon a wheel that nothing drives stands.
+# The motor's highest acceleration, and the deceleration of a wheel that is not driven.
 _STRONGEST_RAD_S2 = 150.0
 _FRICTION_RAD_S2 = 60.0
-# What is left of a change that is done at once, so that a wheel comes to a standstill.
+# A smaller remaining change is done at once, so that a wheel comes to a standstill.
 _NEAR_RAD_S = 0.003
 # A body that has left a wall by so much has left it; less is the same collision.
 _APART_M = 0.005

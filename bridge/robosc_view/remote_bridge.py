@@ -208,7 +208,7 @@ class _Watch:
         # Ends what the thread waits for.
         self._client.close()
         if self._next.done() and not self._next.cancelled():
-            self._next.exception()  # Nobody waits for it any more.
+            self._next.exception()  # Its result is awaited no more.
 
     def _run(self) -> None:
         why: Exception = SourceLostError("the bridge has ended the stream")

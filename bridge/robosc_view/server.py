@@ -203,7 +203,7 @@ class ViewServer:
 
     def _connected(self) -> asyncio.Protocol:
         """A protocol for one more connection, or one that ends it at once."""
-        assert self._runner is not None  # noqa: S101  # Nobody connects before `start`.
+        assert self._runner is not None  # noqa: S101  # Connections come only after `start`.
         server = self._runner.server
         # Those that were accepted just now are no connections of the server's yet.
         if server is None:

@@ -68,7 +68,7 @@ ESCAPED = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x200E, 0x200
 
 def print_json(document: Mapping[str, object]) -> None:
     """One JSON document on standard output, keys in the order given."""
-    # What cannot be encoded is escaped, and in JSON by JSON's own rules.
+    # Characters that cannot be encoded are escaped, and in JSON by JSON's own rules.
     sys.stdout.write(json_text(document, is_ascii=not has_unicode_output()).translate(ESCAPED))
 
 

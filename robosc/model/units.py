@@ -270,7 +270,7 @@ def _follow(
         findings.bindings.bind(component.imported.library, library.tree.name.location)
         wanted = component.imported.component
         if wanted.text not in library.components:
-            # What a broken library would have is not known.
+            # The contents of a broken library are unknown.
             if not findings.is_broken(library.tree.name.location.file):
                 what = f"component of library '{library.tree.name.text}'"
                 findings.unknown(what, wanted.text, wanted.location, library.components)

@@ -157,7 +157,7 @@ def new_stimuli(case: str) -> tuple[Stimulus, ...]:
     found: list[Stimulus] = []
     for stimulus in World(model, Random(crc32(case.encode()))).stimuli(run):
         if "fault" in run.apply(stimulus)["log"]:
-            # How far silent steps go that never end is no matter of the language.
+            # The length of silent steps that never end is no matter of the language.
             break
         found.append(stimulus)
     return tuple(found)

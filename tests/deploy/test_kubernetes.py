@@ -60,7 +60,7 @@ def test_pods_keep_to_the_strictest_standard(variant: str) -> None:
         assert all({"startupProbe", "readinessProbe", "livenessProbe"} <= set(one) for one in spec["containers"])
         mounted = {mount["name"] for container in containers for mount in container["volumeMounts"]}
         assert mounted == {volume["name"] for volume in spec["volumes"]}
-        # Without a limit, a disk of the node would fill.
+        # A disk of the node would fill without a limit.
         assert all("sizeLimit" in volume.get("emptyDir", {"sizeLimit": ""}) for volume in spec["volumes"])
     (namespace,) = of_kind(variant, "Namespace")
     assert namespace["metadata"]["labels"]["pod-security.kubernetes.io/enforce"] == "restricted"

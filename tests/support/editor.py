@@ -285,7 +285,7 @@ class Editor:
         where = lsp.Range(self.position(text, at + begin), self.position(text, at + end))
         return lsp.Location(self.uri(name), where)
 
-    # What it receives
+    # Messages that it receives
 
     def until(self, condition: Callable[[], bool]) -> None:
         """Wait until the server has sent something."""

@@ -222,7 +222,7 @@ class Emacs:
     def __init__(self, home: Home, file: Path) -> None:
         assert EMACS is not None
         home.write(".emacs.d/init.el", settings_of("Emacs", "elisp"))
-        # In a new home Emacs would translate all its packages into machine code first, and show the output of that.
+        # Emacs would translate all its packages into machine code first in a new home, and show the output of that.
         home.write(
             ".emacs.d/early-init.el",
             "(setq native-comp-deferred-compilation nil native-comp-jit-compilation nil"
@@ -264,7 +264,7 @@ class Emacs:
         return False
 
     def _read(self) -> None:
-        # Nothing that it shows may stay in its way.
+        # Output must not stay in its way.
         try:
             while came := os.read(self._number, 65536):
                 self.seen += came

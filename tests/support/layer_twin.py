@@ -127,7 +127,7 @@ class LayerTwin:
         with self.guard():
             self.settle()
 
-    # What both deployments do.
+    # Behaviour of both deployments.
 
     @contextmanager
     def guard(self) -> Iterator[None]:
@@ -191,7 +191,7 @@ class LayerTwin:
     def may_request(self) -> bool:
         return not self.reasons and self.seen.keys() >= self.sensors.keys()
 
-    # What the caller sends.
+    # Data from the caller.
 
     def request(self, identifier: str, message: Any) -> None:
         self.arrived[identifier] = self.now
@@ -256,7 +256,7 @@ class LayerTwin:
         self.cancel(goal)
         self.finish()
 
-    # What the robot sends.
+    # Data from the robot.
 
     def receive(self, identifier: str, data: Any) -> None:
         is_fault = False

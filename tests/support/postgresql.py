@@ -94,7 +94,7 @@ class Postgresql:
             "unix_socket_directories": "",
             "shared_buffers": "16MB",
             "max_connections": str(self._connections),
-            # What is committed survives a kill of its processes without it, and the machine's disk is busy.
+            # Committed rows survive a kill of its processes without it, and the machine's disk is busy.
             "fsync": "off",
         }
         settings = [word for name, value in options.items() for word in ("-c", f"{name}={value}")]

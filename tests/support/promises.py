@@ -143,7 +143,7 @@ def _wait(condition: Callable[[], bool], process: subprocess.Popen[bytes] | None
         time.sleep(0.005)
 
 
-# What lets the faults happen.
+# Functions that let the faults happen.
 
 
 def _halt(bridge: Driven, _: ExitStack) -> Cause:
@@ -205,7 +205,7 @@ def _operator_goes(bridge: Driven, stack: ExitStack) -> Cause:
 
     operator = bridge.host.thread(sees, "operator")
     operator.start()
-    # Whatever becomes of the run, its thread must end before the host does.
+    # The operator's thread must end before the host does, whatever becomes of the run.
     stack.callback(lambda: operator.join(_TOO_LATE_S))
     stack.callback(bridge.machine.quit)
     return there.clear

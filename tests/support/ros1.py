@@ -75,7 +75,7 @@ class Master:
             }
             self.port = port
             self.process = self._start(folder)
-            # Somebody else may have taken the port.
+            # Another process may have taken the port.
             while self.process.is_running:
                 if self.is_up():
                     return

@@ -183,7 +183,7 @@ class Peer:
             )
             if process is not None and not process.is_running and not has_ended:
                 has_ended = True
-                # What it said last may be on its way still.
+                # The last words of the process may be on their way still.
                 deadline = min(deadline, time.monotonic() + _LAST_WORDS_S)
             if time.monotonic() >= next_repeat:
                 repeat()

@@ -107,7 +107,7 @@ class SteppedTwin:
             if deployment is Deployment.CONTROLLER
             else Layer(system, self, _Careless(self), settings, clock, log)
         )
-        # What others do with what they received; not while the executor is handing it over.
+        # Reactions of others to data that they received; not while the executor is handing it over.
         self._waiting: deque[Callable[[], None]] = deque()
         self._turn: Turn | None = None
         self._goal: tuple[int, float, float] | None = None
@@ -122,7 +122,7 @@ class SteppedTwin:
     ) -> None:
         self._stack.close()
 
-    # What the test does.
+    # Acts of the test.
 
     @property
     def is_standing(self) -> bool:
@@ -251,7 +251,7 @@ class SteppedTwin:
         self.world.left.goal_rad_s = (ahead_m_s - aside_m_s) / body.wheel_radius_m
         self.world.right.goal_rad_s = (ahead_m_s + aside_m_s) / body.wheel_radius_m
 
-    # What the executor asks of the robot.
+    # Calls of the executor to the robot.
 
     def prepare(self, communication: str, data: Any) -> Any:
         return data

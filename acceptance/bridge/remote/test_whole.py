@@ -169,10 +169,10 @@ def test_a_robot_is_driven_by_keys_as_far_as_the_layer_lets_it(tmp_path: Path) -
                     becomes(lambda: held(terminal) and not moves(robot))
                     gate.send(give=pb.Message(identifier="/gate/open"))
                     becomes(lambda: held(terminal) and moves(robot) and min(speeds(robot)) > 1.0)
-                    # Nobody holds a key.
+                    # The key is released.
                     becomes(lambda: not moves(robot))
                     becomes(lambda: held(terminal) and moves(robot) and min(speeds(robot)) > 1.0)
-                    # Nobody says goodbye.
+                    # The terminal goes without a word.
                     terminal.process.kill()
                     becomes(lambda: not moves(robot))
                     becomes(

@@ -56,7 +56,7 @@ class ProgramDispatcher:
         if isinstance(item, Attached):
             self._attach(program)
         elif program in self._clients:
-            # What comes from others is too late: they are gone.
+            # Items of programs that have gone come too late.
             self._take(item)
         if self._execution.executor is not None:
             self._robot.deliver_pending(self._execution.executor)

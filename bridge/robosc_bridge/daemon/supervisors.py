@@ -302,7 +302,7 @@ def _checked(data: bytes, place: str, bundle: Bundle, source: Source, report: Ca
     claimed = supervisor.certificate.controller
     outcome = "not checked" if claimed is None else claimed.finite_response
     if outcome == "not checked":
-        # What it says, the verifier has judged; a file that says nothing of it must not get past.
+        # The verifier has judged the claim of a file; a file without a claim must not pass unchecked.
         outcome = _response(supervisor, place)
     _require_response(outcome, place, source, report)
     return supervisor

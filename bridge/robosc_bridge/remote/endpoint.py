@@ -175,7 +175,7 @@ def _watch(port: int, arrivals: Arrivals) -> ConnectionWatch:
 
 def _options() -> list[tuple[str, int]]:
     return [
-        # Without this two bridges could share a port and each get some of the stops.
+        # Two bridges could otherwise share a port, and each would get some of the stops.
         ("grpc.so_reuseport", 0),
         ("grpc.max_receive_message_length", MAXIMUM_REQUEST_BYTES),
         ("grpc.max_metadata_size", MAXIMUM_METADATA_BYTES),

@@ -50,8 +50,8 @@ _RULES = {
     "GetDefinition": _WATCH,
     "GetStatus": _WATCH,
     "Watch": _WATCH,
-    # Whoever sees the robot may stop it: a stop in vain is a nuisance, one that is refused is an accident.
-    # A stop that is refused is an accident, also where somebody has forgotten a new token.
+    # Every client that sees the robot may stop it: a stop in vain is a nuisance, a refused one is an accident, also
+    # where the new token was forgotten.
     "Stop": Rule(admits_expired=True),
     "Command": _OPERATE,
     "Attach": _OPERATE,
@@ -237,7 +237,7 @@ class BridgeService(convert.BridgeServiceServicer):
             await context.abort(grpc.StatusCode.RESOURCE_EXHAUSTED, f"there are {most} {what} already")
         self._counts[what] += 1
         try:
-            # With the first message, gRPC would note them as sent only after it: a call that is ended in between could
+            # Metadata sent with the first message count as sent only after it: a call that is ended in between could
             # not be given a status any more.
             await context.send_initial_metadata(())
             yield

@@ -100,7 +100,7 @@ class Rotate:
         if time_s >= self._end_s:
             self._fail("the rotation has taken too long" if self._heading_rad is not None else "there is no odometry")
             return STANDSTILL
-        # Without a heading nobody knows how far it is.
+        # The remaining rotation is unknown without a heading.
         return Velocity(0.0, self._speed_rad_s()) if is_known else STANDSTILL
 
     def _follow(self, heading_rad: float) -> None:

@@ -107,7 +107,7 @@ class StopPanel(HelperNode):
             self._sent_to[name].publish(Empty())
             self.get_logger().info(name)
         elif name:
-            # When in doubt, stop: somebody in a hurry misses the key.
+            # The panel stops when in doubt: people in a hurry miss the key.
             self._sent_to["stop"].publish(Empty())
             self.get_logger().warning(f"stop: {name!r:.40} is not one of {', '.join(self._sent_to)}, quit")
 

@@ -86,7 +86,7 @@ def _row(name: str) -> list[str]:
         begin_cpu_s, begin_s = time.thread_time(), time.perf_counter()
         for index in range(EXCHANGES):
             commanded_s.clear()
-            # To and fro on the spot: walls would change nothing, but it should not meet one.
+            # The robot turns to and fro on the spot: walls would change nothing, but it should not meet one.
             before_s = time.perf_counter()
             base.exchange(Velocity(0.0, 0.5 if index % 100 < 50 else -0.5))
             exchanges_s.append(time.perf_counter() - before_s)

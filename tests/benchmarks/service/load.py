@@ -181,7 +181,7 @@ def _memory(address: str, pid: int) -> str:
         found = run_load(address, load, count=CALLS // 4)
         assert len(found.times_s) == CALLS // 4, found.errors
         rows.append([f"after {number * CALLS // 4:,} calls", _megabytes(_resident_bytes(pid))])
-    # What is kept of each request is bounded, too.
+    # The memory kept for each request is bounded, too.
     found = run_load(address, call_kinds()["Check"](8), count=_DISTINCT)
     assert len(found.times_s) == _DISTINCT, found.errors
     rows.append([f"after {_DISTINCT:,} different ones (Check)", _megabytes(_resident_bytes(pid))])

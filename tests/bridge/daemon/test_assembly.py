@@ -216,7 +216,7 @@ def test_faces_are_started_before_the_devices_and_stopped_after_them(supervisor:
         endpoint = RecordedEndpoint(made)
         before_s = sys.getswitchinterval()
         assert made.run([endpoint])
-    # While it runs, a busy endpoint must not hold up the other threads; afterwards that is nobody's business.
+    # A busy endpoint must not hold up the other threads while the bridge runs; the interval is restored afterwards.
     assert endpoint.switch_s < 0.001 < before_s == sys.getswitchinterval()
     assert endpoint.told == ["start False", f"stop False {State.OVER}"]
 

@@ -568,7 +568,7 @@ def test_programs_may_come_and_go_in_the_middle_of_everything(steps: list[tuple[
     for program in programs:
         program.leave()
     scene.exchange()
-    # Nobody is there who wants anything to move.
+    # The caller has gone, so no motion is wanted.
     assert scene.out == STANDSTILL
     scene.live(1.0, 2.0)
     assert (scene.out, scene.daemon.state) == (STANDSTILL, State.RUNNING)

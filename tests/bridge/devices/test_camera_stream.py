@@ -107,7 +107,7 @@ def test_whoever_ends_is_gone_and_can_come_again(served: Served) -> None:
         served.camera.receive(0.0)
     served.camera.open()
     again, _ = served._listener.accept()
-    # Nothing is left of the half picture.
+    # The half picture is gone.
     again.sendall(picture(7))
     assert shade(served.camera.receive(LIMIT_S)) == 7
     again.close()

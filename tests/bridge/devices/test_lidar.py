@@ -237,7 +237,7 @@ def test_a_turned_or_hanging_lidar(front_deg: float, is_upside_down: bool, found
     made = Rig(KITS["lds03"], front_rad=math.radians(front_deg), is_upside_down=is_upside_down)
     try:
         revolution = _lds03_revolution(0)
-        # Something at 90 degrees clockwise of its front.
+        # An object at 90 degrees clockwise of its front.
         revolution[5] = lds03_frame(80, 99, [(0, 0)] * 10 + [(1000, 200)] + [(0, 0)] * 9)
         [scan] = made.scans(revolution + revolution[:1])
         assert [k for k in range(BINS) if not math.isnan(scan.ranges_m[k])] == [found]

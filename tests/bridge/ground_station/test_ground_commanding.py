@@ -188,7 +188,7 @@ def test_a_flood_of_others_is_bounded(talk: Talk) -> None:
 
 
 def test_modes(talk: Talk) -> None:
-    # Nothing is stopped: nothing is to be done, and a mode arms nothing.
+    # The robot is not stopped: resuming has no effect, and a mode arms nothing.
     assert talk.results(176, 1.0, 10.0) == [0]
     assert talk.daemon.orders == []
     talk.daemon.show(state=State.RUNNING, reasons=(Reason.OPERATOR_STOP,))

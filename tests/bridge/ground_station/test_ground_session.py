@@ -261,7 +261,7 @@ def test_only_ground_stations_are_operators(talk: Talk) -> None:
     assert talk.daemon.seen == 0
 
 
-# Whatever comes.
+# Bytes of the line.
 
 
 def test_the_worked_arming_is_answered_byte_for_byte() -> None:

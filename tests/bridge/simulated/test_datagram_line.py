@@ -58,7 +58,7 @@ def host(line: DatagramLine | None = None) -> Iterator[socket.socket]:
 
 def test_it_answers_whoever_was_heard_last(time: Timebase) -> None:
     with DatagramLine(Echo(time), time) as line, host(line) as first, host(line) as second:
-        # Nobody was heard: it has nowhere to send to.
+        # No sender was heard: it has nowhere to send to.
         time.advance(1.5)
         first.send(b"abc")
         assert first.recv(100) == b"cba"

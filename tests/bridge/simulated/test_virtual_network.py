@@ -59,7 +59,7 @@ def test_a_connection_carries_bytes_both_ways_until_one_end_is_closed() -> None:
         assert takes.read(1.0) == b"ask"
         takes.write(b"answer")
         takes.close()
-        # Everything sent before is read before the end is reported.
+        # All bytes sent before are read before the end is reported.
         assert calls.read(1.0) == b"answer"
         for use in (lambda: calls.read(1.0), lambda: calls.write(b"x")):
             with pytest.raises(LineLostError):

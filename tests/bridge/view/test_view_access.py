@@ -165,7 +165,7 @@ async def test_with_the_token_the_robot_is_commanded(endpoint: ViewEndpoint, rob
 
 
 async def test_a_command_is_taken_back_when_its_page_leaves(endpoint: ViewEndpoint, robot: LiveRobot) -> None:
-    robot.refusal = None  # Nobody answers.
+    robot.refusal = None  # The command is not answered.
     async with opened(endpoint.url) as page:
         await page.send(type="command", command="resume", token=token_of(endpoint.url))
         await until(lambda: bool(robot.orders))
@@ -263,7 +263,7 @@ def test_there_is_a_limit_of_pages_and_of_connections(
     assert MAXIMUM_VIEWERS > 3
     runner = endpoint._server._runner
     assert runner is not None
-    # While those of the pages still end, they would take the places of the next two.
+    # Connections of pages that still end would take the places of the next two.
     wait_until(lambda: runner.server is not None and not runner.server.connections)
     monkeypatch.setattr(server_module, "MAXIMUM_CONNECTIONS", 2)
     host, _, port = endpoint.address.rpartition(":")

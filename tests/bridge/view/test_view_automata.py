@@ -260,7 +260,7 @@ async def test_the_page_follows_the_file_and_what_it_imports(tmp_path: Path, mon
         update = await page.until(lambda message: message["type"] == "update" and message["warnings"])
         (warning,) = update["warnings"]
         assert "this is not what it says" in warning["text"] and "rule.cif:1:" in warning["text"]
-        # Without a supervisor the page says what is to blame.
+        # The page says what is to blame where there is no supervisor.
         played(rule, "requirement invariant tank.level > 4;")
         update = await page.until(
             lambda message: (

@@ -442,7 +442,7 @@ async def test_a_link_holds_the_model() -> None:
         link = (await page.told("definition"))["play"]["link"]
         assert unpacked(link) == GATE
         await page.told("run")
-        # Somebody else's link does not set this machine to work.
+        # The link of another user does not set this machine to work.
         for shown in (None, "x", 3):
             await page.send(type="model", packed=packed("robot Other { }"), token=shown)
             answer = await page.until(lambda message: message["type"] in ("refused", "run"))
@@ -466,7 +466,7 @@ async def test_a_page_that_comes_back_goes_on_with_its_run() -> None:
     async with served(files.source, is_shared=False, robot=files.robot) as server:
         async with opened(server.url) as page:
             await page.told("run")
-            # Nothing was kept of it yet.
+            # The run has not been kept yet.
             await page.send(type="resume", page="one")
             await done(page, "event", line="light day")
             assert (await done(page, "event", line="open"))["steps"] == 2

@@ -160,7 +160,7 @@ async def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(
 ) -> None:
     assert remote_bridge.FOLLOW_S <= 0.5
     monkeypatch.setattr(remote_bridge, "FOLLOW_S", 0.01)
-    # Whatever ends one, it is not its time.
+    # The time limit ends neither of them.
     monkeypatch.setattr(client, "STOP_LIMIT_S", 10 * LIMIT_S)
     async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server, opened(server.url) as page:
         # The definition and a stop come first; then one after the other, each on a way of its own.
@@ -170,7 +170,7 @@ async def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(
         await press(page, 1)
         assert not any(message.get("what") == "stop" for message in page.messages)
         assert robot.orders == []
-        # In the end who wanted it learns that nobody has heard it.
+        # The page that wanted it learns in the end that the robot has not heard it.
         gate.fall()
         assert (await page.told("refused"))["what"] == "stop"
 

@@ -462,7 +462,7 @@ def test_too_many_orders_are_not_called_confluent() -> None:
     assert not all_.is_exhausted
 
 
-# What people see
+# Reports for people
 
 
 def test_a_livelock_is_an_error_unless_it_is_allowed() -> None:

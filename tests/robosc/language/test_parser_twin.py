@@ -110,7 +110,7 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
         # The grammar does not say that an option stands once.
         return True
     if token == "if" and tokens.texts[at - 1] == "not":
-        # Without its end it is no conditional, so that `not` is a name.
+        # A conditional without its end is none, so that `not` is a name.
         return True
     # The next token shows that `3 needs x` wants a name, and `integer < x` something else than this word; and that an
     # item begins behind a name `not`.

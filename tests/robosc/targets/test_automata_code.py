@@ -347,7 +347,7 @@ def test_what_has_no_code(target: str, made: System, message: str) -> None:
 
 @pytest.mark.parametrize("target", ["c99", "python"])
 def test_what_is_nested_too_deeply_has_no_code(target: str) -> None:
-    # As deep as a front end may let it become, and deeper than compilers take brackets.
+    # The depth is the most that a front end may produce, and deeper than compilers take brackets.
     allow_depth(5_000, 4)
     deep: Expression = VariableRead("A", "x")
     for number in range(500):

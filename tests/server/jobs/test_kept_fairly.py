@@ -154,7 +154,7 @@ async def test_beyond_the_bound_of_jobs_those_of_a_caller_are_forgotten_that_end
         choices.times.wall_s += 1.0
         second, _ = await made.manager.submit(task_of("fail CPU_LIMIT"), ME)
         await ended(made.manager, second.id)
-        # Which began first, but has not ended.
+        # The third one began first, but has not ended.
         third, _ = await made.manager.submit(task_of(_NEVER), ME)
         with pytest.raises(RefusedError, match="no job with this id"):
             await made.manager.get(first.id, ME)

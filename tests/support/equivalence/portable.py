@@ -26,7 +26,7 @@ def flat(data: Any, path: str = "") -> dict[str, Any]:
     if data is None:
         return {}
     if isinstance(data, float) and math.isnan(data):
-        return {path: "NaN"}  # Which equals itself.
+        return {path: "NaN"}  # The text equals itself.
     return {path: data if isinstance(data, str) else float(data)}
 
 

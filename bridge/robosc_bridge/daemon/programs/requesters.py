@@ -126,7 +126,7 @@ class Requesters:
             if now_s >= sender.heard_s + self._timeout_s:
                 layer.on_silent(identifier)
 
-    # What programs ask for.
+    # Requests of programs.
 
     def take(self, item: ProgramRequest, layer: Layer | None) -> None:
         """Pass a program's request to the layer, or refuse it."""

@@ -184,7 +184,7 @@ class ActionGoals:
                 abandoned.is_asked = True
                 abandoned.handle.cancel()
 
-    # What actionlib says, in the threads of rospy.
+    # Callbacks of actionlib, in the threads of rospy.
 
     def _transition(self, goal_id: int) -> Callable[[Any], None]:
         def on_transition(handle: Any) -> None:

@@ -227,8 +227,8 @@ class ActionGoals:
         future.add_done_callback(lambda done: self._abandoned_answered(goal_id, done))
 
     def _abandoned_answered(self, goal_id: int, future: Any) -> None:
-        # Whatever the server says, it has heard; a client's failure is tried again when the server
-        # is seen anew.
+        # The server has heard it, whatever it says; a client's failure is tried again when the
+        # server is seen anew.
         if future.exception() is None:
             self._abandoned.pop(goal_id, None)
 

@@ -161,7 +161,7 @@ class ServedAction:
         """
         self._server = server
 
-    # What the server asks.
+    # Callbacks of the server.
 
     def decide(self, message: Any) -> bool:
         """Take in a goal; return True if it is accepted."""

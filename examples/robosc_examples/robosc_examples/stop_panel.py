@@ -95,7 +95,7 @@ class StopPanel(HelperNode):
                 self._press(self._keys.get(key.lower(), key))
         else:
             *lines, self._unread = (self._unread + data).split(b"\n")
-            # What never ends is no line.
+            # A text without an end is no line.
             self._unread = self._unread[-CHUNK:]
             for line in lines:
                 self._press(line.decode(errors="replace").strip().lower())

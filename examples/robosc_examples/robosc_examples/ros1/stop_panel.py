@@ -37,7 +37,7 @@ class StopPanel(Node):
             self.exit_status = EXIT_OK
             return
         *lines, self._unread = (self._unread + data).split(b"\n")
-        # What never ends is no line.
+        # A text without an end is no line.
         self._unread = self._unread[-CHUNK:]
         for line in lines:
             self._press(line.decode(errors="replace").strip().lower())

@@ -87,5 +87,5 @@ def test_the_random_runs_show_everything_that_a_layer_does() -> None:
             seen.update(f"log {entry['kind']}" for entry in item.log)
     for kind in ("publish", "default", "call", "goal", "cancel", "pass", "blocked", "answer", "no answer"):
         assert seen[kind] > 5, kind
-    for kind in ("accept", "reject", "told", "ended", "log release", "log stop", "log fault", "log unexpected"):
+    for kind in ("accept", "reject", "feedback", "ended", "log release", "log stop", "log fault", "log unexpected"):
         assert seen[kind] > 5, kind

@@ -329,7 +329,7 @@ class TestEnding:
                 for number in range(1, 12, 2):
                     deaf.call(number, "/robosc_api.v1.SynthesisService/Check")
                     deaf.message(number, pb.CheckRequest(bundle=bundle("size 2900000")).SerializeToString())
-                assert eventually(lambda: deaf.was_told(b"not read its earlier results"))
+                assert eventually(lambda: deaf.has_received(b"not read its earlier results"))
             # The line is gone, and with it what was unread, as soon as the server has seen it.
             with grpc.insecure_channel(address) as channel:
                 assert eventually(lambda: is_taken(lambda: check(channel, "size 2900000")))

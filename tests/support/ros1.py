@@ -296,5 +296,5 @@ def until(
         limit_s,
         repeat=repeat,
         fault=lambda: "" if process.is_running else "the node ended",
-        told=lambda: process.stderr,
+        heard=lambda: process.stderr,
     )

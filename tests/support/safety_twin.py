@@ -183,7 +183,7 @@ class SafetyTwin:
                 found.add(Reason.UNBIDDEN_MOTION)
         return found
 
-    def tells(self, reading: DriveReading) -> None:
+    def answers(self, reading: DriveReading) -> None:
         """The drive base has answered; what latches of it is noted at once."""
         self.happens("drive", reading, reading.time_s)
         _, is_lost, read = self._torque_story()

@@ -134,7 +134,7 @@ class SteppedTwin:
         """Position of its middle, in metres."""
         return self.world.pose[:2]
 
-    def tell(self, identifier: str) -> None:
+    def receive(self, identifier: str) -> None:
         """A message without data comes, such as that of a button."""
         self.executor.receive(identifier, None)
 

@@ -64,7 +64,7 @@ class Stranger:
         for place in range(0, len(data), _FRAME_BYTES):
             self.send(DATA, 0, stream, data[place : place + _FRAME_BYTES])
 
-    def was_told(self, words: bytes) -> bool:
+    def has_received(self, words: bytes) -> bool:
         """Return True if headers or trailers that came hold some words."""
         return any(kind == HEADERS and words in content for kind, _, content in self.frames)
 

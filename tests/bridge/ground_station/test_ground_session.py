@@ -304,6 +304,6 @@ def test_any_contents_of_any_message_are_survived(number: int, payload: bytes, i
     talk.session.step(talk.now_s, packet, is_datagram=True)
     talk.session.step(talk.now_s, packet)
     talk.session.receive_from_other(talk.now_s, packet)
-    for item in talk.daemon.told:
+    for item in talk.daemon.received:
         if isinstance(item, MessageRequested):
             assert all(map(math.isfinite, (item.data["linear"]["x"], item.data["angular"]["z"])))

@@ -130,9 +130,9 @@ class Navigator(Companion):
 
     def take[Kind](self, kind: type[Kind]) -> Kind | None:
         """Return the oldest item of a kind, which is done with then."""
-        for item in self.told:
+        for item in self.received:
             if isinstance(item, kind):
-                self.told.remove(item)
+                self.received.remove(item)
                 return item
         return None
 

@@ -109,7 +109,7 @@ def see_a_place(endpoint: ViewEndpoint, loop: HeldLoop) -> None:
 
     async def look() -> None:
         async with opened(endpoint.url) as page:
-            arrival = asyncio.create_task(page.told("update"))
+            arrival = asyncio.create_task(page.receive("update"))
             while not arrival.done():
                 await asyncio.to_thread(loop.advance, server_module.BATCH_S)
             await arrival

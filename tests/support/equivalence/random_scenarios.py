@@ -276,7 +276,20 @@ def ticking_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario
 
 
 LAYER_KINDS = frozenset(
-    {"publish", "call", "goal", "cancel", "pass", "blocked", "answer", "no answer", "accept", "reject", "told", "ended"}
+    {
+        "publish",
+        "call",
+        "goal",
+        "cancel",
+        "pass",
+        "blocked",
+        "answer",
+        "no answer",
+        "accept",
+        "reject",
+        "feedback",
+        "ended",
+    }
 )
 """Kinds of requests and reports of a layer, all of which a random run should show."""
 

@@ -26,7 +26,7 @@ CORRECTION, COMMAND = "/line/correction", "/cmd_vel"
 
 
 class Follower:
-    """Follower that asks for velocities along the last correction that it heard.
+    """Follower that requests velocities along the last correction that it heard.
 
     Args:
         speed_m_s: Speed forward, in m/s.

@@ -280,7 +280,7 @@ class Program:
                 with suppress(subprocess.TimeoutExpired):
                     process.wait(STOP_LIMIT_S)
         finally:
-            # Also where somebody does not wait for it any longer.
+            # The same holds where its end is not awaited any longer.
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()

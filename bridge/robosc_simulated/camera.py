@@ -34,7 +34,7 @@ class SimulatedCamera:
         path: Path of the socket.
         is_covered: True if something covers it: its pictures are black.
         is_frozen: True if it has stopped sending pictures.
-        sent: Pictures that have gone to somebody.
+        sent: Pictures that have gone to a client.
 
     Raises:
         OSError: There is something at `link` already, or no socket can be there.

@@ -180,7 +180,7 @@ class SimulatedLine(Closing):
             return self.received >= received and not self._wire
 
     def disconnect(self) -> None:
-        """Pull the plug: the port is gone, and whoever has it open sees a hang-up."""
+        """Pull the plug: the port is gone, and a program that has it open sees a hang-up."""
         with self._time.lock:
             if not self._end.is_connected:
                 return
@@ -260,7 +260,7 @@ class SimulatedLine(Closing):
     def _look_at_the_host(self) -> None:
         """Report whether the host is behind.
 
-        Nobody waits for a host that has no use for this line, and reads nothing of it.
+        The world does not wait for a host that has no use for this line, and reads nothing of it.
         """
         unread = self._end.unread()
         self._is_used = self._is_used or unread < self._waiting

@@ -384,7 +384,7 @@ class OpenCr:
         return tuple(servo for servo in self._servos if self._has_motors and servo.answers)
 
     def _is_missing_servo(self) -> bool:
-        """Return True if a servo that it asks does not answer."""
+        """Return True if a servo of its bus does not answer."""
         return self._has_motors and not all(servo.answers for servo in self._servos)
 
     def _cycle(self, began_s: float, now_s: float) -> None:

@@ -156,7 +156,7 @@ class VirtualHost(Closing):
         """Open a line over its network, which reaches this host alone, whatever an address says.
 
         Raises:
-            LineMissingError: Nobody serves there.
+            LineMissingError: The address has no server.
             LineBusyError: The port is in use.
         """
         return self._network.open(address)
@@ -178,7 +178,7 @@ class VirtualHost(Closing):
             thread.join(_END_S)
 
     def _pass_on(self, slot: _Slot) -> None:
-        """Give the processor to whoever's wait is over first, and wait for the own one."""
+        """Give the processor to the thread whose wait is over first, and wait for the own one."""
         following = self._next()
         if following is not slot:
             self._running = following

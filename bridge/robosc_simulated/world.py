@@ -259,7 +259,7 @@ class World:
         self._clear_m = 0.0
 
     def watch(self, on_step: OnStep, on_event: OnWorldEvent) -> None:
-        """Notify somebody of every step and of what happens, under the lock of the time."""
+        """Notify an observer of every step and of what happens, under the lock of the time."""
         with self.time.lock:
             self._watchers.append((on_step, on_event))
 
@@ -314,7 +314,7 @@ class World:
         """Move, unless something is in the way; whether it has."""
         x_m, y_m = self.x_m + along_x_m, self.y_m + along_y_m
         radius_m = self.body.radius_m
-        # A distance changes by no more than the way that was gone: most often nobody has to measure.
+        # A distance changes by no more than the way that was gone: most often none is measured.
         self._clear_m -= abs(forward_m)
         if self._clear_m < radius_m + _APART_M:
             nearest_m, name = self._nearest(x_m, y_m)

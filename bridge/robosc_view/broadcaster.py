@@ -24,7 +24,7 @@ MAXIMUM_BYTES = 2 * 1024 * 1024
 """Maximum size of the entries that wait for a viewer, in bytes."""
 
 MAXIMUM_ANSWERS = 50
-"""Answers that wait for one who asks; the oldest are forgotten."""
+"""Answers that wait for one page; the oldest are forgotten."""
 
 UPDATE_S, SIGN_OF_LIFE_S = 0.05, 1.0
 """Least and longest time between two updates."""

@@ -237,7 +237,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _refuse_for_automata(arguments: argparse.Namespace) -> None:
-    """Do nothing if all that is asked for means something for automata.
+    """Do nothing if all options have a meaning for automata.
 
     Raises:
         UsageError: Something does not.

@@ -21,7 +21,7 @@ from typing import Any
 
 MAXIMUM_STATES = 150
 MAXIMUM_EDGES = 600
-"""A larger automaton is not drawn: nobody could read it."""
+"""A larger automaton is not drawn: it would be unreadable."""
 
 MAXIMUM_LABEL = 60
 """Characters of a label."""

@@ -28,7 +28,7 @@ def load_bundle(
 
     Libraries are looked for in the model's folder, its sibling `../shared` and `library_paths`. Only files
     that declare a library which is imported, directly or by another library, become part of the bundle: a
-    broken library that nothing imports is nobody's error. Definitions of middleware types are also looked for in the
+    broken library without an importer is no error. Definitions of middleware types are also looked for in the
     packages around the model.
 
     Args:

@@ -118,7 +118,7 @@ class Comparison:
 
 
 class FieldChecker:
-    """Checker of data types against messages; of each pair, no matter how often it is asked for, once.
+    """Checker of data types against messages; each pair is checked once.
 
     Args:
         catalogue: The interfaces.

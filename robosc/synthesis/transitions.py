@@ -63,7 +63,7 @@ def transition_of(encoding: Encoding, event: Event) -> Transition:
     manager, system = encoding.manager, encoding.system
     encoder = ExpressionEncoder(encoding, encoding.inputs_of(event.name))
     participants = [automaton for automaton in system.automata if event.name in automaton.alphabet]
-    # An event in no alphabet belongs to nobody, so it cannot happen.
+    # An event in no alphabet belongs to no automaton, so it cannot happen.
     possible = encoding.possible_inputs(event.name) if participants else manager.false
     possible = possible & _condition(encoding, encoder, system.plant_conditions, event.name)
     watched = manager.true

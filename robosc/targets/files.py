@@ -117,7 +117,7 @@ def write_files(files: GeneratedFiles, directory: Path, force: bool = False) -> 
         The path of every generated file, sorted.
 
     Raises:
-        OverwriteError: A file was changed by somebody; nothing was written.
+        OverwriteError: A file was changed since it was generated; nothing was written.
         UnwritableError: The place cannot be written.
     """
     try:

@@ -275,7 +275,7 @@ class Lifecycle:
         _log.info("running")
 
     def _enable(self) -> None:
-        """Let the safety layer leave standby, unless somebody wants it there."""
+        """Let the safety layer leave standby, unless it is to stay there."""
         self._safety.enable()
         if self._orders.is_halt_coming:
             # Its own word to the layer may have come just before this one.

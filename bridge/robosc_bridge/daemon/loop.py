@@ -207,7 +207,7 @@ class Daemon:
         self._in_hand = ()
         for item in items:
             self._handle(item)
-        # Not what comes meanwhile: nobody can keep the loop from its cycle.
+        # Items that come meanwhile wait: they cannot keep the loop from its cycle.
         for _ in range(self._inbox.qsize()):
             self._handle(self._inbox.get_nowait())
         self._take_from_programs()

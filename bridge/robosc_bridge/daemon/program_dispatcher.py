@@ -51,7 +51,7 @@ class ProgramDispatcher:
         self._robot = robot
 
     def take(self, item: Arrived) -> None:
-        """Do what a program asks for, or refuse it with the reason."""
+        """Take a program's item, or refuse it with the reason."""
         program = item.program
         if isinstance(item, Attached):
             self._attach(program)

@@ -130,7 +130,7 @@ class MavlinkObstacles:
         return self._link
 
     def _keep_on(self, link: VehicleLink) -> None:
-        # A drive base's heartbeat says that it lives; nobody says so in its place.
+        # A drive base's heartbeat says that it lives; no other message does.
         if not link.has_driver:
             link.keep_alive()
         if not self._is_requested and link.state.heartbeat is not None:

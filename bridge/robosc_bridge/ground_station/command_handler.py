@@ -28,7 +28,7 @@ RESET_LIMIT_S = 20.0
 LOOP_HANGS = "The bridge's loop hangs."
 
 REPEATED_S = 10.0
-"""For so long it is known how a command was answered, if its sender asks again."""
+"""Time for which the answer to a command is kept, for a sender that repeats it."""
 
 _MOST_PENDING = 8
 _MOST_REMEMBERED = 32
@@ -99,7 +99,7 @@ class CommandHandler:
         self._ordered: set[Stop] = set()
 
     def begin(self) -> None:
-        """Begin anew: commands that come from now on are newer than every earlier order, whoever gave it."""
+        """Begin anew: commands that come from now on are newer than every earlier order of any sender."""
         self._ordered.clear()
 
     def _stop(self, stop: Stop, by: Sender, now_s: float) -> None:

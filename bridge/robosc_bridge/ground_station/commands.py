@@ -21,7 +21,7 @@ type Parameters = tuple[float, float, float, float, float, float, float]
 
 
 class Stop(StrEnum):
-    """Ways of stopping: they are obeyed at once, and whoever asks."""
+    """Ways of stopping: they are obeyed at once, from every sender."""
 
     STANDBY = "standby"
     OPERATOR = "operator stop"

@@ -50,7 +50,7 @@ def ring_sectors(ring: ObstacleRing, heading_rad: float | None) -> tuple[Sector,
         heading_rad: Of the vehicle, counter-clockwise from north; None: unknown.
 
     Returns:
-        None: it counts from north, and nobody knows where that is.
+        None: it counts from north, whose direction is unknown.
     """
     if ring.is_body_fixed:
         turned_deg = 0.0

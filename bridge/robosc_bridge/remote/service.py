@@ -123,7 +123,7 @@ class BridgeService(convert.BridgeServiceServicer):
     async def _order(self, command: states.OperatorCommand, by: str) -> str:
         """Return the reason why the command cannot be; empty: it is done.
 
-        Without an answer, or with nobody to hear it, it is taken back.
+        It is taken back if there is no answer, or if its caller has gone.
 
         Raises:
             TimeoutError: The loop does not answer.

@@ -62,7 +62,7 @@ class SafetyLayer:
         # The commanded velocity, within the limits, and the velocity of the last output.
         self._wanted = self._velocity = STANDSTILL
         self._is_refused = False
-        # Forward, as it was commanded last: whether it counts or not, that is where somebody wants to go.
+        # Forward velocity of the last command: whether it counts or not, the robot is wanted there.
         self._asked_m_s = 0.0
         # All commands up to the next output came too early to count.
         self._is_held = True

@@ -13,7 +13,7 @@ from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.skills.settings import RotateSettings
 
 MAXIMUM_ANGLE_RAD = 200 * math.pi
-"""A hundred revolutions; who asks for more has mistaken the unit."""
+"""A hundred revolutions; a larger angle is one in a mistaken unit."""
 
 
 class RotateState(StrEnum):

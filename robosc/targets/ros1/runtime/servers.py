@@ -98,12 +98,12 @@ class CalledService:
         self.answer(number, self._make_default())
 
     def close(self) -> None:
-        """Answer every new call with the default response from now on, and notify nobody."""
+        """Answer every new call with the default response from now on, without a notice."""
         with self._lock:
             self._is_closed = True
 
     def take_leave(self) -> None:
-        """Answer every call that waits with the default response: nobody else would."""
+        """Answer every call that waits with the default response."""
         for number in list(self._waiting):
             self.answer_default(number)
 
@@ -198,12 +198,12 @@ class ServedAction:
         self._try_to('end', lambda: end(result))
 
     def close(self) -> None:
-        """From now on reject every new goal, and notify nobody."""
+        """From now on reject every new goal, without a notice."""
         with self._lock:
             self._is_closed = True
 
     def take_leave(self) -> None:
-        """Abort every goal: nobody else would end it."""
+        """Abort every goal, for its caller waits."""
         for number in list(self._goals):
             self.end(number, 'aborted', None)
 

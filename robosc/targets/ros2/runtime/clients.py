@@ -212,7 +212,7 @@ class ActionGoals:
         self._end(goal_id, 'lost')
 
     def _look_for_server(self) -> None:
-        """Cancel lost goals as soon as their server is seen: nobody else would ever stop them."""
+        """Cancel lost goals as soon as their server is seen: they would run on."""
         is_there = self.is_ready()
         for goal_id, abandoned in list(self._abandoned.items()):
             if not is_there:
@@ -256,7 +256,7 @@ class ActionGoals:
                 self._end(goal_id, 'rejected')
             return
         if goal is None:
-            # Its server counted as lost: nobody would ever stop this one.
+            # Its server counted as lost: this goal would run on.
             self._abandoned[goal_id] = AbandonedGoal(handle)
             self._cancel_abandoned(goal_id)
             return

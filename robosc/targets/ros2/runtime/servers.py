@@ -95,7 +95,7 @@ class CalledService:
         self.answer(number, self._make_default())
 
     def take_leave(self) -> None:
-        """Answer every call with the default response: nobody else would."""
+        """Answer every call with the default response, for its caller waits."""
         for number in list(self._calls):
             self.answer_default(number)
 
@@ -252,7 +252,7 @@ class ServedAction:
         return self._make_default() if result is None else result
 
     def take_leave(self) -> None:
-        """Abort every goal: nobody else would end it."""
+        """Abort every goal, for its caller waits."""
         for number in list(self._goals):
             self.end(number, 'aborted', None)
 

@@ -359,7 +359,7 @@ class CallsByConnection(Layer):
     calls notes them itself.
 
     Args:
-        arrivals: Layer that is told.
+        arrivals: Layer that is notified.
     """
 
     def __init__(self, arrivals: Arrivals) -> None:

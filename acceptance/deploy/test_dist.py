@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(not (DIST / "SHA256SUMS").is_file(), reason="the
 
 
 def offline() -> list[str]:
-    """The words before a command that take its network away; none where the kernel allows nobody to."""
+    """The words before a command that take its network away; none where the kernel does not allow that."""
     words = ["unshare", "--map-root-user", "--net"]
     is_there = shutil.which("unshare") is not None
     return (

@@ -1,4 +1,4 @@
-"""Calls by somebody who was given an address and nothing else, as with grpcurl."""
+"""Calls by a user who was given an address and nothing else, as with grpcurl."""
 
 import base64
 import hashlib

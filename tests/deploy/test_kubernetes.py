@@ -17,7 +17,7 @@ from support.manifests import VARIANTS, Manifest, container_of, has_kustomize, m
 
 pytestmark = pytest.mark.skipif(not has_kustomize(), reason="there is no kubectl, which knows Kustomize")
 
-# The oldest one that somebody may still have, and the newest.
+# The oldest version in use, and the newest.
 VERSIONS = ("1.29.0", "1.34.0")
 
 

@@ -56,7 +56,7 @@ def follow_the_line_without_care(twin: SteppedTwin) -> Judge:
 
 
 def follow_the_person(twin: SteppedTwin) -> Judge:
-    """Follow: the robot catches up, backs off, faces, pauses by its button, and stands where nobody is."""
+    """Follow: the robot catches up, backs off, faces, pauses by its button, and stands without a person."""
 
     def gap_m() -> float:
         (person,) = twin.world.obstacles
@@ -84,7 +84,7 @@ def follow_the_person(twin: SteppedTwin) -> Judge:
 
 
 def navigate(twin: SteppedTwin) -> Judge:
-    """Navigate: the robot waits until nobody is near, is calibrated and drives to its goal."""
+    """Navigate: the robot waits until no person is near, is calibrated and drives to its goal."""
     twin.go_on(3.0)
     assert twin.place == (0.0, 0.0)
     assert twin.called == ["calibrate"]

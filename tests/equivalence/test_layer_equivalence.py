@@ -35,7 +35,7 @@ def some_layer(seed: int) -> Supervisor:
     """A random robot, of one kind or another."""
     supervisor = msgspec.structs.replace(random_supervisor(seed), deployment=Deployment.LAYER)
     incoming = [i for i in supervisor.model.communications if i.kind is CommunicationKind.INCOMING_MESSAGE]
-    # Messages that share an identifier there are not told apart by conditions.
+    # Messages that share an identifier there are not distinguished by conditions.
     if seed % 2 or len(incoming) > len({item.identifier for item in incoming}):
         return random_layer(Random(seed))
     return supervisor

@@ -51,7 +51,7 @@ def settings_of(editor: str, language: str) -> str:
 
 
 class Home:
-    """The folder of somebody who has nothing but `robosc-lsp`.
+    """The folder of a user who has nothing but `robosc-lsp`.
 
     Args:
         folder: Empty.
@@ -257,7 +257,7 @@ class Emacs:
             raise
 
     def _listens(self) -> bool:
-        # Its socket is there a moment before anybody is let in.
+        # Its socket is there a moment before connections are accepted.
         with socket.socket(socket.AF_UNIX) as line, contextlib.suppress(FileNotFoundError, ConnectionRefusedError):
             line.connect(str(self._socket))
             return True

@@ -24,7 +24,7 @@ class Fault(Exception):
 
 
 class Endless(Fault):
-    """Silent steps that do not end: the state at which that is noticed is nobody's business."""
+    """Silent steps that do not end: the state at which that is noticed does not matter."""
 
 
 @dataclass
@@ -368,7 +368,7 @@ class LayerTwin:
         self.finish()
 
     def finish(self) -> None:
-        """Goals that nobody but the supervisor, time or a restart ended are aborted for their callers."""
+        """Goals that only the supervisor, time or a restart ended are aborted for their callers."""
         for goal in self.goals:
             if not (goal.runs_in_model or goal.was_cancelled_by_caller or goal.has_ended_for_caller):
                 goal.has_ended_for_caller = True

@@ -143,7 +143,7 @@ class Porter:
         self._parameters = parameters
 
     def leave(self) -> None:
-        """End what runs, as a crash would, and wait until nobody is connected with it."""
+        """End what runs, as a crash would, and wait until no node is connected with it."""
         self._parameters = None
         if self.layer is not None:
             self.layer.__exit__(None, None, None)

@@ -100,7 +100,7 @@ class Master(Process):
         wait_until(self._is_up, "the master")
 
     def another(self, folder: Path) -> Process:
-        """One in its place that knows nobody; it has ended."""
+        """One in its place that knows no node; it has ended."""
         return Process(self._command, self.variables, folder)
 
     def _is_up(self) -> bool:

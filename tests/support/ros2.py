@@ -142,7 +142,7 @@ class Peer:
         self.publisher(type(message), topic, qos).publish(message)
 
     def wait_for_peers(self, topics: Sequence[str]) -> None:
-        """Wait until somebody else publishes on or subscribes to each topic, as seen from here."""
+        """Wait until another node publishes on or subscribes to each topic, as seen from here."""
         own = self.node.get_name()
 
         def others(topic: str) -> bool:

@@ -42,7 +42,7 @@ class Stranger:
         self._thread.start()
 
     def send(self, kind: int, flags: int, stream: int, content: bytes) -> None:
-        """A frame; nobody takes it where the server has ended the connection."""
+        """A frame; it is lost where the server has ended the connection."""
         self._send(frame(kind, flags, stream, content))
 
     def call(

@@ -1,4 +1,4 @@
-"""Waiting for what nobody reports; what does is waited for by its event.
+"""Waiting for conditions without an event; others are awaited by their events.
 
 It is asked for often, and a limit is there for failing tests alone: nothing is decided by how long it takes.
 """

@@ -131,7 +131,7 @@ def test_a_stop_reaches_the_motors_at_once(
             assert watcher.stdout is not None
             assert watcher.stderr is not None
             watcher.stdout.readline()
-            # A bridge that hangs is reported to whoever relies on it.
+            # A bridge that hangs is reported to those who rely on it.
             bridge.process.send_signal(signal.SIGSTOP)
             stopped = command("stop", "--address", address)
             assert stopped.returncode == 2

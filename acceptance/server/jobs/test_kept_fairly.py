@@ -1,4 +1,4 @@
-"""Owners that give something back where too much is kept: as in an obvious twin, and nobody at another's cost."""
+"""Owners that give something back where too much is kept: as in an obvious twin, and no owner at another's cost."""
 
 import asyncio
 from pathlib import Path

@@ -54,7 +54,7 @@ def _percentile(samples_s: list[float], percent: int) -> str:
 
 
 def _waiting_share(path: str) -> float:
-    """Share of a processor that waiting for an answer takes; nobody has the id that is asked."""
+    """Share of a processor that waiting for an answer takes; no device has the id of the request."""
     with SerialLine(path, 1_000_000) as line:
         bus = DynamixelBus(line, str, WAIT_S)
         bus.begin(WAIT_S, repeats=0)

@@ -379,7 +379,7 @@ def test_an_operator_who_is_lost_stops_the_wheels_until_he_is_back() -> None:
             operator.join(LIMIT_S)
 
 
-# The bridge stays if an operator can learn of it; nothing moves before somebody says so.
+# The bridge stays if an operator can learn of it; nothing moves before an operator resumes.
 
 
 def _ordered(bridge: Driven, command: OperatorCommand) -> str:

@@ -273,7 +273,7 @@ def test_a_run_that_ends_takes_its_numbers_with_it() -> None:
     scene.daemon.post(OperatorCommand.STANDBY)
     server.received.clear()
     scene.live(0.3, 2.0)
-    # It had not been accepted: the program learns all the same that nobody wants it any more.
+    # It had not been accepted: the program learns all the same that it is not wanted any more.
     assert server.of(CancelMade) == [CancelMade("fetch", goal.number)]
     assert len(why(server.say(GoalAccepted, goal.number))) == 1
     scene.daemon.post(OperatorCommand.START)

@@ -312,7 +312,7 @@ def test_a_byte_that_is_changed_is_refused(signed: Signed, place: int, change: i
 
 
 def test_a_changed_file_is_refused_though_the_verifier_would_pass_it(signed: Signed, tmp_path: Path) -> None:
-    """Somebody has been at it: that is not passed over."""
+    """A changed file is not passed over."""
     written(tmp_path)
     signed.file.write_bytes(signed.file.read_bytes().replace(b"\n", b" \n"))
     assert obtain(signed.source())

@@ -214,7 +214,7 @@ def test_a_frame_with_a_wrong_checksum_is_counted_and_dropped(rig: Rig) -> None:
 
 
 def test_of_several_turns_in_one_read_the_newest_is_reported(rig_lds01: Rig) -> None:
-    # The line holds more than one turn; whoever was late wants what is now.
+    # The line holds more than one turn; a late reader wants the present one.
     stream = b"".join(_lds01_revolution(500) + _lds01_revolution(600))[:4000]
     rig_lds01.pty.send(stream)
     first = rig_lds01.lidar.receive(LIMIT_S)

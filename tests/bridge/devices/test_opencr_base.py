@@ -546,7 +546,7 @@ def test_a_button_that_is_pressed_shortly_and_often_is_not_warned_of(
 
 
 def test_commands_that_change_at_once_are_followed(bench: Rig) -> None:
-    """No stop and no turn is taken for a motion that nobody has commanded."""
+    """No stop and no turn is taken for a motion without a command."""
     bench.start()
     for velocity in (Velocity(0.2), Velocity(-0.2), Velocity(0.0, 2.0), Velocity(), Velocity(0.2, -1.0)):
         assert bench.drive(velocity, 0.8).faults == frozenset()
@@ -678,7 +678,7 @@ def test_a_board_that_loses_what_comes_before_it_has_answered_is_sent_no_more_of
         bench.tap.device = board = _Forgetful(_board(bench))
         for number in range(5):
             velocity = Velocity(0.1, 0.1 * number)
-            # Behind a read; behind a write nobody knows which of the two was lost.
+            # Behind a read; behind a write it is unknown which of the two was lost.
             _Source(bench, velocity, BLOCK)
             assert bench.base.exchange(STANDSTILL).is_torque_on
             reading = bench.base.exchange(velocity)

@@ -54,7 +54,7 @@ def test_an_arming_that_is_not_answered_is_undone(talk: Talk) -> None:
     assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [4]
     assert "Not armed: the bridge's loop does not answer." in joined_texts(found)
     assert talk.daemon.commands == [OperatorCommand.START, OperatorCommand.STANDBY]
-    # A late answer concerns nobody.
+    # A late answer has no effect.
     talk.daemon.orders[0].answer("")
     assert of_type("COMMAND_ACK", talk.live(1.0)) == []
 

@@ -328,7 +328,7 @@ def test_it_may_be_stopped_at_any_time(host: VirtualHost) -> None:
     link = GroundLink(PlayedDaemon().operations, GroundSettings(LISTENING, FASTEST), host)
     link.stop()
     for passed_s in (0.0, 0.01, 1.0, 100.0):
-        # Also between two attempts to find somebody.
+        # Also between two attempts to find a station.
         link = GroundLink(PlayedDaemon().operations, GroundSettings("tcp:127.0.0.1:1", FASTEST), host)
         assert not link.is_alive
         link.start()

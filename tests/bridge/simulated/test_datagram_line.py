@@ -86,7 +86,7 @@ def test_a_host_that_is_gone_does_not_end_it(time: Timebase) -> None:
         with host(line) as gone:
             gone.send(b"abc")
             assert gone.recv(100) == b"cba"
-        # The system reports that nobody listens there.
+        # The system reports that there is no listener.
         time.advance(3.0)
         other.send(b"de")
         assert other.recv(100) == b"ed"

@@ -14,7 +14,7 @@ def test_datagrams_come_whole_and_in_order_to_who_listens() -> None:
         assert (listens.port, listens.is_datagram) == (14550, True)
         with pytest.raises(LineBusyError):
             host.open_network("udpin:127.0.0.1:14550")
-        # Until it was called by somebody, it has nobody to write to.
+        # A listener has no one to write to until it was called.
         listens.write(b"lost")
         one, other = (host.open_network("udpout:127.0.0.1:14550") for _ in range(2))
         one.write(b"first")

@@ -199,7 +199,7 @@ def test_nothing_of_the_folder_that_one_works_in_is_run(tmp_path: Path, monkeypa
 
 
 async def test_one_that_is_not_wanted_any_more_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Reading it never ends, since nobody writes.
+    # Reading it never ends without a writer.
     model = tmp_path / "pipe.rscd"
     os.mkfifo(model)
     started = []

@@ -1,4 +1,4 @@
-"""Tests that any printed output arrives, or its loss is reported; a reader who left is nobody's fault."""
+"""Tests that any printed output arrives, or its loss is reported; a reader who left is no fault."""
 
 import os
 import subprocess

@@ -263,7 +263,7 @@ def test_descriptions_between_what_must_be_and_what_must_not(data: st.DataObject
 
 
 def check_descriptions(domains: Domains, compared: tuple[Subject, ...], holds: Predicate, matters: Predicate) -> None:
-    """Each description is right where it matters, whether the values of the places are all told apart or not."""
+    """Each description is right where it matters, whether the values of the places are all distinguished or not."""
     sets = [
         diagram_of(domains, lambda *values: matters(*values) and holds(*values)),
         diagram_of(domains, lambda *values: matters(*values) and not holds(*values)),

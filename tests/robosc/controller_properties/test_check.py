@@ -284,7 +284,7 @@ OWN = robot(INTERFACE, AGAIN, "requirement reach needs Arm.home or Arm.again")
 
 
 def test_what_the_request_itself_makes_false_never_cancels() -> None:
-    """The supervisor would allow the cancel at once, but only a requirement that somebody else turns cancels."""
+    """The supervisor would allow the cancel at once, but only a requirement on another's turn cancels."""
     found = properties(OWN)
     assert outcomes(found) == ("passed", "passed", "failed")
     assert found.blocking is not None

@@ -1,4 +1,4 @@
-"""Names in goals and assumptions: who uses them is told by the statement."""
+"""Names in goals and assumptions: the statement names their uses."""
 
 import pytest
 

@@ -31,7 +31,7 @@ UNFIT = re.compile(
     "so it has no|what must never be|has no 'allow'|stands here twice|stands behind 'always'|or 'leads to' behind|"
     "in one statement"
 )
-"""Messages about goals and assumptions that are told of a word before the one that fits nowhere."""
+"""Messages about goals and assumptions whose place is a word before the one that fits nowhere."""
 
 OPTIONS = ("qos", "depth", "max_age", "stamped", "when")
 

@@ -40,7 +40,7 @@ SWITCH = """component Switch {
         marked state on_ { }
     }
 }"""
-"""A switch that somebody else flips."""
+"""A switch that the environment flips."""
 
 MOTOR = """component Motor {
     action drive with request: none, response: none, feedback: none links i

@@ -258,7 +258,7 @@ def test_a_database_that_a_running_server_has(capsys: pytest.CaptureFixture[str]
         checked = Checked(capsys, "--database-url", f"sqlite:///{state / DATABASE_FILE}")
         assert checked.grade("database") == "warning"
         assert {path.name for path in state.iterdir()} == before
-        # It has kept its lock, and lost it to nobody.
+        # It has kept its lock to the end.
         with pytest.raises(StoreError, match="in use by another robosc-server"):
             open_store(state)
     before = {path.name for path in state.iterdir()}

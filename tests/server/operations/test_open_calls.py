@@ -1,4 +1,4 @@
-"""Tests of the limit on open calls, with real calls: silent ones, watches, answers that nobody reads."""
+"""Tests of the limit on open calls, with real calls: silent ones, watches, answers that are not read."""
 
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager

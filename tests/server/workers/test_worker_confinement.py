@@ -1,4 +1,4 @@
-"""A worker in the hands of a hostile program: what it tries is refused by the kernel, and harms nobody."""
+"""A worker in the hands of a hostile program: what it tries is refused by the kernel, and does no harm."""
 
 import json
 import os

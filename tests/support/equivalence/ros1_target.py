@@ -113,7 +113,7 @@ class Ros1Surroundings:
         )
 
     def _connections(self) -> set[str]:
-        """The topics on which the node has somebody to send to, as it says itself."""
+        """The topics on which the node has a subscriber, as it reports itself."""
         # Fields of each: number, the other end, direction, transport, topic.
         return {item[4] for item in _answer(self._ask_node("getBusInfo")) if item[2] == "o"}
 

@@ -343,7 +343,7 @@ def test_others_manage_the_node(courier_node: Path, tmp_path: Path) -> None:
     doings = [(word, name) for word, name, _ in found]
     assert doings.index(("state", "activate")) < doings.index(("call", "/power"))
     assert drives(found)[-1] is False
-    # The wheels stop before the goal is cancelled, and both before the answer to whoever manages the node.
+    # The wheels stop before the goal is cancelled, and both before the answer to the node's manager.
     place = doings.index(("state", "deactivate"))
     assert doings[place - 2 : place] == [("publish", "/cmd_vel"), ("cancel", "/count")]
     # Each configuration begins a log.

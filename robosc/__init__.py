@@ -48,11 +48,13 @@ if TYPE_CHECKING:
     from robosc.pipeline.goals import Choice, GoalApproach, Goals
     from robosc.pipeline.loading import LoadedAutomata, LoadedModel, load
     from robosc.pipeline.manual_run import EventNotPossibleError, NoStrategyError, UnknownEventError
+    from robosc.pipeline.missions import DetourProgress, MissionProgress
     from robosc.pipeline.options import SynthesisOptions
     from robosc.pipeline.received_data import DataError
     from robosc.pipeline.results import (
         Explained,
         Generation,
+        GoalSummary,
         NoSupervisor,
         NothingGeneratedError,
         Summary,
@@ -78,6 +80,7 @@ _HOMES = {
     "Conditions": "pipeline.conditions",
     "DataError": "pipeline.received_data",
     "Deployment": "model.structure",
+    "DetourProgress": "pipeline.missions",
     "Diagnostic": "errors",
     "DrawingUnavailableError": "graphviz",
     "EventNotPossibleError": "pipeline.manual_run",
@@ -87,6 +90,7 @@ _HOMES = {
     "Findings": "pipeline.findings",
     "GenerateOptions": "targets",
     "Generation": "pipeline.results",
+    "GoalSummary": "pipeline.results",
     "GoalApproach": "pipeline.goals",
     "Goals": "pipeline.goals",
     "InternalError": "errors",
@@ -95,6 +99,7 @@ _HOMES = {
     "LanguageError": "errors",
     "LoadedAutomata": "pipeline.loading",
     "LoadedModel": "pipeline.loading",
+    "MissionProgress": "pipeline.missions",
     "NoStrategyError": "pipeline.manual_run",
     "NoSupervisor": "pipeline.results",
     "NodeLimitError": "errors",
@@ -142,6 +147,7 @@ __all__ = [
     "Conditions",
     "DataError",
     "Deployment",
+    "DetourProgress",
     "Diagnostic",
     "DrawingUnavailableError",
     "EventNotPossibleError",
@@ -152,6 +158,7 @@ __all__ = [
     "GenerateOptions",
     "Generation",
     "GoalApproach",
+    "GoalSummary",
     "Goals",
     "InternalError",
     "InvalidSupervisorError",
@@ -159,6 +166,7 @@ __all__ = [
     "LanguageError",
     "LoadedAutomata",
     "LoadedModel",
+    "MissionProgress",
     "NoStrategyError",
     "NoSupervisor",
     "NodeLimitError",

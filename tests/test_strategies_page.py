@@ -8,11 +8,10 @@ from robosc.diagnostics import codes
 from robosc.errors import Severity
 from robosc.execution.interpreter import InterpretedSystem
 from support.execution import Bench
+from support.goal_porter import LOOP, PAGE, PORTER
 from support.models import bundle_of
 from support.tutorial import play_page
 
-PAGE = (Path(__file__).parents[1] / "docs" / "strategies.md").read_text(encoding="utf-8")
-LOOP, PORTER = re.findall(r"^```robosc file=\w+.rscd\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
 DOOR = "    assume Door.opening leads to Door.ajar\n"
 
 

@@ -97,6 +97,7 @@ class MessageBuilder:
             },
             "age_s": round(age_s, 3),
             "last": None if status.last is None else dict(status.last),
+            "progress": None if status.progress is None else status.progress.plain(),
             "latencies": [[name, *(round(one_ms, 1) for one_ms in times_ms)] for name, *times_ms in status.latencies],
         }
         return _text(message)

@@ -11,6 +11,7 @@ from typing import Any
 from google.protobuf.json_format import MessageToDict
 
 from robosc.errors import RoboscError
+from robosc.execution.runtime.progress import Progress, Standing
 from robosc.supervisor import Supervisor, decode
 from robosc_api.security import Credentials
 from robosc_bridge.daemon.states import OperatorCommand
@@ -19,6 +20,7 @@ from robosc_bridge.terminal.client import (
     DriveState,
     RequestedCommand,
     Snapshot,
+    StrategyProgress,
     UnreachableError,
     WatchResponse,
     events_of,
@@ -304,7 +306,24 @@ def status_of(snapshot: Snapshot) -> Status:
             for item in snapshot.latencies
             if item.count
         ],
+        progress=_progress(snapshot.progress) if snapshot.HasField("progress") else None,
     )
+
+
+def _progress(progress: StrategyProgress) -> Progress:
+    return Progress(
+        aims=tuple(map(_standing, progress.aims)),
+        assumptions=tuple(map(_standing, progress.assumptions)),
+        overdue=tuple(progress.overdue),
+        is_followed=progress.is_followed,
+        approached=progress.approached or None,
+        chosen=progress.chosen or None,
+    )
+
+
+def _standing(item: Any) -> Standing:
+    unmet_s = item.unmet_s if item.HasField("unmet_s") else None
+    return Standing(item.name, item.words, item.is_met, item.times, unmet_s)
 
 
 def _drive(drive: DriveState) -> Drive:

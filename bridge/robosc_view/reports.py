@@ -6,6 +6,7 @@ from enum import StrEnum
 from typing import Any
 
 from robosc.execution.runtime.event_log import Entry
+from robosc.execution.runtime.progress import Progress
 
 
 class SourceKind(StrEnum):
@@ -99,6 +100,7 @@ class Status:
         last: Number of the transition that each component took last; unknown for components that are not named. None:
             it follows from the entries.
         latencies: Times that the bridge measures of itself: name, 50th and 99th percentile and maximum in milliseconds.
+        progress: State of what the strategy aims at and assumes; None: there is no strategy, or it is not reported.
     """
 
     time_s: float
@@ -115,6 +117,7 @@ class Status:
     age_s: float = 0.0
     last: Mapping[str, int] | None = None
     latencies: Sequence[tuple[str, float, float, float]] = ()
+    progress: Progress | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -15,9 +15,12 @@ import time
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from itertools import count
-from typing import Any
+from typing import Annotated, Any
+
+import msgspec
 
 from robosc.automata.plants import PLANT_LOCATIONS
+from robosc.execution.runtime.progress import Progress, Standing
 from robosc.supervisor import Supervisor
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.definition import (
@@ -111,6 +114,7 @@ class StateReader:
             time_s=time_s,
             components=_components(document.get("current")),
             communications=_communications(document.get("communications"), robot),
+            progress=_progress(document.get("progress")),
         )
         return robot, status, list(self._entries(document.get("transitions"), time_s))
 
@@ -231,6 +235,49 @@ def _communications(locations: object, robot: Robot) -> Mapping[str, str]:
         if place not in places.get(name, ()):
             raise DefinitionError(f"where '{name[:100]}' is makes no sense on /state")
     return locations
+
+
+_Text = Annotated[str, msgspec.Meta(max_length=100_000)]
+_MANY = msgspec.Meta(max_length=10_000)
+
+
+class _Standing(msgspec.Struct, frozen=True):
+    """State of an aim or an assumption, as a node writes it."""
+
+    name: _Text
+    words: _Text
+    is_met: bool
+    times: Annotated[int, msgspec.Meta(ge=0)]
+    unmet_s: Annotated[float, msgspec.Meta(ge=0)] | None
+
+
+class _Progress(msgspec.Struct, frozen=True):
+    """Progress of a strategy, as a node writes it."""
+
+    aims: Annotated[tuple[_Standing, ...], _MANY]
+    assumptions: Annotated[tuple[_Standing, ...], _MANY]
+    overdue: Annotated[tuple[_Text, ...], _MANY]
+    is_followed: bool
+    approached: _Text | None
+    chosen: _Text | None
+
+
+def _progress(found: object) -> Progress | None:
+    """Return the progress of the node's strategy; None for a node that reports none."""
+    if found is None:
+        return None
+    try:
+        told = msgspec.convert(found, _Progress)
+    except (msgspec.ValidationError, RecursionError) as error:
+        raise DefinitionError(f"the progress on /state makes no sense: {str(error)[:300]}") from error
+    return Progress(
+        aims=tuple(Standing(*msgspec.structs.astuple(item)) for item in told.aims),
+        assumptions=tuple(Standing(*msgspec.structs.astuple(item)) for item in told.assumptions),
+        overdue=told.overdue,
+        is_followed=told.is_followed,
+        approached=told.approached,
+        chosen=told.chosen,
+    )
 
 
 @dataclass

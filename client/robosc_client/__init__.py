@@ -27,6 +27,7 @@ if TYPE_CHECKING:
         Exploration,
         Formatted,
         Generation,
+        GoalSummary,
         Progress,
         ServerInfo,
         ServerLimits,
@@ -69,6 +70,7 @@ _HOMES = {
     "Formatted": "results",
     "Generate": "tasks",
     "Generation": "results",
+    "GoalSummary": "results",
     "Job": "jobs",
     "JobError": "errors",
     "JobFailure": "jobs",
@@ -118,6 +120,7 @@ __all__ = [
     "Formatted",
     "Generate",
     "Generation",
+    "GoalSummary",
     "Job",
     "JobError",
     "JobFailure",
@@ -150,4 +153,6 @@ __all__ = [
 ]
 
 
-__getattr__ = named_on_use(__name__, _HOMES)
+if not TYPE_CHECKING:
+    # A type checker knows the names from above, and is to find every other one wrong.
+    __getattr__ = named_on_use(__name__, _HOMES)

@@ -11,6 +11,7 @@ from robosc.expressions import Value
 from robosc.pipeline.results import (
     Explained,
     Generation,
+    GoalSummary,
     Outcome,
     Summary,
     SynthesisStatus,
@@ -189,6 +190,7 @@ __all__ = [
     "Exploration",
     "Formatted",
     "Generation",
+    "GoalSummary",
     "Progress",
     "ServerInfo",
     "ServerLimits",

@@ -32,6 +32,7 @@ SYMBOLS = {
     DefinitionKind.STATE: lsp.SymbolKind.EnumMember,
     DefinitionKind.VARIABLE: lsp.SymbolKind.Variable,
     DefinitionKind.ELEMENT: lsp.SymbolKind.Variable,
+    DefinitionKind.MISSION: lsp.SymbolKind.Object,
 }
 COMPLETIONS = {
     DefinitionKind.ROBOT: lsp.CompletionItemKind.Module,
@@ -50,6 +51,7 @@ COMPLETIONS = {
     DefinitionKind.STATE: lsp.CompletionItemKind.EnumMember,
     DefinitionKind.VARIABLE: lsp.CompletionItemKind.Variable,
     DefinitionKind.ELEMENT: lsp.CompletionItemKind.Variable,
+    DefinitionKind.MISSION: lsp.CompletionItemKind.Reference,
 }
 
 TOKEN_TYPES = (
@@ -83,6 +85,7 @@ _TOKENS = {
     DefinitionKind.STATE: "enumMember",
     DefinitionKind.VARIABLE: "variable",
     DefinitionKind.ELEMENT: "variable",
+    DefinitionKind.MISSION: "class",
 }
 
 

@@ -1,16 +1,17 @@
 """Memory that a strategy keeps beside the state: what has been judged in stable states so far.
 
 Each place of it is a truth value. In every stable state it becomes a function of itself and of that state; the
-executor and the game observe it at the same moments.
+executor and the game observe it at the same moments. Observing a state twice changes nothing.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import TYPE_CHECKING
 
 from robosc.automata.structure import Automaton, DiscreteVariable, System
-from robosc.expressions import TRUE, Binary, BooleanType, Expression, StateTest, Unary, VariableRead
-from robosc.model.structure import Assumption, EventKind, Goal, GoalForm
+from robosc.expressions import FALSE, TRUE, Binary, BooleanType, Expression, StateTest, Unary, VariableRead, conjunction
+from robosc.model.structure import Assumption, Detour, EventKind, Goal, GoalForm, Mission
 
 if TYPE_CHECKING:
     from robosc.automata.executable import ExecutableSystem
@@ -133,33 +134,206 @@ def remembering(system: System, places: Sequence[Place]) -> System:
     return replace(system, automata=(*system.automata, memory))
 
 
+class AimKind(StrEnum):
+    """Kind of an aim."""
+
+    GOAL = "goal"
+    VISIT = "visit"
+    DETOUR_VISIT = "visit of a detour"
+
+
 @dataclass(frozen=True, slots=True)
-class Obligations:
-    """Goals and assumptions of a robot, with the memory that judging them needs.
+class Aim:
+    """A goal, or a visit of a mission or of one of its detours: the strategy has one mode for each.
 
     Attributes:
-        goals: Condition of each goal, to be true again and again.
-        assumptions: Condition of each assumption, true again and again.
-        cancels: Own cancels of the executor, in its order.
-        places: Places of the memory: of the cancels, of the assumptions, of the goals.
+        name: Name in words, unique in the model: `goal 1`, `visit 2 of mission rounds`.
+        kind: Kind.
+        condition: Condition over the state and the memory that is to be true again and again.
+        number: Number of the goal from 0; of a visit in its mission, where those of detours follow its own.
+        mission: Number of the mission from 0; None for a goal.
+        visit: Condition that the visit is about, as it is written; None for a goal.
     """
 
-    goals: tuple[Expression, ...]
+    name: str
+    kind: AimKind
+    condition: Expression
+    number: int
+    mission: int | None = None
+    visit: Expression | None = None
+
+
+def counted(aims: Collection[Aim]) -> str:
+    """Return the number of goals and visits in words: `1 goal and 3 visits`."""
+    goals = sum(item.kind is AimKind.GOAL for item in aims)
+    counts = (("goal", goals), ("visit", len(aims) - goals))
+    return " and ".join(f"{count} {word}{'s' if count > 1 else ''}" for word, count in counts if count)
+
+
+@dataclass(frozen=True, slots=True)
+class Journey:
+    """A mission as aims.
+
+    Attributes:
+        aims: Its visits, then those of each detour.
+        exclusive: Places of the memory in groups; in each group at most one is true at a time: of the mission, where it
+            is at its first visit if none is true, then of each detour, which is idle if none is true.
+    """
+
+    aims: tuple[Aim, ...]
+    exclusive: tuple[tuple[Place, ...], ...]
+
+
+@dataclass(frozen=True, slots=True)
+class _Stage:
+    """Stage of a mission or a detour.
+
+    Attributes:
+        here: Condition that it is the one that the mission or detour is at.
+        is_passed: Condition on a stable state under which it is left at once for the next one.
+    """
+
+    here: Expression
+    is_passed: Expression
+
+
+def journey(mission: Mission, number: int) -> Journey:
+    """Return a mission as aims, with the memory that it needs.
+
+    Each update takes in, at once, that any number of visits are passed in one stable state: its size is proportional to
+    the number of visits.
+
+    Args:
+        mission: The mission.
+        number: Its number in the model, from 0.
+    """
+    name = f"mission {mission.name}"
+    asked = () if mission.condition is None else (holds(mission.condition),)
+    visits = [holds(item) for item in mission.visits]
+    names = [f"{name} is at visit {visit}" for visit in range(2, len(visits) + 1)]
+    later = [_remembered(item) for item in names]
+    at = [_negated(_any(later)), *later]
+    stages = [_Stage(*item) for item in zip(at, visits, strict=True)]
+    places = []
+    for place, stands in enumerate(names, start=1):
+        # One whole round at most: where every visit is true, it stays.
+        moved = Binary("or", _arrives(stages, place), conjunction(at[place], *visits))
+        places.append(Place(stands, conjunction(*asked, moved)))
+    aims: list[Aim] = []
+    groups = [tuple(places)]
+    under_way: list[Expression] = []
+    for order, detour in enumerate(mission.detours, start=1):
+        title = f"detour {order} of {name}"
+        group = _detour_places(detour, title, asked)
+        groups.append(group)
+        under_way += [item.read for item in group]
+        for visit, (condition, place_) in enumerate(zip(detour.visits, group, strict=True), start=1):
+            target = _negated(place_.read)
+            place_number = len(mission.visits) + len(aims)
+            aims.append(Aim(f"visit {visit} of {title}", AimKind.DETOUR_VISIT, target, place_number, number, condition))
+    own = [
+        Aim(
+            f"visit {visit + 1} of {name}",
+            AimKind.VISIT,
+            _any([*map(_negated, asked), _negated(at[visit]), visits[visit], *under_way]),
+            visit,
+            number,
+            condition,
+        )
+        for visit, condition in enumerate(mission.visits)
+    ]
+    return Journey((*own, *aims), tuple(groups))
+
+
+def _detour_places(detour: Detour, title: str, asked: Sequence[Expression]) -> tuple[Place, ...]:
+    """Return the places of a detour, one for each visit; where none is true it is idle.
+
+    Args:
+        detour: The detour.
+        title: Its name.
+        asked: Condition of its mission, if it has one.
+    """
+    names = [f"{title} is at visit {visit}" for visit in range(1, len(detour.visits) + 1)]
+    at = [_remembered(name) for name in names]
+    # Being idle is a stage, too, which is passed where the detour is wanted.
+    idle = _Stage(_negated(_any(at)), holds(detour.trigger))
+    stages = [idle, *(_Stage(here, holds(visit)) for here, visit in zip(at, detour.visits, strict=True))]
+    return tuple(Place(name, conjunction(*asked, _arrives(stages, place))) for place, name in enumerate(names, start=1))
+
+
+def _arrives(stages: Sequence[_Stage], place: int) -> Expression:
+    """Return the condition that a stage is the first one that is not passed, from the current one on, round and round.
+
+    Args:
+        stages: The stages, in their order.
+        place: Place of the stage among them.
+    """
+    # Before it come those behind it, the farthest first. Chains lean to the left, so that they may be long.
+    found: Expression | None = None
+    for stage in (*stages[place + 1 :], *stages[:place]):
+        comes = stage.here if found is None else Binary("or", found, stage.here)
+        found = Binary("and", comes, stage.is_passed)
+    here = stages[place].here
+    comes = here if found is None else Binary("or", found, here)
+    return Binary("and", comes, _negated(stages[place].is_passed))
+
+
+def _remembered(name: str) -> Expression:
+    return VariableRead(MEMORY, name)
+
+
+def _negated(condition: Expression) -> Expression:
+    return TRUE if condition == FALSE else FALSE if condition == TRUE else Unary("not", condition)
+
+
+def _any(conditions: Iterable[Expression]) -> Expression:
+    found: Expression = FALSE
+    for item in conditions:
+        found = item if found == FALSE else found if item == FALSE else Binary("or", found, item)
+    return found
+
+
+@dataclass(frozen=True, slots=True)
+class Obligations:
+    """Aims and assumptions of a robot, with the memory that judging them needs.
+
+    Attributes:
+        aims: Aims: the goals, then the visits of each mission, those of its detours behind its own.
+        assumptions: Condition of each assumption, true again and again.
+        cancels: Own cancels of the executor, in its order.
+        places: Places of the memory: of the cancels, of the assumptions, of the goals, of the missions.
+        exclusive: Groups of places, in each of which at most one is true at a time.
+    """
+
+    aims: tuple[Aim, ...]
     assumptions: tuple[Expression, ...]
     cancels: tuple[Cancel, ...]
     places: tuple[Place, ...]
+    exclusive: tuple[tuple[Place, ...], ...]
 
 
 def obligations(executable: "ExecutableSystem") -> Obligations:
-    """Return the goals and assumptions of an executable system's model."""
+    """Return the aims and assumptions of an executable system's model."""
     cancels = tuple(own_cancels(executable))
     model = executable.model
     owed = [judgement(item, f"assumption {number}") for number, item in enumerate(model.assumptions, start=1)]
-    wanted = [judgement(item, f"goal {number}") for number, item in enumerate(model.goals, start=1)]
+    names = [f"goal {number}" for number, _ in enumerate(model.goals, start=1)]
+    wanted = [judgement(item, name) for item, name in zip(model.goals, names, strict=True)]
+    goals = (
+        Aim(name, AimKind.GOAL, item.condition, number)
+        for number, (name, item) in enumerate(zip(names, wanted, strict=True))
+    )
+    journeys = [journey(mission, number) for number, mission in enumerate(model.missions)]
+    exclusive = tuple(group for item in journeys for group in item.exclusive)
     judged = (item.place for item in (*owed, *wanted))
     return Obligations(
-        tuple(item.condition for item in wanted),
+        (*goals, *(aim for item in journeys for aim in item.aims)),
         tuple(item.condition for item in owed),
         cancels,
-        (*(place for cancel in cancels for place in cancel.places), *(place for place in judged if place)),
+        (
+            *(place for cancel in cancels for place in cancel.places),
+            *(place for place in judged if place),
+            *(place for group in exclusive for place in group),
+        ),
+        exclusive,
     )

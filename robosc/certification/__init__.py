@@ -35,4 +35,6 @@ __all__ = [
     "prepare",
 ]
 
-__getattr__ = named_on_use(__name__, _HOMES)
+if not TYPE_CHECKING:
+    # A type checker knows the names from above, and is to find every other one wrong.
+    __getattr__ = named_on_use(__name__, _HOMES)

@@ -20,6 +20,7 @@ _WORDS = {
     "behaviour": "",
     "communications": "communication",
     "components": "component",
+    "detours": "detour",
     "enums": "enum",
     "goals": "goal",
     "interface": "middleware type",
@@ -29,7 +30,9 @@ _WORDS = {
     "is_marked": "marked",
     "is_never": "'never'",
     "is_synthesis": "part in synthesis",
+    "missions": "mission",
     "objects": "object",
+    "preferences": "preference",
     "properties": "property",
     "provides": "provide statement",
     "requirements": "requirement",
@@ -38,6 +41,7 @@ _WORDS = {
     "transitions": "transition",
     "updates": "update",
     "variables": "variable",
+    "visits": "visit",
 }
 """Names of the fields of the structure in a model."""
 

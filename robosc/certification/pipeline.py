@@ -14,7 +14,9 @@ import msgspec
 
 from robosc import explanation as explanations
 from robosc.automata import ExecutableSystem, Semantics
+from robosc.automata.goal_memory import counted
 from robosc.certification.certify import certify
+from robosc.certification.goals import GoalExplanation, goal_explanation
 from robosc.certification.progress import Progress
 from robosc.controller_properties import check_controller, check_strategy, controller_findings
 from robosc.errors import Diagnostic, InternalError, NodeLimitError, sorted_diagnostics
@@ -23,7 +25,7 @@ from robosc.model.layers import layer_findings, without_controller_findings
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
-from robosc.strategies import goal_findings, layer_goal_findings, synthesize_strategy
+from robosc.strategies import blame_goals, goal_findings, goals_and_missions, layer_goal_findings, synthesize_strategy
 from robosc.supervisor import CheckResult, Supervisor
 from robosc.synthesis import (
     EngineOptions,
@@ -40,9 +42,6 @@ if TYPE_CHECKING:
     from robosc.explanation import EmptyExplanation
 
 LIVELOCK_REASON = "no supervisor is made, because silent steps never end (--allow-livelock overrides this)"
-
-
-GOALS_REASON = "no strategy is made for the goals"
 
 
 class OutcomeStatus(StrEnum):
@@ -65,6 +64,7 @@ class SynthesisOutcome:
         statistics: Figures of the synthesis, or None where there was none.
         reason: Reason why there is no supervisor, in one sentence; empty where there is one.
         explanation: Explanation of what is to blame where no supervisor exists.
+        goals: Explanation of what is to blame where goals cannot be reached.
     """
 
     status: OutcomeStatus
@@ -73,6 +73,7 @@ class SynthesisOutcome:
     statistics: Statistics | None = None
     reason: str = ""
     explanation: "EmptyExplanation | None" = None
+    goals: GoalExplanation | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -201,15 +202,30 @@ def make_supervisor(
         return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, LIVELOCK_REASON)
     certificate = msgspec.structs.replace(certificate, controller=properties.certified())
     strategy = None
-    if model.goals and deployment is Deployment.CONTROLLER:
-        on_progress(Progress("strategy", f"{len(model.goals)} goal{'s' if len(model.goals) > 1 else ''}"))
+    if (model.goals or model.missions) and deployment is Deployment.CONTROLLER:
+        on_progress(Progress("strategy", counted(problem.system.obligations.aims)))
         found = synthesize_strategy(
             problem.system, result.added, engine=engine, should_stop=should_stop, on_progress=report
         )
-        diagnostics = sorted_diagnostics((*diagnostics, *goal_findings(places, found)))
+        blame = None
+        if found.unreached:
+            on_progress(Progress("strategy", "what keeps the goals from being reached"))
+            blame = blame_goals(
+                problem.system, result.added, found, engine=engine, should_stop=should_stop, on_progress=report
+            )
+        diagnostics = sorted_diagnostics(
+            (*diagnostics, *goal_findings(problem.system.obligations.aims, places, found, blame))
+        )
         strategy = found.strategy
         if strategy is None:
-            return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, GOALS_REASON)
+            goals = None
+            if blame is not None:
+                without = Supervisor.supervising(problem.system, result.added, certificate)
+                goals = goal_explanation(without, places, found, blame)
+            reason = f"no strategy is made for the {goals_and_missions(model)}"
+            return SynthesisOutcome(
+                OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, reason, goals=goals
+            )
         check = check_strategy(problem.system, result.added, strategy, semantics=semantics, should_stop=should_stop)
         if check.missed is not None:
             raise InternalError(f"the strategy misses a goal after {', '.join(check.missed.trace)}")

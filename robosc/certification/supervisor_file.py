@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from robosc._version import __version__
 from robosc.automata import ExecutableSystem, Semantics, System
 from robosc.automata.compile import State
+from robosc.automata.goal_memory import Aim, AimKind
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import subjects
 from robosc.certification.differences import model_differences
@@ -198,7 +199,9 @@ def verify_supervisor_file(
             executable, supervisor.added, supervisor.strategy, semantics=semantics, should_stop=should_stop
         )
         if goals.missed is not None:
-            faults.append(Fault("goals", _missed(goals.missed.goal), goals.missed.trace, is_shortest=False))
+            aims, number = executable.obligations.aims, goals.missed.goal
+            missed = _missed(None if number is None else aims[number])
+            faults.append(Fault("goals", missed, goals.missed.trace, is_shortest=False))
     faults += [
         Fault(
             item.property.replace(" ", "_"),
@@ -212,10 +215,11 @@ def verify_supervisor_file(
     return FileVerification((), tuple(faults), (*notes, *_beliefs(supervisor.certificate, found)), report)
 
 
-def _missed(goal: int | None) -> str:
-    if goal is None:
+def _missed(aim: Aim | None) -> str:
+    if aim is None:
         return "the strategy chooses a request that is not enabled, or silent steps do not end under it"
-    return f"under the strategy goal {goal + 1} may never come true again although every assumption does"
+    what = f"{aim.name} may never come true again" if aim.kind is AimKind.GOAL else f"{aim.name} may never be reached"
+    return f"under the strategy {what} although every assumption does"
 
 
 def _notes(certificate: Certificate, bundle: Bundle | None) -> list[str]:

@@ -18,6 +18,7 @@ from robosc.source import visible
 if TYPE_CHECKING:
     from robosc.certification.supervisor_file import StateInWords
     from robosc.pipeline.manual_run import ManualRun
+    from robosc.pipeline.missions import MissionProgress
     from robosc.pipeline.saved_runs import ModelOfTest
     from robosc.pipeline.simulation import Run
     from robosc.pipeline.steps import Step
@@ -299,6 +300,7 @@ class _JsonReport:
                 "skipped": list(step.skipped),
                 "unknown": list(step.unknown),
                 "reached": list(step.reached),
+                "visits": list(step.visits),
                 "strategy": step.chosen,
                 "state": state_json(step.state),
             }
@@ -316,6 +318,7 @@ class _JsonReport:
                 "state": state_json(run_.state),
                 "marked": run_.is_marked,
                 "goals": list(run_.reached),
+                "missions": [mission_json(item) for item in run_.missions],
                 "strategy": run_.chosen,
                 "enabled": list(run_.enabled),
                 "disabled": [{"event": event, "why": list(run_.reasons(event))} for event in disabled],
@@ -337,6 +340,20 @@ def state_json(state: "StateInWords") -> dict[str, object]:
         "components": dict(state.components),
         "variables": dict(state.variables),
         "communications": dict(state.communications),
+    }
+
+
+def mission_json(mission: "MissionProgress") -> dict[str, object]:
+    """Progress of a mission as JSON values."""
+    return {
+        "mission": mission.name,
+        "asked": mission.is_asked,
+        "visit": mission.visit,
+        "condition": mission.condition,
+        "round": mission.is_round,
+        "detours": [
+            {"detour": item.number, "visit": item.visit, "condition": item.condition} for item in mission.detours
+        ],
     }
 
 

@@ -60,8 +60,9 @@ def step_lines(number: int, step: "Step", before: "StateInWords") -> list[str]:
     lines = [f"{number:4}  {': '.join(filter(None, (event_text(step), changes_text(before, step.state))))}"]
     if step.provided is not None:
         lines.append(f"      sends {json.dumps(step.provided, default=str)}")
-    if step.reached:
-        lines.append(f"      reached: goal {', '.join(map(str, step.reached))}")
+    goals = [f"goal {', '.join(map(str, step.reached))}"] if step.reached else []
+    if goals or step.visits:
+        lines.append(f"      reached: {', '.join([*goals, *step.visits])}")
     lines += [f"      unknown: {item}" for item in step.unknown]
     lines += [f"      unknown: {item} keeps its value" for item in step.skipped]
     return lines
@@ -79,8 +80,12 @@ def state_lines(run_: "ManualRun") -> list[str]:
 
 
 def _strategy_lines(run_: "ManualRun") -> list[str]:
-    """Return which goals are true and what the strategy chooses, in lines; nothing where there is no strategy."""
+    """Return which goals are true, how far missions are, and what the strategy chooses; nothing without a strategy."""
     if not run_.has_strategy:
         return []
     goals = ", ".join(f"{number} {'true' if is_true else 'not yet'}" for number, is_true in enumerate(run_.reached, 1))
-    return [f"goals     {goals}", f"strategy  {run_.chosen or 'waits'}"]
+    return [
+        *([f"goals     {goals}"] if goals else []),
+        *(f"mission   {item}" for item in run_.missions),
+        f"strategy  {run_.chosen or 'waits'}",
+    ]

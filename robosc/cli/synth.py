@@ -35,6 +35,7 @@ from robosc.source import Bundle
 
 if TYPE_CHECKING:
     from robosc.certification import SynthesisOutcome
+    from robosc.certification.goals import GoalExplanation
     from robosc.explanation import EmptyExplanation
 
 
@@ -198,10 +199,26 @@ def report_reasons(outcome: Reasons, bundle: Bundle) -> None:
         sys.stderr.write(f"{bundle.main.name}: {outcome.reason}\n")
     if outcome.explanation is not None:
         sys.stderr.write(empty_text(outcome.explanation))
+    goals = goals_explained(outcome)
+    if goals is not None:
+        sys.stderr.write(f"{goals}\n")
+        if goals.counter is not None:
+            sys.stderr.write("'robosc simulate' with '--counter-strategy' plays the surroundings, against you\n")
+
+
+def goals_explained(outcome: Reasons) -> "GoalExplanation | None":
+    """Return the explanation why goals cannot be reached; None if that is not the reason, or a server's answer."""
+    found: GoalExplanation | None = getattr(outcome, "goals", None)
+    return found
 
 
 def reasons_json(outcome: Reasons) -> dict[str, object]:
     """Return the reason why there is no supervisor, as JSON values."""
     from robosc.explanation import document
 
-    return {"reason": outcome.reason, "explanation": document(outcome.explanation) if outcome.explanation else None}
+    goals = goals_explained(outcome)
+    return {
+        "reason": outcome.reason,
+        "explanation": document(outcome.explanation) if outcome.explanation else None,
+        **({} if goals is None else {"goals": goals.document()}),
+    }

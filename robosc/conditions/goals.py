@@ -1,10 +1,10 @@
-"""Goals and assumptions in the words of the language, and what a strategy chooses for each goal."""
+"""Goals, visits and assumptions in the words of the language, and what a strategy chooses for each goal and visit."""
 
 from dataclasses import dataclass
 
 from robosc.conditions.rendering import Formulas, in_words
 from robosc.expressions import Expression
-from robosc.model.structure import Assumption, Goal, GoalForm
+from robosc.model.structure import Assumption, Goal, GoalForm, Model
 from robosc.supervisor import DecisionDiagram, Supervisor
 from robosc.supervisor.diagram import diagram_domains
 
@@ -14,13 +14,15 @@ Formula = tuple[str, DecisionDiagram, Expression | None]
 
 @dataclass(frozen=True, slots=True)
 class GoalInWords:
-    """Goal with what the strategy chooses to approach it.
+    """Goal, or visit of a mission, with what the strategy chooses to approach it.
 
     Attributes:
-        text: The goal, as a user writes it.
+        name: Name, such as `goal 1` or `visit 2 of mission rounds`.
+        text: The goal, or the visit's condition, as a user writes it.
         choices: Requests in the order in which they are tried, each with the condition for choosing it.
     """
 
+    name: str
     text: str
     choices: tuple[Formula, ...]
 
@@ -35,18 +37,38 @@ def assumption_text(assumption: Assumption) -> str:
     return f"{'allow ' if assumption.is_allowed else ''}{_aim_text(assumption)}"
 
 
+def aims_in_words(supervisor: Supervisor) -> tuple[tuple[str, str], ...]:
+    """Return name and words of each goal and visit of a supervisor's model, in the order of a strategy's modes."""
+    return tuple(
+        (aim.name, goal_text(supervisor.model.goals[aim.number]) if aim.visit is None else in_words(aim.visit, ()))
+        for aim in supervisor.executable.obligations.aims
+    )
+
+
+def assumptions_in_words(model: Model) -> tuple[tuple[str, str], ...]:
+    """Return name and words of each assumption of a model."""
+    return tuple((f"assumption {number}", _aim_text(item)) for number, item in enumerate(model.assumptions, start=1))
+
+
 def goals_in_words(supervisor: Supervisor) -> tuple[GoalInWords, ...]:
-    """Return each goal of a supervisor with what its strategy chooses; nothing where it has no strategy."""
+    """Return each goal and visit of a supervisor with what its strategy chooses; nothing where it has no strategy."""
     if supervisor.strategy is None:
         return ()
     formulas = Formulas(diagram_domains(supervisor.executable.remembering_automata))
     return tuple(
         GoalInWords(
-            goal_text(goal),
+            name,
+            words,
             tuple((choice.event, choice.condition, formulas.formula(choice.condition)) for choice in mode),
         )
-        for goal, mode in zip(supervisor.model.goals, supervisor.strategy.modes, strict=True)
+        for (name, words), mode in zip(aims_in_words(supervisor), supervisor.strategy.modes, strict=True)
     )
+
+
+def goals_and_visits(supervisor: Supervisor) -> str:
+    """Return a word for what the strategy of a supervisor approaches: goals, visits or both."""
+    model = supervisor.model
+    return " and ".join(word for word, items in (("goals", model.goals), ("visits", model.missions)) if items)
 
 
 def _aim_text(aim: Goal | Assumption) -> str:

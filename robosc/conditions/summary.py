@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 import msgspec
 
 from robosc.automata import System
-from robosc.conditions.goals import GoalInWords, assumption_text, goals_in_words
+from robosc.conditions.goals import GoalInWords, assumption_text, goals_and_visits, goals_in_words
 from robosc.conditions.literals import Vocabulary
 from robosc.conditions.rendering import Formulas, diagram_lines, in_words, size_in_words
 from robosc.expressions import TRUE, Expression
@@ -72,6 +72,7 @@ def _diagram_json(diagram: DecisionDiagram, vocabulary: Vocabulary) -> list[dict
 
 def _goal_json(goal: GoalInWords, vocabulary: Vocabulary, components: frozenset[str]) -> dict[str, object]:
     return {
+        "name": goal.name,
         "goal": goal.text,
         "choices": [
             {
@@ -167,16 +168,20 @@ def added_lines(supervisor: Supervisor, system: System) -> list[str]:
 
 
 def strategy_lines(supervisor: Supervisor) -> list[str]:
-    """Return the choices of the strategy for people, goal by goal, then what is assumed; nothing without a strategy."""
+    """Return the choices of the strategy for people, goal by goal and visit by visit, then what is assumed.
+
+    There are none without a strategy.
+    """
     components = _components(supervisor)
     goals = goals_in_words(supervisor)
     if not goals:
         return []
     vocabulary = Vocabulary(diagram_domains(supervisor.executable.remembering_automata), components)
     short = short_diagrams(diagram for goal in goals for _, diagram, formula in goal.choices if formula is None)
-    lines = ["the strategy approaches its goals in turn; it requests the first that applies"]
-    for number, goal in enumerate(goals, start=1):
-        lines += [f"  {row}" for row in _wrapped(f"for goal {number}, {goal.text}")]
+    what = goals_and_visits(supervisor)
+    lines = [f"the strategy approaches its {what} in turn; it requests the first that applies"]
+    for goal in goals:
+        lines += [f"  {row}" for row in _wrapped(f"for {goal.name}, {goal.text}")]
         rows: list[tuple[str, list[str]]] = []
         for event, diagram, formula in goal.choices:
             parts = _parts(diagram, formula, vocabulary, components, short)

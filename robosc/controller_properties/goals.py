@@ -1,5 +1,7 @@
 """Check of a strategy: under it every goal comes true again and again, as long as every assumption does.
 
+A visit of a mission is a goal here, too: that the mission is not at it any more.
+
 All that the surroundings can do is followed, state by state, on the automaton of the executor; of the controller only
 what the strategy chooses. A goal is missed where a cycle has a turn of the controller on it and turns at which each
 assumption is true, but none at which the goal is. Source of fair cycles: E. A. Emerson and C.-L. Lei, "Modalities for
@@ -37,7 +39,8 @@ class MissedGoal:
     """Run under a strategy that misses a goal for ever.
 
     Attributes:
-        goal: Number of the goal, from 0; None where silent steps do not end, or a chosen request is not enabled.
+        goal: Number of the goal or visit, from 0; None where silent steps do not end, or a chosen request is not
+            enabled.
         trace: Events that lead to where it begins.
     """
 
@@ -77,7 +80,7 @@ class StrategyRun:
             return tuple(lambda state, holds=holds: holds(state, NO_DATA) is True for holds in functions)
 
         self._updates = compiled(place.update for place in owed.places)
-        self._goals = compiled(owed.goals)
+        self._goals = compiled(item.condition for item in owed.aims)
         self._assumptions = compiled(owed.assumptions)
         self._modes = tuple(
             tuple((item.event, state_predicate(system, item.condition)) for item in mode) for mode in strategy.modes
@@ -95,7 +98,7 @@ class StrategyRun:
         return tuple(update(whole) for update in self._updates)
 
     def goals(self, state: State, memory: Memory) -> tuple[bool, ...]:
-        """Return for each goal True if it is true."""
+        """Return for each goal and visit True if it is true."""
         whole = self._whole(state, memory)
         return tuple(goal(whole) for goal in self._goals)
 
@@ -144,7 +147,7 @@ def check_strategy(
             return StrategyCheck(result, len(search.turns), search.lost)
     except TooManyChoicesError:
         return StrategyCheck("not checked", len(search.turns))
-    missed = search.missed(len(executable.obligations.goals))
+    missed = search.missed(len(executable.obligations.aims))
     return StrategyCheck("passed" if missed is None else "failed", len(search.turns), missed)
 
 

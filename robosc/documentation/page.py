@@ -12,6 +12,8 @@ from robosc.documentation.sentences import (
     enum_sentences,
     goal_sentence,
     invariant_sentence,
+    mission_sentences,
+    preference_sentence,
     provide_sentences,
     requirement_sentence,
     type_cell,
@@ -89,14 +91,21 @@ def _invariant_count(model: Model) -> str:
 
 
 def _goal_rows(model: Model) -> list[tuple[str, int, str]]:
-    """The rows of goals and assumptions; none where the model has none of them."""
-    if not model.goals and not model.assumptions:
-        return []
-    allowed = sum(item.is_allowed for item in model.assumptions)
-    return [
-        ("goals", len(model.goals), ""),
-        ("assumptions", len(model.assumptions), f"{allowed} that the robot may break" if allowed else ""),
-    ]
+    """The rows of goals and assumptions, of missions and of preferences; none where the model has none of them."""
+    rows: list[tuple[str, int, str]] = []
+    if model.goals or model.assumptions:
+        allowed = sum(item.is_allowed for item in model.assumptions)
+        rows += [
+            ("goals", len(model.goals), ""),
+            ("assumptions", len(model.assumptions), f"{allowed} that the robot may break" if allowed else ""),
+        ]
+    if model.missions:
+        visits = count(sum(len(mission.visits) for mission in model.missions), "visit")
+        detours = sum(len(mission.detours) for mission in model.missions)
+        rows.append(("missions", len(model.missions), f"{visits}, {count(detours, 'detour')}" if detours else visits))
+    if model.preferences:
+        rows.append(("preferences", len(model.preferences), ""))
+    return rows
 
 
 def _kind_counts(kinds: Sequence[CommunicationKind]) -> list[str]:
@@ -246,7 +255,7 @@ def _data_types(model: Model) -> str:
     return blocks(heading(2, "Data types"), *enums, *objects)
 
 
-# Requirements, goals and data of requests
+# Requirements, goals, missions and data of requests
 
 
 def _requirements(model: Model) -> str:
@@ -259,6 +268,8 @@ def _requirements(model: Model) -> str:
 def _goals(model: Model) -> str:
     sections = (
         ("Goals", map(goal_sentence, model.goals)),
+        ("Missions", map(mission_sentences, model.missions)),
+        ("Preferences", map(preference_sentence, model.preferences)),
         ("Assumptions", map(assumption_sentence, model.assumptions)),
     )
     listed = [(title, list(sentences)) for title, sentences in sections]

@@ -1,4 +1,4 @@
-"""Requirements, data of requests and rules of enums in sentences."""
+"""Requirements, goals, missions, data of requests and rules of enums in sentences."""
 
 from collections.abc import Sequence
 
@@ -11,7 +11,9 @@ from robosc.model.structure import (
     Goal,
     GoalForm,
     Invariant,
+    Mission,
     ObjectValue,
+    Preference,
     Provide,
     ProvidedValue,
     Requirement,
@@ -56,6 +58,35 @@ def assumption_sentence(assumption: Assumption) -> str:
     else:
         start = f"The surroundings bring about again and again{allowed}"
     return _listed(start, _ALL_AT_ONCE, conditions)
+
+
+def mission_sentences(mission: Mission) -> str:
+    """Describe a mission in sentences: its visits in their order, then its detours."""
+    start = f"{code(mission.name)}: "
+    if mission.condition is not None:
+        start += f"While {code(expression_text(mission.condition))}, the robot reaches, round after round, "
+    else:
+        start += "The robot reaches, round after round, "
+    texts = [f"{start}{_in_turn(mission.visits)}."]
+    texts += [
+        f"Whenever {code(expression_text(detour.trigger))}, it reaches before that {_in_turn(detour.visits)}."
+        for detour in mission.detours
+    ]
+    return " ".join(texts)
+
+
+def _in_turn(visits: Sequence[Expression]) -> str:
+    """Conditions that are reached one after the other."""
+    return ", then ".join(code(expression_text(visit)) for visit in visits)
+
+
+def preference_sentence(preference: Preference) -> str:
+    """Describe a preference in a sentence."""
+    if not preference.preferred or not preference.others:
+        return "A preference without effect: one of its sides names no request."
+    verb = "is" if len(preference.preferred) == 1 else "are"
+    others = codes(preference.others)
+    return f"{codes(preference.preferred)} {verb} requested rather than {others}, where both lead nearer to a goal."
 
 
 _ALL_AT_ONCE = "a state where all of these hold"

@@ -181,11 +181,15 @@ class _Names:
 
     def _is_communication_wanted(self) -> bool:
         item = self._place.item
-        if item in (("requirement",), ("provide",)) or item[-1:] == ("disables",):
-            return True
         # Behind `requirement {` the item of the brace is the requirement itself.
-        opened = self._place.open[-1:] and self._place.open[-1]
-        return bool(opened) and (opened == ("requirement",) or opened[-1:] == ("disables",))
+        opened = self._place.open[-1] if self._place.open else ()
+        return any(
+            words in (("requirement",), ("provide",), ("prefer",))
+            or words[-1:] == ("disables",)
+            # Behind the braces of its first side, an item begins anew with `over`.
+            or (words[:1] in (("prefer",), ("over",)) and words[-1:] == ("over",))
+            for words in (item, opened)
+        )
 
     def _is_property_wanted(self) -> bool:
         item = self._place.item

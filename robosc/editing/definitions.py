@@ -29,6 +29,7 @@ class DefinitionKind(StrEnum):
     STATE = "state"
     VARIABLE = "variable"
     ELEMENT = "element"
+    MISSION = "mission"
 
 
 COMMUNICATIONS = frozenset(
@@ -59,6 +60,7 @@ _COMMUNICATION_KINDS = {syntax.Service: DefinitionKind.SERVICE, syntax.Action: D
 _ITEM_KINDS = {
     syntax.Interface: DefinitionKind.INTERFACE,
     syntax.Constant: DefinitionKind.CONSTANT,
+    syntax.Mission: DefinitionKind.MISSION,
 }
 
 
@@ -79,7 +81,7 @@ def definitions(file: syntax.File) -> Iterator[Definition]:
                 yield _defined(DefinitionKind.ENUM, item.name, item)
                 for rule in item.rules:
                     yield _defined(DefinitionKind.ENUM_VALUE, rule.value, item, item.name.text)
-            case syntax.Interface() | syntax.Constant():
+            case syntax.Interface() | syntax.Constant() | syntax.Mission():
                 yield _defined(_ITEM_KINDS[type(item)], item.name, item)
     for node in walk(file):
         if isinstance(node, syntax.Quantifier):

@@ -36,7 +36,9 @@ def hover_text(
     paragraphs = ["\n".join(("```robosc", *shown, "```"))]
     owner = f" of `{definition.owner}`" if definition.owner else ""
     paragraphs.append(f"{definition.kind}{owner}")
-    paragraphs.append(_used(holders))
+    if definition.kind is not DefinitionKind.MISSION:
+        # No statement names a mission.
+        paragraphs.append(_used(holders))
     if definition.kind in COMMUNICATIONS:
         communication = inspected.communications.get(definition.name)
         if communication is not None:
@@ -95,6 +97,10 @@ def holder_of(parsed: Parsed, offset: int) -> str:
             return f"goal (line {item.location.line})"
         case syntax.Assumption():
             return f"assumption (line {item.location.line})"
+        case syntax.Mission():
+            return f"mission `{item.name.text}`"
+        case syntax.Preference():
+            return f"preference (line {item.location.line})"
         case syntax.Provide():
             return f"provide (line {item.location.line})"
         case syntax.Component():

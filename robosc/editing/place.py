@@ -14,10 +14,14 @@ _ITEMS = frozenset(
 )
 """Words that begin an item of a list."""
 
-_ROBOT_ITEMS = frozenset({"goal", "assume"})
+_ROBOT_ITEMS = frozenset({"goal", "assume", "mission", "prefer"})
 """Words that begin an item of a robot, where no name can stand."""
 
-_BEFORE_OPERANDS = frozenset("allow always assume constant else eventually goal in never not once then".split())
+_BEFORE_OPERANDS = frozenset(
+    """
+    allow always assume constant else eventually goal in mission never not once over prefer then visit while
+    """.split()
+)
 """Free words that a name follows, unless they are names themselves."""
 
 _SIGNS_BEHIND = frozenset({"{", "}", ")", "]", "true", "false", "value"})

@@ -22,7 +22,10 @@ MAXIMUM_VIOLATIONS = 1000
 """Violations that are reported one by one: more are only counted."""
 
 KINDS = frozenset(
-    ("event", "unexpected", "unknown", "release", "blocked", "fault", "stop", "resume", "restart", "dropped")
+    (
+        *("event", "unexpected", "unknown", "release", "blocked", "fault", "stop", "resume", "restart", "dropped"),
+        *("reached", "approach", "owed", "met"),
+    )
 )
 """Kinds of entries."""
 

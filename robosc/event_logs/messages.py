@@ -50,8 +50,9 @@ _SECONDS_END = 1 << 31
 _LONGEST_TOKEN = 80
 _MOST_POSES = 2000
 _INFO, _WARN, _ERROR = 20, 30, 40
-_LEVELS = {"event": _INFO, "release": _INFO, "resume": _INFO, "restart": _INFO, "fault": _ERROR}
-_WORDS = ("identifier", "what", "why", "unknown", "count")
+_TOLD = ("event", "release", "resume", "restart", "reached", "approach", "met")
+_LEVELS = {"fault": _ERROR, **dict.fromkeys(_TOLD, _INFO)}
+_WORDS = ("identifier", "aim", "assumption", "what", "why", "unknown", "count")
 
 
 class Message(NamedTuple):
@@ -271,7 +272,7 @@ def _diagnostics(
 
 def _log(entry: LogEntry, stamp: Mapping[str, int], name: str) -> dict[str, Any]:
     level = _LEVELS.get(entry.kind, _WARN)
-    words = [_words(entry.document[field]) for field in _WORDS if field in entry.document]
+    words = [_words(entry.document[field]) for field in _WORDS if entry.document.get(field) is not None]
     words += [f"{pair['key']} = {pair['value']}" for pair in _pairs(entry.data)]
     subject = entry.event if entry.kind == "event" else f"{entry.kind} {entry.event}".strip()
     text = f"{subject}: {', '.join(words)}" if words else subject

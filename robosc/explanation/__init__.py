@@ -56,4 +56,6 @@ __all__ = [
 ]
 
 
-__getattr__ = named_on_use(__name__, _HOMES)
+if not TYPE_CHECKING:
+    # A type checker knows the names from above, and is to find every other one wrong.
+    __getattr__ = named_on_use(__name__, _HOMES)

@@ -5,13 +5,13 @@ from dataclasses import dataclass
 from typing import Any
 
 from robosc.explanation.analysis import Analysis
-from robosc.explanation.conflict import minimal_conflict, minimal_removal
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
 from robosc.explanation.explanations import EmptyExplanation
 from robosc.explanation.parts import Blamed, CounterexampleReport, Path, StateValues
 from robosc.explanation.problems import Problems
 from robosc.explanation.reports import Reporter
 from robosc.explanation.subjects import Words
+from robosc.synthesis.conflict import minimal_conflict, minimal_removal
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.monitor import BoundedMonitor, EffortSpentError
 from robosc.synthesis.result import SynthesisProgress

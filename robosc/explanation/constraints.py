@@ -4,7 +4,7 @@ A supervisor stays a supervisor if a constraint is left out: the system under it
 condition or an invariant, less is forbidden, and with one more marked location, there is one more location to reach. A
 range is left out by updates that stop at its end, as `clamp` does: states from which the variable does not leave its
 range are unchanged, and the other states become safe. So emptiness is monotone, as the search for a minimal set needs
-(see `conflict`), and without any constraint every system with an initial state has a supervisor.
+(see `robosc.synthesis.conflict`), and without any constraint every system with an initial state has a supervisor.
 """
 
 from collections.abc import Collection, Iterable, Iterator, Sequence

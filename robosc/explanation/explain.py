@@ -10,7 +10,6 @@ from robosc.automata.state import subjects
 from robosc.errors import InternalError
 from robosc.explanation.analysis import Analysis, BlockingCause, BlockingCauseKind
 from robosc.explanation.blame import explain_problem
-from robosc.explanation.conflict import minimal_conflict
 from robosc.explanation.explanations import Explanation
 from robosc.explanation.notation import events_text
 from robosc.explanation.parts import EventHere, EventReport, Reason, Remark, StateReport, Stopped
@@ -19,6 +18,7 @@ from robosc.explanation.reports import Reporter
 from robosc.explanation.requests import MAXIMUM_SHOWN, RequestError
 from robosc.explanation.subjects import Words
 from robosc.source import visible
+from robosc.synthesis.conflict import minimal_conflict
 from robosc.synthesis.controlled import ControlledSystem
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import EngineOptions

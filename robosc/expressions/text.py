@@ -41,8 +41,11 @@ _NOT, _NEGATIVE, _OPERAND = 8, 9, 10
 _IMPLIES = 0
 _CONDITIONAL = -1
 
-_SENTENCE = re.compile(" (is|was) ")
-"""Verb of a variable whose name has blanks: no name of the language has any."""
+_SENTENCE = re.compile("(.*) (is|was) ")
+"""Beginning of a sentence, up to its verb: the last, as a name in it may be one, too.
+
+It is a variable whose name has blanks; no name of the language has any.
+"""
 
 
 def automaton_text(name: str, components: Collection[str]) -> str:
@@ -122,7 +125,7 @@ class _Printer:
             case Unary(operator="holds", operand=operand):
                 return f"holds({self.print(operand, depth)[0]})", _OPERAND
             case Unary(operator="not", operand=VariableRead(variable=variable)) if _SENTENCE.search(variable):
-                return _SENTENCE.sub(r" \1 not ", variable, count=1), _OPERAND
+                return _SENTENCE.sub(r"\1 \2 not ", variable, count=1), _OPERAND
             case Unary(operator="not", operand=operand):
                 return f"!{self._within(operand, _NOT, depth)}", _NOT
             case Unary(operand=operand):

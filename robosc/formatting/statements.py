@@ -349,6 +349,8 @@ class _Walker(_Expressions):
             "provide": self._provide,
             "goal": self._aim,
             "assume": self._aim,
+            "mission": self._mission,
+            "prefer": self._preference,
             "incoming": self._communication,
             "outgoing": self._communication,
             "service": self._communication,
@@ -537,6 +539,41 @@ class _Walker(_Expressions):
             self.place += 2
             self.expression(1)
             self._clause(leads, is_alone=is_bracket)
+        self._end(first, level)
+
+    def _mission(self, level: int) -> None:
+        first = self.place
+        self.place += 2
+        if self.texts[self.place] == "while":
+            self.breaks[self.place] = Break.LINE
+            self.place += 1
+            self.expression(1)
+        self._rest_of_body(first, level, self._visits)
+
+    def _visits(self, level: int) -> None:
+        """The visits of a mission, or one of its detours."""
+        first = self.place
+        if self.texts[first] == "on":
+            self.place += 1
+            self.expression(1)
+            self.place += 2
+            self.breaks[self.place] = Break.LINE
+        while self.texts[self.place] in ("visit", "then"):
+            self.place += 1
+            self.expression(1)
+            if self.texts[self.place] == "then":
+                self.breaks[self.place] = Break.LINE
+        self._end(first, level)
+
+    def _preference(self, level: int) -> None:
+        first = self.place
+        self.place += 1
+        is_bracket = self.texts[self.place] == "{"
+        self._communications()
+        over = self.place
+        self.place += 1
+        self._communications()
+        self._clause(over, is_alone=is_bracket)
         self._end(first, level)
 
     def _communications(self) -> None:

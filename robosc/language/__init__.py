@@ -22,4 +22,6 @@ _HOMES = {
 
 __all__ = ["Parsed", "decode_source", "load_bundle", "parse", "read_source"]
 
-__getattr__ = named_on_use(__name__, _HOMES)
+if not TYPE_CHECKING:
+    # A type checker knows the names from above, and is to find every other one wrong.
+    __getattr__ = named_on_use(__name__, _HOMES)

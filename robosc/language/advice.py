@@ -36,6 +36,7 @@ _LEAF_NODES = (
 _SMACH_STATES = "simpleactionstate servicestate monitorstate conditionstate cbstate"
 
 _SAID_ELSEWHERE = {
+    "anywhere": "everywhere any anytime all",
     "action": f"task skill {_LEAF_NODES} {_SMACH_STATES}",
     "array": "list vector sequence",
     "assume": "assumes assumption",
@@ -62,11 +63,14 @@ _SAID_ELSEWHERE = {
     "library": "lib package namespace",
     "links": "link linked link_to maps",
     "marked": "final accepting accept end mark terminal",
+    "mission": "missions task plan route tour itinerary",
     "message": "topic msg msgs event signal channel",
     "needs": "requires require when only_if only if needed",
     "object": "struct class record message dict map",
     "on": "when upon event at",
+    "over": "than before above to",
     "outgoing": "output out pub publisher publish publishes sends emit",
+    "prefer": "prefers preference preferred prioritize prioritise priority",
     "provide": "sends send with_data fill",
     "request": "req goal command call send",
     "requirement": "require requires rule constraint spec property assert ensure",
@@ -74,10 +78,13 @@ _SAID_ELSEWHERE = {
     "robot": "system model program controller main",
     "service": "srv client server rpc service_node servicenode rosservicenode btservicenode servicestate",
     "state": "location mode step phase node",
+    "then": "next than after afterwards followed andthen",
     "transition": "trans edge step tau jump",
     "type": "msg_type message_type datatype data payload",
     "use": "using type of",
+    "visit": "visits goto go go_to reach reaches at first",
     "variable": "var let val def field int bool float double string boolean integer",
+    "while": "when whenever during where if given as",
     "with": "using where has having as",
 }
 """Words of other languages and of robotics for those of ours; one may stand for several, of which one is expected."""
@@ -218,6 +225,8 @@ def _of_words(token: str, expected: Sequence[str], following: Sequence[str]) -> 
     if near is not None and near != token:
         is_message = near in _OF_COMPONENTS and following[0] not in ("message", "topic", "msg")
         return f"Did you mean '{near}{' message' if is_message else ''}'?"
+    if token == "visit" and "'mission'" in expected:
+        return "Put it in a mission, as in 'mission rounds { visit ... }'."
     if "'variable'" in expected and following[0] == ":" and token.isidentifier():
         return "Write 'variable' before it."
     return ""
@@ -258,6 +267,9 @@ def _of_missing_words(before: str, token: str, expected: Sequence[str], followin
                 ("on", token in _PREPOSITIONS),
                 ("transition", token in ("if", "goto")),
                 ("needs", begins_operand),
+                ("visit", begins_operand),
+                ("then", begins_operand),
+                ("over", is_name),
                 ("to", token == "{"),
                 ("(", token[:1].isdigit()),
             )
@@ -295,7 +307,8 @@ def _of_brackets(token: str, expected: Sequence[str]) -> str:
 
 _HOMES = {
     **dict.fromkeys(("component", "datatype", "interface", "requirement", "provide"), "the robot or library"),
-    **dict.fromkeys(("goal", "assume"), "the robot"),
+    **dict.fromkeys(("goal", "assume", "mission", "prefer"), "the robot"),
+    "visit": "a mission",
     **dict.fromkeys(("incoming", "outgoing", "service", "action", "behaviour"), "a component"),
     **dict.fromkeys(("variable", "initial", "marked", "state"), "a behaviour"),
     **dict.fromkeys(("on", "transition"), "a state or behaviour"),

@@ -201,6 +201,18 @@ class Cursor:
             self.report("name-too-long", message, location, "Shorten the name.")
         return syntax.Name(text, location)
 
+    def names(self) -> tuple[syntax.Name, ...]:
+        """Read a name, or several in braces with commas between them."""
+        if not self.takes("{"):
+            return (self.name(),)
+        found: list[syntax.Name] = []
+        if self.texts[self.place] != "}":
+            found.append(self.name())
+            while self.takes(","):
+                found.append(self.name())
+        self.take("}")
+        return tuple(found)
+
     def string(self) -> syntax.Text:
         """Read a text in quotes."""
         index = self.place
@@ -388,13 +400,16 @@ class Cursor:
 
     def _begins_item(self, index: int) -> bool:
         """Return True if a token looks like the first word of an item of an open list."""
-        word = self.texts[index]
+        word, following = self.texts[index], self.texts[index + 1]
         follow = STARTS.get(word)
         if follow is None or not any(word in parsers for parsers in self._lists):
             return False
-        return (
-            self.kinds[index + 1] == _NAME if follow == "a name" else follow is True or self.texts[index + 1] in follow
-        )
+        if word == "on" and "visit" in self._lists[-1]:
+            # A detour begins with any condition.
+            return True
+        if follow == "names":
+            return self.kinds[index + 1] == _NAME or following == "{"
+        return self.kinds[index + 1] == _NAME if follow == "a name" else follow is True or following in follow
 
     def _reads_body(self, begin: int, opening: int) -> bool:
         """Read the list that a broken item still has, if its first word says what the list contains."""

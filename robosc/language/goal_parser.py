@@ -11,6 +11,9 @@ from robosc.language.cursor import Fault, shown
 from robosc.language.expression_parser import ExpressionParser
 from robosc.source import Location
 
+_KINDS = {"goal": "a goal", "assume": "an assumption", "mission": "a mission", "prefer": "a preference"}
+"""Statements about a whole robot, by their first words."""
+
 _ANSWERS_ELSEWHERE = frozenset({"->", "leadsto", "leads_to", "leadsTo"})
 """Signs and words of other languages for `leads to`."""
 
@@ -59,7 +62,7 @@ class GoalParser(ExpressionParser):
 
     def goal(self) -> syntax.Goal:
         """`goal` and what is to be reached."""
-        place = self._first_word("goal")
+        place = self.first_word("goal")
         self.possible("'always'", "'once'")
         if self._is_word("once"):
             self.place += 1
@@ -68,19 +71,18 @@ class GoalParser(ExpressionParser):
 
     def assumption(self) -> syntax.Assumption:
         """`assume` and what the surroundings of the robot owe it."""
-        place = self._first_word("assume")
+        place = self.first_word("assume")
         self.possible("'allow'", "'always'")
         is_allowed = self._is_word("allow")
         self.place += is_allowed
         self.possible("'always'")
         return syntax.Assumption(is_allowed, *self._recurring(_IN_ASSUMPTIONS), place)
 
-    def _first_word(self, word: str) -> Location:
-        """Read the word that the statement begins with; its place."""
+    def first_word(self, word: str) -> Location:
+        """Read the word that a statement about a whole robot begins with; its place."""
         place = self.at(self.take(word))
         if self.is_library:
-            what = "a goal is" if word == "goal" else "an assumption is"
-            message = f"{what} about a whole robot, so it cannot stand in a library"
+            message = f"{_KINDS[word]} is about a whole robot, so it cannot stand in a library"
             self.report("goal-in-library", message, place, "Move it into the robot that imports from here.")
         return place
 
@@ -89,7 +91,13 @@ class GoalParser(ExpressionParser):
         if self.texts[self.place] != word:
             return False
         self.possible("an expression", *(("'always'",) if word == "allow" else ()), ahead=1)
+        if self._is_cut():
+            self.possible("'to'", ahead=2)
         return not self.begins_with_name("leads")
+
+    def _is_cut(self) -> bool:
+        """Return True if the text ends behind a word and `leads`, which may become `leads to`."""
+        return self.texts[self.place + 1 : self.place + 3] == ["leads", ""]
 
     def _recurring(self, unfit: Mapping[str, tuple[str, str]]) -> _Aim:
         """`always eventually E` or `E leads to E`.
@@ -103,11 +111,11 @@ class GoalParser(ExpressionParser):
             if self.texts[begin + 1] == "eventually":
                 self.place += 2
                 return _Aim("always eventually", None, self._only_condition(2))
-            if not self.begins_with_name("leads"):
+            if not (self._is_cut() or self.begins_with_name("leads")):
                 self.place += 1
                 raise self.fault("'eventually'", fix="Write 'eventually' before it.")
-        if self.texts[begin] in unfit and self._is_word(self.texts[begin]):
-            raise self._unfit(*unfit[self.texts[begin]])
+        if self.texts[begin] in unfit and not self._is_cut() and self._is_word(self.texts[begin]):
+            raise self.unfit(*unfit[self.texts[begin]])
         trigger = self.expression()
         self._leads_to(begin)
         return _Aim("leads to", trigger, self.expression())
@@ -127,7 +135,7 @@ class GoalParser(ExpressionParser):
         token = self.texts[self.place]
         if token in _ANSWERS_ELSEWHERE:
             message = f"{shown(token)} does not fit here; expected 'leads'"
-            raise self._unfit(message, f"Write 'leads to' instead of '{token}'.")
+            raise self.unfit(message, f"Write 'leads to' instead of '{token}'.")
         if token == "}" or (token != "leads" and self._begins_item(self.place)):
             # The expression is the end, so the words before it are missing.
             self.place = begin
@@ -135,15 +143,15 @@ class GoalParser(ExpressionParser):
                 f"{shown(self.texts[begin])} does not fit here; expected 'always eventually' before the expression, or "
                 "'leads to' behind it"
             )
-            raise self._unfit(message, "Write 'always eventually' before it.")
+            raise self.unfit(message, "Write 'always eventually' before it.")
         self.take("leads")
         if self.texts[self.place] == "-" and self.texts[self.place + 1] == "to":
-            raise self._unfit("'-' does not fit here; expected 'to'", "Write 'to' instead of '-to'.")
+            raise self.unfit("'-' does not fit here; expected 'to'", "Write 'to' instead of '-to'.")
         if self.texts[self.place] != "to":
             raise self.fault("'to'", fix="Write 'to' before it.")
         self.place += 1
 
-    def _unfit(self, message: str, fix: str) -> Fault:
+    def unfit(self, message: str, fix: str) -> Fault:
         """Return the error that the next token does not fit."""
         self.report("syntax-error", message, self.at(self.place), fix)
         self.place += 1

@@ -13,7 +13,7 @@ _NAME, _NUMBER, _STRING = int(Kind.NAME), int(Kind.NUMBER), int(Kind.STRING)
 _BEGIN_OPERANDS = frozenset({"(", "!", "true", "false", "value"})
 _CONVERSIONS = frozenset({"integer", "double"})
 _BEHIND_OPERANDS = frozenset({"then", "else", "in"})
-_ITEMS = frozenset({"goal", "assume"})
+_ITEMS = frozenset({"goal", "assume", "mission", "prefer"})
 """Free words that begin an item without a sign that tells."""
 
 _BETWEEN = frozenset({",", ":", "..", "in"})
@@ -34,7 +34,7 @@ def is_negation(texts: Sequence[str], kinds: Sequence[int], index: int, word: st
         return False
     following, kind = texts[index + 1], kinds[index + 1]
     if kind == _NAME:
-        return not _is_behind_operand(texts, kinds, index + 1)
+        return not (_is_behind_operand(texts, kinds, index + 1) or _begins_item(texts, kinds, index + 1))
     if following == "if":
         return _is_conditional(texts, kinds, index + 1)
     if following in _CONVERSIONS:
@@ -43,14 +43,31 @@ def is_negation(texts: Sequence[str], kinds: Sequence[int], index: int, word: st
 
 
 def _is_behind_operand(texts: Sequence[str], kinds: Sequence[int], index: int) -> bool:
-    """Return True if the free word at a token stands behind an operand, or begins the next item."""
+    """Return True if the free word at a token can stand behind an operand."""
     word = texts[index]
-    if word in _ITEMS and kinds[index + 1] == _NAME:
-        # The goal of the next item: `goal once not goal always eventually red`.
-        return texts[index + 1] in _ITEMS or not _is_behind_operand(texts, kinds, index + 1)
     # The constant of the next item: `constant A: E = not constant B: E = red`.
     begins_constant = word == "constant" and kinds[index + 1] == _NAME and texts[index + 2] == ":"
     return word in _BEHIND_OPERANDS or begins_constant or (word == "leads" and texts[index + 1] == "to")
+
+
+def _begins_item(texts: Sequence[str], kinds: Sequence[int], index: int) -> bool:
+    """Return True if the free word at a token begins a goal, an assumption, a mission or a preference.
+
+    Of a name that could be such a word itself, as in `not mission goal while ...`, only the sign behind it tells.
+    """
+    word, following, behind = texts[index : index + 3]
+    if word == "prefer" and following == "{":
+        # Behind the condition of a mission that is called so, too, a brace opens.
+        return behind == "}" or texts[index + 3] in (",", "}")
+    if kinds[index + 1] != _NAME:
+        return False
+    if word in ("goal", "assume"):
+        # The goal of the next item: `goal once not goal always eventually red`.
+        return not _is_behind_operand(texts, kinds, index + 1)
+    if word == "mission" and behind == "{":
+        return True
+    is_head = (word, behind) in (("mission", "while"), ("prefer", "over"))
+    return is_head and following not in _ITEMS and not _is_behind_operand(texts, kinds, index + 1)
 
 
 def _is_conditional(texts: Sequence[str], kinds: Sequence[int], index: int) -> bool:

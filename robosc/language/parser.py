@@ -13,8 +13,8 @@ from robosc.errors import Diagnostic, RelatedPlace, sorted_diagnostics
 from robosc.language import syntax
 from robosc.language.cursor import Extent, Fault, TooManyFaults, shown
 from robosc.language.expression_parser import ExpressionParser
-from robosc.language.goal_parser import GoalParser
 from robosc.language.limits import FRAMES_PER_LEVEL, MAXIMUM_NESTING
+from robosc.language.mission_parser import MissionParser
 from robosc.language.tokens import Kind, Places, Tokens, obstacle, readable_tokens, tokenize
 from robosc.recursion import allow_depth
 from robosc.source import SourceFile
@@ -74,7 +74,7 @@ def parse(file: SourceFile) -> Parsed:
     return Parsed(None if diagnostics else tree, diagnostics, tree, tuple(parser.extents), parser.expected)
 
 
-class _Parser(GoalParser):
+class _Parser(MissionParser):
     """Reads definitions."""
 
     def __init__(self, file: SourceFile, tokens: Tokens, places: Places) -> None:
@@ -87,7 +87,13 @@ class _Parser(GoalParser):
             "requirement": self._requirement,
             "provide": self._provide,
         }
-        self._robot_items = {**self._library_items, "goal": self.goal, "assume": self.assumption}
+        self._robot_items = {
+            **self._library_items,
+            "goal": self.goal,
+            "assume": self.assumption,
+            "mission": self.mission,
+            "prefer": self.preference,
+        }
         self._component_items: Mapping[str, Callable[[], syntax.Communication | syntax.Behaviour]] = {
             "incoming": self._message,
             "outgoing": self._message,
@@ -154,6 +160,8 @@ class _Parser(GoalParser):
                 return self._behaviour_list
             case "initial" | "marked" | "state", _:
                 return self._state_list
+            case "mission", _:
+                return self.mission_list
             case "datatype", "object":
                 return self._object_list
             case "datatype", "enum":
@@ -490,7 +498,7 @@ class _Parser(GoalParser):
             self.place += 1
             return syntax.Invariant(word == "never", self.expression(), place)
         if self.texts[self.place] == "{" or self.texts[self.place + 1] == "needs":
-            names = self._communications()
+            names = self.names()
             self.take("needs")
             return syntax.Requirement(names, False, self.expression(), place)
         if self.kinds[self.place] == _NAME:
@@ -499,18 +507,7 @@ class _Parser(GoalParser):
             self.possible("'needs'", ahead=1)
         expression = self.expression()
         self.take("disables")
-        return syntax.Requirement(self._communications(), True, expression, place)
-
-    def _communications(self) -> tuple[syntax.Name, ...]:
-        if not self.takes("{"):
-            return (self.name(),)
-        names: list[syntax.Name] = []
-        if self.texts[self.place] != "}":
-            names.append(self.name())
-            while self.takes(","):
-                names.append(self.name())
-        self.take("}")
-        return tuple(names)
+        return syntax.Requirement(self.names(), True, expression, place)
 
     def _provide(self) -> syntax.Provide:
         place = self.at(self.take("provide"))

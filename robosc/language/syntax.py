@@ -412,6 +412,47 @@ class Assumption(msgspec.Struct, frozen=True, gc=False):
     location: Location
 
 
+class Visit(msgspec.Struct, frozen=True, gc=False):
+    """A condition behind `visit` or `then`; `location` is the whole of it."""
+
+    condition: Expression
+    location: Location
+
+
+class Detour(msgspec.Struct, frozen=True, gc=False):
+    """`on E from anywhere visit E then E ...`; `location` is the word `on`."""
+
+    trigger: Expression
+    visits: tuple[Visit, ...]
+    location: Location
+
+
+class Mission(msgspec.Struct, frozen=True, gc=False):
+    """`mission name while E { visit E then E ... on E from anywhere ... }`.
+
+    Attributes:
+        name: Its name.
+        condition: The expression behind `while`; None without one.
+        visits: Visits in their order.
+        detours: Detours in the order of the text.
+        location: Place of the word `mission`.
+    """
+
+    name: Name
+    condition: Expression | None
+    visits: tuple[Visit, ...]
+    detours: tuple[Detour, ...]
+    location: Location
+
+
+class Preference(msgspec.Struct, frozen=True, gc=False):
+    """`prefer R over R`; `location` is the word `prefer`."""
+
+    preferred: tuple[Name, ...]
+    others: tuple[Name, ...]
+    location: Location
+
+
 Item = (
     Component
     | ObjectDefinition
@@ -423,6 +464,8 @@ Item = (
     | Provide
     | Goal
     | Assumption
+    | Mission
+    | Preference
 )
 
 

@@ -14,7 +14,7 @@ RESERVED_WORDS = frozenset(
 )
 """The quoted words of A.2 and A.3; every other word is a free name."""
 
-STARTS: dict[str, Literal[True, "a name"] | frozenset[str]] = {
+STARTS: dict[str, Literal[True, "a name", "names"] | frozenset[str]] = {
     "component": "a name",
     "constant": "a name",
     "datatype": frozenset({"object", "enum"}),
@@ -23,6 +23,9 @@ STARTS: dict[str, Literal[True, "a name"] | frozenset[str]] = {
     "provide": "a name",
     "goal": "a name",
     "assume": "a name",
+    "mission": "a name",
+    "prefer": "names",
+    "visit": "a name",
     "incoming": frozenset({"message"}),
     "outgoing": frozenset({"message"}),
     "service": "a name",
@@ -43,7 +46,7 @@ An error inside one item ends where the next one seems to begin.
 _DEFINITIONS = frozenset({"'component'", "'constant'", "'datatype'", "'interface'", "'requirement'", "'provide'"})
 
 _GROUPS: tuple[tuple[str, frozenset[str]], ...] = (
-    ("a definition", _DEFINITIONS | {"'goal'", "'assume'"}),
+    ("a definition", _DEFINITIONS | {"'goal'", "'assume'", "'mission'", "'prefer'"}),
     ("a definition", _DEFINITIONS),
     ("a communication", frozenset({"'incoming'", "'outgoing'", "'service'", "'action'"})),
 )

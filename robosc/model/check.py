@@ -28,6 +28,7 @@ from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Bindings, Findings
 from robosc.model.goals import build_goals
 from robosc.model.interfaces import InterfaceChecker
+from robosc.model.missions import build_missions, build_preferences
 from robosc.model.own_requests import OwnRequests
 from robosc.model.places import Places
 from robosc.model.restrictions import Restrictions
@@ -42,6 +43,7 @@ from robosc.model.structure import (
     EnumDefinition,
     EnumRule,
     Goal,
+    Mission,
     Model,
     Provide,
     Requirement,
@@ -191,9 +193,11 @@ class _RobotChecker:
         invariants = tuple(restrictions.invariants)
         checker = ExpressionChecker(scopes.of(self._unit), self.findings)
         goals, assumptions = build_goals(self._tree.items, checker, self.places)
+        missions = build_missions(self._tree.items, checker, self.findings, self.places)
+        preferences = build_preferences(self._tree.items, communications, self.findings, self.places)
         communications = with_conditions(trees, communications, scopes, self.findings)
         self.communications = communications
-        aims: tuple[Goal | Assumption, ...] = (*goals, *assumptions)
+        aims: tuple[Goal | Assumption | Mission, ...] = (*goals, *assumptions, *missions)
         marked = mark_synthesis_variables(behaviours, requirements, provides, invariants, aims)
         for name, behaviour in marked.items():
             tree = behaviour_trees[name]
@@ -221,6 +225,8 @@ class _RobotChecker:
             invariants=invariants,
             goals=goals,
             assumptions=assumptions,
+            missions=missions,
+            preferences=preferences,
         )
 
     def _resolve_own_types(self) -> None:

@@ -482,7 +482,10 @@ class ExpressionChecker:
                 self._findings.unknown(f"value of '{wanted.name}'", name, tree.root.location, wanted.values)
                 return None
             known = self._scope.known_names()
-            self._findings.unknown("name", name, tree.root.location, known, words=_WORDS)
+            fix = ""
+            if name in self._findings.bindings.communications:
+                fix = f"'{name}' is a communication: let a component go to a state with it, and name that state."
+            self._findings.unknown("name", name, tree.root.location, known, fix=fix, words=_WORDS)
         return None
 
     def _component_part(self, tree: syntax.Access, component: ComponentNames) -> Typed | None:

@@ -363,6 +363,11 @@ class Mission(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
         first = () if self.condition is None else (self.condition,)
         return (*first, *self.visits, *(part for item in self.detours for part in item.expressions))
 
+    @property
+    def all_visits(self) -> tuple[Expression, ...]:
+        """Its visits, then those of each detour; a strategy has a mode for each of them."""
+        return (*self.visits, *(visit for item in self.detours for visit in item.visits))
+
 
 class Preference(msgspec.Struct, frozen=True, gc=False):
     """Requests that a strategy chooses rather than others, where both lead to its goals (language C.4).
@@ -408,6 +413,11 @@ class Model(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     assumptions: tuple[Assumption, ...] = ()
     missions: tuple[Mission, ...] = ()
     preferences: tuple[Preference, ...] = ()
+
+    @property
+    def has_goals(self) -> bool:
+        """True if the robot is to achieve something, so that a controller needs a strategy: a goal or a mission."""
+        return bool(self.goals or self.missions)
 
     def component(self, name: str) -> Component:
         """The component called `name` (KeyError if there is none)."""

@@ -1,4 +1,4 @@
-"""Variables that take part in synthesis, and the rules about them (language A.6, and C.3 for goals)."""
+"""Variables that take part in synthesis, and the rules about them (language A.6; goals and missions: C.1 to C.3)."""
 
 from collections.abc import Iterable, Iterator, Mapping
 
@@ -25,6 +25,7 @@ from robosc.model.structure import (
     EventKind,
     Goal,
     Invariant,
+    Mission,
     Provide,
     Requirement,
     is_tau,
@@ -39,7 +40,7 @@ def mark_synthesis_variables(
     requirements: Iterable[Requirement],
     provides: Iterable[Provide],
     invariants: Iterable[Invariant],
-    aims: Iterable[Goal | Assumption],
+    aims: Iterable[Goal | Assumption | Mission],
 ) -> dict[str, Behaviour]:
     """The behaviours with every variable classified: part of synthesis, or code-only."""
     found = set[Key]()

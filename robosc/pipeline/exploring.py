@@ -5,6 +5,7 @@ from pathlib import Path
 
 from robosc.automata import System
 from robosc.certification import Progress, SynthesisOutcome
+from robosc.certification.goals import GoalExplanation
 from robosc.certification.progress import OnProgress, ShouldStop, ignored, never
 from robosc.errors import UnsupportedModelError
 from robosc.explanation import EmptyExplanation
@@ -41,7 +42,7 @@ class Exploration(Outcome):
     diagnostics: Findings
     reason: str
     graph: Graph | None
-    explanation: EmptyExplanation | NoSupervisor | None = None
+    explanation: EmptyExplanation | GoalExplanation | NoSupervisor | None = None
 
     def write(self, file: FileName) -> Path:
         """Write the graph, whole or not at all, and return the file's path.

@@ -1,12 +1,13 @@
-"""Goals of a supervisor and what its strategy chooses for them, in the model's words."""
+"""Goals and visits of a supervisor and what its strategy chooses for them, in the model's words."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from robosc.conditions.goals import goals_in_words
+from robosc.conditions.goals import aims_in_words, assumptions_in_words, goals_in_words
 from robosc.conditions.literals import Vocabulary
 from robosc.conditions.summary import ELSEWHERE, condition_line, short_diagrams
 from robosc.pipeline.conditions import Condition
+from robosc.pipeline.results import GoalSummary
 from robosc.supervisor import Supervisor
 from robosc.supervisor.diagram import diagram_domains
 from robosc.tables import html_table
@@ -22,22 +23,34 @@ class Choice(Condition):
 
 @dataclass(frozen=True, slots=True, repr=False)
 class GoalApproach:
-    """Goal with what the strategy does to reach it.
+    """Goal, or visit of a mission, with what the strategy does to reach it.
 
     Attributes:
-        goal: The goal, as a user writes it.
+        name: Name: `goal 1`, `visit 2 of mission rounds`, `visit 1 of detour 1 of mission rounds`.
+        goal: The goal, or the visit's condition, as a user writes it.
         choices: Choices in the order in which they are tried; where none applies, the controller waits.
     """
 
+    name: str
     goal: str
     choices: tuple[Choice, ...]
 
     def __repr__(self) -> str:
         requests = ", ".join(item.event for item in self.choices) or "nothing"
-        return f"<{self.goal}: requests {requests}>"
+        return f"<{self.title}: requests {requests}>"
 
     def __str__(self) -> str:
-        return "\n".join([f"{self.goal}:", *(f"  {event} {text}" for event, text in self.rows())])
+        return "\n".join([f"{self.title}:", *(f"  {event} {text}" for event, text in self.rows())])
+
+    @property
+    def is_visit(self) -> bool:
+        """True for a visit of a mission or of a detour."""
+        return self.name.startswith("visit ")
+
+    @property
+    def title(self) -> str:
+        """The goal as a user writes it; of a visit also its name."""
+        return f"{self.name}, {self.goal}" if self.is_visit else self.goal
 
     def rows(self) -> list[tuple[str, str]]:
         """Each choice with its condition, and at last when nothing is requested, if there is such a case."""
@@ -53,7 +66,7 @@ class GoalApproach:
 
 
 class Goals(tuple[GoalApproach, ...]):
-    """The goals of a supervisor, in source order, each with what its strategy chooses for it."""
+    """The goals of a supervisor, then the visits of its missions, each with what its strategy chooses for it."""
 
     __slots__ = ()
 
@@ -62,22 +75,21 @@ class Goals(tuple[GoalApproach, ...]):
         return super().__new__(cls, tuple(goals))
 
     def __repr__(self) -> str:
-        return f"<{len(self)} goal{'s' if len(self) != 1 else ''}>" if self else "<no goals>"
+        visits = sum(item.is_visit for item in self)
+        counts = (("goal", len(self) - visits), ("visit", visits))
+        found = [f"{count} {word}{'s' if count != 1 else ''}" for word, count in counts if count]
+        return f"<{' and '.join(found) or 'no goals'}>"
 
     def __str__(self) -> str:
         return "\n".join(map(str, self)) or "no goals"
 
     def _repr_html_(self) -> str:
-        rows = [
-            (str(number), item.goal, event, text)
-            for number, item in enumerate(self, start=1)
-            for event, text in item.rows()
-        ]
-        return html_table(("", "goal", "the strategy requests", ""), rows)
+        rows = [(item.name, item.goal, event, text) for item in self for event, text in item.rows()]
+        return html_table(("", "goal or visit", "the strategy requests", ""), rows)
 
 
 def goals_of(supervisor: Supervisor) -> Goals:
-    """Return the goals of a supervisor with the choices of its strategy; empty where it has none."""
+    """Return the goals and visits of a supervisor with the choices of its strategy; empty where it has none."""
     components = frozenset(item.name for item in supervisor.model.components)
     found = goals_in_words(supervisor)
     if not found:
@@ -85,6 +97,7 @@ def goals_of(supervisor: Supervisor) -> Goals:
     vocabulary = Vocabulary(diagram_domains(supervisor.executable.remembering_automata), components)
     return Goals(
         GoalApproach(
+            item.name,
             item.text,
             tuple(
                 Choice(event, condition_line(diagram, formula, components), formula, diagram, vocabulary)
@@ -93,3 +106,16 @@ def goals_of(supervisor: Supervisor) -> Goals:
         )
         for item in found
     )
+
+
+def goal_summary(supervisor: Supervisor) -> GoalSummary | None:
+    """Return the goals of a supervisor's robot in figures and words; None where it has none."""
+    aims = tuple(
+        words if aim.mission is None else f"{words} ({name})"
+        for aim, (name, words) in zip(supervisor.executable.obligations.aims, aims_in_words(supervisor), strict=True)
+    )
+    if not aims:
+        return None
+    assumptions = tuple(words for _, words in assumptions_in_words(supervisor.model))
+    strategy = supervisor.strategy
+    return GoalSummary(aims, assumptions, strategy is not None, 0 if strategy is None else len(strategy.modes))

@@ -9,6 +9,7 @@ from robosc.certification.supervisor_file import StateInWords
 from robosc.errors import RoboscError, UnknownNameError
 from robosc.pipeline.conditions import unknown_event
 from robosc.pipeline.files import FileAccessError, FileName, given_path, write_whole
+from robosc.pipeline.missions import MissionProgress
 from robosc.pipeline.received_data import DataField
 from robosc.pipeline.saved_runs import event_log
 from robosc.pipeline.steps import Step, changes_text, event_text
@@ -54,7 +55,7 @@ class ManualRun(ABC):
 
     @property
     def has_strategy(self) -> bool:
-        """True if the supervisor has a strategy, which reaches the goals of its model."""
+        """True if the supervisor has a strategy, which reaches the goals and visits of its model."""
         return False
 
     @property
@@ -65,6 +66,11 @@ class ManualRun(ABC):
     @property
     def reached(self) -> tuple[bool, ...]:
         """For each goal True if it counts as come true now; nothing where there is no strategy."""
+        return ()
+
+    @property
+    def missions(self) -> tuple[MissionProgress, ...]:
+        """Progress of each mission; nothing where there is no strategy."""
         return ()
 
     @property
@@ -274,7 +280,7 @@ class ManualRun(ABC):
             NoStrategyError: The supervisor has none.
         """
         if strategy and not self.has_strategy:
-            raise NoStrategyError(f"the supervisor of {self._name} has no strategy: there are no goals to reach")
+            raise NoStrategyError(f"the supervisor of {self._name} has no strategy: there are no goals or missions")
         self._walker.follows_strategy = strategy
 
     def save(self, file: FileName) -> Path:

@@ -12,6 +12,7 @@ from robosc.source import visible
 from robosc.tables import html_table, html_text
 
 if TYPE_CHECKING:
+    from robosc.certification.goals import GoalExplanation
     from robosc.explanation import EmptyExplanation, Explanation
     from robosc.targets import GeneratedFiles, Written
 
@@ -45,6 +46,23 @@ class NothingGeneratedError(RoboscError):
 
 
 @dataclass(frozen=True, slots=True)
+class GoalSummary:
+    """Goals of a robot, and the strategy that reaches them.
+
+    Attributes:
+        aims: Everything that the robot aims at, in the words of the model and in the order of the strategy.
+        assumptions: Everything that it assumes of its surroundings, in the words of the model.
+        has_strategy: True if there is a strategy that reaches the goals; a supervision layer has none.
+        modes: Number of modes of the strategy, one for each aim.
+    """
+
+    aims: tuple[str, ...]
+    assumptions: tuple[str, ...]
+    has_strategy: bool
+    modes: int
+
+
+@dataclass(frozen=True, slots=True)
 class Summary:
     """A supervisor in figures and words.
 
@@ -55,6 +73,7 @@ class Summary:
         transitions: Transitions between them, or None if they were not counted.
         added: Each controllable event with the condition that the supervisor adds.
         text: The summary as `robosc synth` prints it.
+        goals: Goals of the robot, or None if it has none.
     """
 
     controllable_events: int
@@ -63,6 +82,7 @@ class Summary:
     transitions: int | None
     added: tuple[tuple[str, str], ...]
     text: str
+    goals: GoalSummary | None = None
 
     def __str__(self) -> str:
         return self.text.rstrip()
@@ -104,9 +124,9 @@ class Outcome:
         """The product of the task, or None."""
         return None
 
-    def _why(self) -> "EmptyExplanation | None":
+    def _why(self) -> "EmptyExplanation | GoalExplanation | None":
         """An explanation, in addition to the reason, of why there is no product; None if there is none."""
-        explanation: EmptyExplanation | NoSupervisor | None = getattr(self, "explanation", None)
+        explanation: EmptyExplanation | GoalExplanation | NoSupervisor | None = getattr(self, "explanation", None)
         return None if isinstance(explanation, NoSupervisor) else explanation
 
     def __repr__(self) -> str:

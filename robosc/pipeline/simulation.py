@@ -20,6 +20,7 @@ from robosc.model.structure import CommunicationKind, EventKind, Model, is_tau
 from robosc.pipeline.conditions import unknown_event
 from robosc.pipeline.files import FileAccessError, FileName, given_path, write_whole
 from robosc.pipeline.manual_run import ManualRun, UnknownEventError
+from robosc.pipeline.missions import MissionProgress, progress, visits_made
 from robosc.pipeline.received_data import (
     NO_DATA,
     DataError,
@@ -83,7 +84,7 @@ class Run(ManualRun):
 
     @property
     def has_strategy(self) -> bool:
-        """True if the supervisor has a strategy, which reaches the goals of its model."""
+        """True if the supervisor has a strategy, which reaches the goals and visits of its model."""
         return self._supervisor.strategy is not None
 
     @property
@@ -98,6 +99,11 @@ class Run(ManualRun):
     def reached(self) -> tuple[bool, ...]:
         """For each goal True if it counts as come true in the last stable state; nothing without a strategy."""
         return self._reached
+
+    @property
+    def missions(self) -> tuple[MissionProgress, ...]:
+        """Progress of each mission as of the last stable state; nothing without a strategy."""
+        return tuple(map(progress, self._model.missions, self._system.missions()))
 
     @property
     def is_marked(self) -> bool:
@@ -186,9 +192,9 @@ class Run(ManualRun):
         before = self._snapshot()
         skipped = self._system.step(event, reading) or ()
         data_seen = {} if reading is None else dict(reading.data)
-        reached = self._observe()
+        reached, visits = self._observe()
         state, is_own = self.state, self._events[event]
-        step = Step(event, data_seen, state, provided, skipped, unknown, is_own, given, reached, self._chosen)
+        step = Step(event, data_seen, state, provided, skipped, unknown, is_own, given, reached, self._chosen, visits)
         return self._take(step, before)
 
     def again(self) -> "Run":
@@ -237,18 +243,22 @@ class Run(ManualRun):
         self._reached = ()
         self._observe()
 
-    def _observe(self) -> tuple[int, ...]:
-        """Take in the state for the strategy, if it is stable, and return the goals that have come true."""
+    def _observe(self) -> tuple[tuple[int, ...], tuple[str, ...]]:
+        """Take in the state for the strategy, if it is stable; return goals that have come true, and visits made."""
         self._chosen = None
         if not self.has_strategy or not self._system.is_stable():
-            return ()
-        before = self._reached
+            return (), ()
+        before, places = self._reached, self._system.missions()
         self._system.observe()
         self._reached = self._system.reached()
         number = self._system.choose()
         self._chosen = None if number is None else self._requests.events[number]
         pairs = zip(self._reached, before or [False] * len(self._reached), strict=True)
-        return tuple(place for place, (is_true, was_true) in enumerate(pairs, start=1) if is_true and not was_true)
+        moves = zip(self._model.missions, places, self._system.missions(), strict=True)
+        return (
+            tuple(place for place, (is_true, was_true) in enumerate(pairs, start=1) if is_true and not was_true),
+            tuple(visit for mission, was, now in moves for visit in visits_made(mission, was, now)),
+        )
 
     def _make_walker(self) -> Walker:
         return ModelWalker(self, self._system, self._model, RandomData(self._model))

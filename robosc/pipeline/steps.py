@@ -24,6 +24,7 @@ class Step:
         given: Data as it was given.
         reached: Numbers of the goals that have come true with it, from 1 on.
         chosen: Request that the strategy chooses in the state that it led to; None: it waits, or there is none.
+        visits: Names of the visits of missions that were made with it, such as `visit 2 of mission rounds`.
     """
 
     event: str
@@ -36,6 +37,7 @@ class Step:
     given: Any = field(default=NO_DATA, hash=False)
     reached: tuple[int, ...] = ()
     chosen: str | None = None
+    visits: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return f"{self.event}: {self.state}"

@@ -11,7 +11,7 @@ from robosc.model.structure import Deployment, Model
 from robosc.pipeline.conditions import Conditions, conditions_of
 from robosc.pipeline.files import FileName, SupervisorFile, given_path, read_bounded
 from robosc.pipeline.findings import Findings
-from robosc.pipeline.goals import Goals, goals_of
+from robosc.pipeline.goals import Goals, goal_summary, goals_of
 from robosc.pipeline.results import Summary
 from robosc.supervisor import AddedCondition, Certificate, Strategy
 from robosc.supervisor import Supervisor as CoreSupervisor
@@ -94,6 +94,7 @@ class Supervisor(CoreSupervisor, SupervisorFile, frozen=True, dict=True):
             transitions=self.transitions,
             added=tuple((event, condition.text) for event, condition in self.conditions.items()),
             text=summary_text(self),
+            goals=goal_summary(self),
         )
 
     def to_json(self) -> dict[str, object]:

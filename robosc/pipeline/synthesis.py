@@ -5,6 +5,7 @@ from typing import Literal, overload
 
 from robosc.automata import System
 from robosc.certification import SynthesisOutcome, make_supervisor
+from robosc.certification.goals import GoalExplanation
 from robosc.certification.progress import OnProgress, ShouldStop, ignored, never
 from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.explanation import EmptyExplanation
@@ -39,7 +40,7 @@ class Synthesis(Outcome):
     reason: str
     supervisor: Supervisor | None
     statistics: Statistics | None = None
-    explanation: EmptyExplanation | NoSupervisor | None = None
+    explanation: EmptyExplanation | GoalExplanation | NoSupervisor | None = None
 
     @property
     def summary(self) -> Summary | None:
@@ -176,10 +177,12 @@ def status_of(attempt: Attempt) -> tuple[SynthesisStatus, str]:
     return SynthesisStatus.UNSUPPORTED_MODEL, attempt.reason
 
 
-def why_not(attempt: Attempt, diagnostics: Findings) -> EmptyExplanation | NoSupervisor:
+def why_not(attempt: Attempt, diagnostics: Findings) -> EmptyExplanation | GoalExplanation | NoSupervisor:
     """Return the explanation of why an attempted synthesis has no supervisor."""
-    if isinstance(attempt, SynthesisOutcome) and attempt.explanation is not None:
-        return attempt.explanation
+    if isinstance(attempt, SynthesisOutcome):
+        found = attempt.explanation or attempt.goals
+        if found is not None:
+            return found
     _, reason = status_of(attempt)
     return NoSupervisor(reason, diagnostics)
 

@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from robosc.automata import ExecutableSystem
-from robosc.automata.goal_memory import MEMORY, Cancel, Place
+from robosc.automata.goal_memory import MEMORY, Cancel, Obligations
 from robosc.automata.state import Subject
 from robosc.expressions import Expression
 from robosc.supervisor import AddedCondition
@@ -31,13 +31,13 @@ class ControllerArena:
     Args:
         executable: Executable system of the robot.
         added: The conditions that synthesis adds.
-        places: Places of the memory.
-        cancels: Own cancels of the executor.
+        owed: Its aims and assumptions, with the memory.
         encoding: Variables of its executed automata with the memory.
         monitor: Monitor of the waiting caller.
 
     Attributes:
-        positions: Stable states that the controlled system can reach, with any memory.
+        positions: Stable states that the controlled system can reach, with any memory of which places that exclude each
+            other are not true together.
         observed: Those whose memory can be that of the controller at its turn: to observe them again changes nothing.
     """
 
@@ -45,8 +45,7 @@ class ControllerArena:
         self,
         executable: ExecutableSystem,
         added: Sequence[AddedCondition],
-        places: Sequence[Place],
-        cancels: Sequence[Cancel],
+        owed: Obligations,
         encoding: Encoding,
         monitor: ProgressMonitor,
     ) -> None:
@@ -63,14 +62,17 @@ class ControllerArena:
                 steps = steps.under(steps.condition & conditions[event.name])
             self._steps[event.name] = steps
         self._observed = {
-            encoding.subjects[Subject(MEMORY, place.name)].names[0]: encoder.holds(place.update) for place in places
+            encoding.subjects[Subject(MEMORY, place.name)].names[0]: encoder.holds(place.update)
+            for place in owed.places
         }
         self._arrived: tuple[Any, Any] | None = None
         reachable = self._reachable()
-        self._silent = tuple(self._silent_steps(executable, cancels, encoder, reachable))
+        self._silent = tuple(self._silent_steps(executable, owed.cancels, encoder, reachable))
         self.positions = reachable & ~encoding.any_of(first for first, _ in self._silent)
+        for group in owed.exclusive:
+            self.positions = self.positions & self._at_most_one([encoder.holds(place.read) for place in group])
         self.observed = self.positions
-        for place in places:
+        for place in owed.places:
             before, after = encoder.holds(place.read), encoder.holds(place.update)
             self.observed = self.observed & ((before & after) | (~before & ~after))
         self._batches = tuple(
@@ -85,6 +87,12 @@ class ControllerArena:
         problem = Problem(tuple(self._steps.values()), safe_states(self._encoding, ()))
         states = FixedPoint(self._encoding, self._monitor).reachable_states(problem, self._manager.true)
         return self._manager.exist(self._observed, states) if self._observed else states
+
+    def _at_most_one(self, predicates: Sequence[Any]) -> Any:
+        none, one = self._manager.true, self._manager.false
+        for item in predicates:
+            none, one = none & ~item, (one & ~item) | (none & item)
+        return none | one
 
     def _enabled(self, event: str) -> Any:
         steps = self._steps[event]
@@ -161,6 +169,20 @@ class ControllerArena:
                 self._monitor.check_stop()
                 inside = inside | steps.some(inside)
             found = found | (self.positions & inside)
+        return found
+
+    def whatever_was(self, condition: Any) -> Any:
+        """Return the states in which a condition is true once they are observed, whatever was remembered before."""
+        if not self._observed:
+            return condition
+        return ~self._manager.exist(self._observed, ~self._manager.let(self._observed, condition))
+
+    def behaviours(self, predicate: Any) -> Any:
+        """Return the states from which the behaviours alone, without requirements, have an event into a predicate."""
+        found = self._manager.false
+        for steps in self._steps.values():
+            self._monitor.check_stop()
+            found = found | (steps.plant & steps.some(predicate))
         return found
 
     def can_begin(self, predicate: Any) -> bool:

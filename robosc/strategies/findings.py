@@ -1,24 +1,31 @@
-"""Findings about goals: those that cannot be reached, assumptions that are not needed or that the robot can break."""
+"""Findings about goals, missions and assumptions: what cannot be reached, is not needed, or can be broken."""
 
 from collections.abc import Sequence
 
+from robosc.automata.goal_memory import Aim, AimKind
+from robosc.conditions.goals import assumption_text
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Location
+from robosc.strategies.blame import GoalBlame
 from robosc.strategies.synthesize import StrategyResult
 
 
-def goal_findings(places: Places, result: StrategyResult) -> tuple[Diagnostic, ...]:
-    """Return the diagnostics about a model's goals and assumptions.
+def goal_findings(
+    aims: Sequence[Aim], places: Places, result: StrategyResult, blame: GoalBlame | None = None
+) -> tuple[Diagnostic, ...]:
+    """Return the diagnostics about a model's goals, missions and assumptions.
 
     Args:
+        aims: Goals and visits of the model.
         places: Source locations of the model's parts.
         result: Result of the synthesis of a strategy.
+        blame: Findings about what is to blame for goals that are not reached; None if nobody has looked for it.
     """
     found: list[Diagnostic] = []
     if result.unreached:
-        found.append(_unreached(places, result))
+        found.append(_unreached(aims, places, result, blame))
     for number in result.preventable:
         found.append(
             Diagnostic(
@@ -44,36 +51,87 @@ def goal_findings(places: Places, result: StrategyResult) -> tuple[Diagnostic, .
 
 
 def layer_goal_findings(model: Model, places: Places, deployment: Deployment) -> tuple[Diagnostic, ...]:
-    """Return the diagnostic that goals have no effect in a supervision layer, or none."""
-    if not model.goals or deployment is not Deployment.LAYER:
+    """Return the diagnostic that goals and missions have no effect in a supervision layer, or none."""
+    if not (model.goals or model.missions) or deployment is not Deployment.LAYER:
         return ()
+    what = goals_and_missions(model)
+    found = [
+        *(("this goal neither", place) for place in places.goals),
+        *(("this mission neither", place) for place in places.missions),
+        *(("this preference neither", place) for place in places.preferences),
+    ]
     return (
         Diagnostic(
             Severity.WARNING,
             "goals-in-layer",
-            "goals have no effect in a supervision layer: the existing controller decides what is requested",
-            places.goals[0],
-            "Use the deployment 'controller', or remove the goals.",
-            _related("this goal neither", places.goals[1:]),
+            f"{what} have no effect in a supervision layer: the existing controller decides what is requested",
+            found[0][1],
+            f"Use the deployment 'controller', or remove the {what}.",
+            _related(found[1:]),
         ),
     )
 
 
-def _unreached(places: Places, result: StrategyResult) -> Diagnostic:
-    first, *others = result.unreached
-    what = "this goal" if not others else "these goals together"
+def goals_and_missions(model: Model) -> str:
+    """Return a word for what a model's strategy is to reach: goals, missions or both."""
+    return " and ".join(word for word, items in (("goals", model.goals), ("missions", model.missions)) if items)
+
+
+def _unreached(aims: Sequence[Aim], places: Places, result: StrategyResult, blame: GoalBlame | None) -> Diagnostic:
+    """Return the finding about what cannot be reached together.
+
+    It stands at the last visit of a mission where there is one: the others are those that come before it.
+    """
+    unreached = [aims[number] for number in result.unreached]
+    *others, last = unreached
+    first, *others = unreached if last.kind is AimKind.GOAL else (last, *others)
+    what = f"this {_word(first)}" if not others else f"these {_words(unreached)} together"
     if result.is_hopeless:
-        message = (
-            f"{what} cannot be reached again and again, whatever the surroundings do: the model or its requirements "
-            "exclude it"
+        message = f"{what} cannot be reached again and again, whatever the surroundings do"
+        advice = (
+            f"Look for the requirement or the transition that keeps the robot from it, or change the {_word(first)}."
         )
-        advice = "Look for the requirement or the transition that keeps the robot from it, or change the goal."
     else:
         message = f"the surroundings can keep {what} from coming true, for ever"
-        advice = "Say what the surroundings owe the robot, for example 'assume Arm.moving leads to Arm.done'."
-    related = _related("this goal belongs to them", [places.goals[number] for number in others])
-    return Diagnostic(Severity.ERROR, "unreachable-goal", message, places.goals[first], advice, related)
+        advice = (
+            "Assume what the surroundings do once the robot has done its part, look for what excludes the "
+            f"{_word(first)}, or change it."
+        )
+    related = _related([(f"this {_word(aim)} belongs to them", _place(places, aim)) for aim in others])
+    if blame is not None:
+        message += _blamed(blame, is_hopeless=result.is_hopeless)
+        found = [places.requirements[number] for number in blame.requirements]
+        found += [places.invariants[number] for number in blame.invariants]
+        related += _related([("this requirement is to blame", place) for place in found])
+        if blame.helpful:
+            written = " and ".join(f"'assume {assumption_text(item)}'" for item in blame.helpful)
+            advice = f"Write {written}, if that is what the surroundings do, or change the {_word(first)}."
+    return Diagnostic(Severity.ERROR, "unreachable-goal", message, _place(places, first), advice, related)
 
 
-def _related(message: str, locations: Sequence[Location]) -> tuple[RelatedPlace, ...]:
-    return tuple(RelatedPlace(message, location) for location in locations[:5])
+def _blamed(blame: GoalBlame, *, is_hopeless: bool) -> str:
+    """Return the end of a message: which requirements are to blame."""
+    count = len(blame.requirements) + len(blame.invariants)
+    if not blame.is_known:
+        return "; which requirements are to blame is not known: the search was given up"
+    if count == 0:
+        return ": the behaviours exclude it, without any requirement" if is_hopeless else ", even without requirements"
+    if count == 1:
+        return ": one requirement alone is enough for that"
+    return f": {count} requirements are enough for that, and each of them is needed"
+
+
+def _word(aim: Aim) -> str:
+    return "goal" if aim.kind is AimKind.GOAL else "visit"
+
+
+def _words(aims: Sequence[Aim]) -> str:
+    return " and ".join(f"{word}s" for word in dict.fromkeys(map(_word, aims)))
+
+
+def _place(places: Places, aim: Aim) -> Location:
+    return places.goals[aim.number] if aim.mission is None else places.visits[aim.mission][aim.number]
+
+
+def _related(found: Sequence[tuple[str, Location]]) -> tuple[RelatedPlace, ...]:
+    return tuple(RelatedPlace(message, location) for message, location in found[:5])

@@ -1,7 +1,8 @@
 """Synthesis of a strategy: what the controller does next, of what its supervisor allows, so that its goals come true.
 
 The supervisor stays as it is: a strategy only chooses among the requests that it enables, or waits. In each mode one
-goal is approached; once it is true the next one in turn is.
+goal or visit of a mission is approached; once it is true the next one in turn is. In this package a visit counts as a
+goal: that the mission is not at it any more.
 """
 
 from collections.abc import Callable, Collection, Iterable, Sequence
@@ -9,9 +10,12 @@ from dataclasses import dataclass
 from typing import Any
 
 from robosc.automata import ExecutableSystem
+from robosc.automata.goal_memory import holds
 from robosc.strategies.arena import ControllerArena
+from robosc.strategies.counter_strategy import CounterStage, CounterStrategy, oppose
 from robosc.strategies.gr1 import Solution, solve
-from robosc.supervisor import AddedCondition, Choice, Strategy
+from robosc.strategies.preferences import preferred_order
+from robosc.supervisor import AddedCondition, Choice, DecisionDiagram, Strategy
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.monitor import ProgressMonitor
@@ -27,8 +31,8 @@ class StrategyResult:
 
     Attributes:
         strategy: The strategy, or None where there is none.
-        unreached: Numbers of goals that cannot be reached together, a set of which none can be left out; empty where
-            there is a strategy.
+        unreached: Numbers of goals and visits that cannot be reached together, a set of which none can be left out;
+            empty where there is a strategy.
         is_hopeless: True if these goals cannot be reached even if the surroundings do all they can for it.
         preventable: Numbers of assumptions that the robot itself can keep from coming true, though nobody allows it.
         unneeded: Numbers of assumptions without which the goals are reached just as well.
@@ -58,7 +62,7 @@ def synthesize_strategy(
     """Synthesize a strategy that reaches every goal of a model while its assumptions come true.
 
     Args:
-        executable: Executable system of the robot, with at least one goal.
+        executable: Executable system of the robot, with at least one goal or mission.
         added: The conditions that its supervisor adds.
         engine: Name of the engine for decision diagrams, or its options.
         should_stop: Function called before each step of the work; once it returns true, the work ends.
@@ -84,8 +88,11 @@ class StrategySynthesis:
         self._manager = place.encoding.manager
         self._monitor: ProgressMonitor = place.monitor
         self._seconds = place.condition_seconds
-        self.arena = ControllerArena(executable, added, owed.places, owed.cancels, place.encoding, place.monitor)
-        self.goals = [self.arena.condition(item) for item in owed.goals]
+        self.arena = ControllerArena(executable, added, owed, place.encoding, place.monitor)
+        ordered = preferred_order(executable.requests, executable.model.preferences)
+        self._requests = tuple(event for event in ordered if event in self.arena.requests)
+        self._aims = owed.aims
+        self.goals = [self.arena.condition(item.condition) for item in owed.aims]
         self.assumptions = [self.arena.condition(item) for item in owed.assumptions]
 
     def result(self, allowed: Collection[int] = ()) -> StrategyResult:
@@ -97,16 +104,72 @@ class StrategySynthesis:
         solution = self._solution(range(len(self.assumptions)), range(len(self.goals)))
         is_won = self.arena.can_begin(solution.winning)
         unreached = () if is_won else self._unreached()
-        preventable = self._preventable(allowed)
+        preventable = self.preventable(allowed)
         return StrategyResult(
             strategy=self._strategy(solution) if is_won and not preventable else None,
             unreached=unreached,
-            is_hopeless=bool(unreached) and not self._can_be_reached(unreached),
+            is_hopeless=bool(unreached) and not self.can_be_reached(unreached),
             preventable=preventable,
             unneeded=self._unneeded() if is_won else (),
             positions=self._count(self.arena.positions),
             winning=self._count(solution.winning),
             rounds=solution.rounds,
+        )
+
+    def sought(self, number: int) -> Any:
+        """Return the predicate that a goal is true, or the condition of a visit, whatever was remembered before.
+
+        Args:
+            number: Number of the goal or visit.
+        """
+        visit = self._aims[number].visit
+        if visit is None:
+            return self.arena.whatever_was(self.goals[number])
+        return self.arena.condition(holds(visit))
+
+    @property
+    def false(self) -> Any:
+        """The predicate that is true nowhere."""
+        return self._manager.false
+
+    def diagram(self, predicate: Any) -> DecisionDiagram:
+        """Return a predicate as a diagram over the state and the memory.
+
+        Raises:
+            UnsupportedModelError: It would be too large.
+        """
+        return extract(self._encoding, predicate)
+
+    def counter(self, goals: Sequence[int]) -> CounterStrategy:
+        """Return how the surroundings keep goals from coming true together, which cannot be reached.
+
+        Args:
+            goals: Numbers of the goals.
+
+        Raises:
+            UnsupportedModelError: It would be too large.
+        """
+        denied = [self.goals[item] for item in goals]
+        positions = self.arena.positions
+        lost = positions & ~self._solved(self.assumptions, denied).winning
+
+        def is_enough(found: Any) -> bool:
+            return not self.arena.can_begin(positions & ~found)
+
+        stages = oppose(
+            *(self.arena, self.assumptions, denied, lost, is_enough),
+            false=self.false,
+            check_stop=self._monitor.check_stop,
+        )
+        return CounterStrategy(
+            tuple(
+                CounterStage(
+                    goals[stage.goal],
+                    self.diagram(stage.positions),
+                    tuple(tuple(map(self.diagram, layers)) for layers in stage.layers),
+                )
+                for stage in stages
+            )
         )
 
     def _solution(self, assumptions: Iterable[int], goals: Iterable[int]) -> Solution:
@@ -115,7 +178,8 @@ class StrategySynthesis:
     def _solved(self, assumptions: Sequence[Any], goals: Sequence[Any]) -> Solution:
         return solve(self.arena, assumptions, goals, false=self._manager.false, check_stop=self._monitor.check_stop)
 
-    def _is_won(self, assumptions: Iterable[int], goals: Iterable[int]) -> bool:
+    def is_won(self, assumptions: Iterable[int], goals: Iterable[int]) -> bool:
+        """Return True if some goals can be reached under some assumptions."""
         return self.arena.can_begin(self._solution(assumptions, goals).winning)
 
     def _unreached(self) -> tuple[int, ...]:
@@ -124,11 +188,11 @@ class StrategySynthesis:
         kept = list(range(len(self.goals)))
         for item in reversed(range(len(self.goals))):
             fewer = [number for number in kept if number != item]
-            if fewer and not self._is_won(every, fewer):
+            if fewer and not self.is_won(every, fewer):
                 kept = fewer
         return tuple(kept)
 
-    def _can_be_reached(self, goals: Sequence[int]) -> bool:
+    def can_be_reached(self, goals: Sequence[int]) -> bool:
         """Return True if both sides together can make goals true again and again."""
         found = self.arena.positions
         before = None
@@ -149,15 +213,18 @@ class StrategySynthesis:
         kept = list(range(len(self.assumptions)))
         for item in reversed(range(len(self.assumptions))):
             fewer = [number for number in kept if number != item]
-            if self._is_won(fewer, goals):
+            if self.is_won(fewer, goals):
                 kept = fewer
         return tuple(item for item in range(len(self.assumptions)) if item not in kept)
 
-    def _preventable(self, allowed: Collection[int]) -> tuple[int, ...]:
+    def preventable(self, allowed: Collection[int]) -> tuple[int, ...]:
         """Return assumptions that the robot can make false for ever, in a state that it can get to.
 
         A robot that does so reaches its goals in name alone. Such assumptions are not well separated from the goals:
         U. Klein and A. Pnueli, "Revisiting synthesis of GR(1) specifications", HVC 2010, LNCS 6504, pp. 161-181.
+
+        Args:
+            allowed: Numbers of assumptions that are not looked at.
         """
         found = []
         for item, assumption in enumerate(self.assumptions):
@@ -188,14 +255,14 @@ class StrategySynthesis:
         decided = self.goals[number]
         for approach in solution.approaches[number]:
             here = approach.positions & ~approach.nearer
-            for event in self.arena.requests:
+            for event in self._requests:
                 found = here & ~decided & self.arena.choice(event, approach.nearer)
                 if found != self._manager.false:
                     chosen[event] = chosen.get(event, self._manager.false) | found
                     decided = decided | found
         care = solution.winning & self.arena.observed & ~self.goals[number]
         choices: list[Choice] = []
-        for event in self.arena.requests:
+        for event in self._requests:
             if event in chosen and chosen[event] & care != self._manager.false:
                 condition = simplifier.condition(chosen[event], care)
                 if condition is None:

@@ -10,6 +10,7 @@ from typing import Annotated, Literal, Self
 import msgspec
 
 from robosc.automata.executable import ExecutableSystem
+from robosc.automata.goal_memory import counted
 from robosc.expressions.types import PartName
 from robosc.model.structure import Deployment, Model
 
@@ -75,8 +76,8 @@ class Strategy(msgspec.Struct, frozen=True):
     """Choice among the requests that the supervisor enables, so that the goals of the model come true.
 
     Attributes:
-        modes: For each goal of the model, in its order, the choices that approach it: the first whose condition is
-            true, else none. Once the goal is true, the next one in turn is approached.
+        modes: For each goal of the model, in its order, then for each visit of its missions, the choices that approach
+            it: the first whose condition is true, else none. Once it is reached, the next one in turn is approached.
     """
 
     modes: tuple[tuple[Choice, ...], ...]
@@ -119,7 +120,8 @@ class Certificate(msgspec.Struct, frozen=True, omit_defaults=True):
         states: Reachable states of the controlled system, exact.
         transitions: Transitions between them, or None where they were not counted.
         controller: Properties of the controller, or None if they were not checked.
-        goals: Under the strategy every goal comes true while the assumptions do; None where there is no strategy.
+        goals: Under the strategy every goal comes true, and every mission goes on, while the assumptions come true;
+            None where there is no strategy.
     """
 
     engine_version: str
@@ -144,7 +146,7 @@ class Supervisor(msgspec.Struct, frozen=True, dict=True, omit_defaults=True):
         deployment: Deployment that it was synthesized for.
         added: The conditions that synthesis adds, in source order of their events.
         certificate: Record of what was checked.
-        strategy: Strategy that reaches the model's goals; None where it has none, and in a layer.
+        strategy: Strategy that reaches the model's goals and visits; None where it has none, and in a layer.
     """
 
     model: Model
@@ -177,8 +179,8 @@ class Supervisor(msgspec.Struct, frozen=True, dict=True, omit_defaults=True):
         return next((item.condition for item in self.added if item.event == event), None)
 
     def __repr__(self) -> str:
-        certificate, modes = self.certificate, () if self.strategy is None else self.strategy.modes
-        strategy = f", a strategy for {len(modes)} goal{'s' if len(modes) != 1 else ''}" if modes else ""
+        certificate = self.certificate
+        strategy = "" if self.strategy is None else f", a strategy for {counted(self.executable.obligations.aims)}"
         return (
             f"<supervisor of {self.model.name}: {self.deployment}, {certificate.states} states, "
             f"conditions added to {len(self.added)} event{'s' if len(self.added) != 1 else ''}{strategy}>"

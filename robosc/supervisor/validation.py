@@ -29,6 +29,7 @@ from robosc.expressions import (
     type_text,
 )
 from robosc.expressions.inference import Scope, has_type, is_assignable
+from robosc.model.preferences import contradiction
 from robosc.model.structure import (
     Assumption,
     Behaviour,
@@ -40,6 +41,7 @@ from robosc.model.structure import (
     EventKind,
     Goal,
     GoalForm,
+    Mission,
     Model,
     ObjectDefinition,
     ObjectValue,
@@ -105,6 +107,7 @@ def validate(supervisor: Supervisor) -> None:
                 _validate_component(component, names)
         _validate_requirements(model, names)
         _validate_goals(model, names)
+        _validate_missions(model, names)
         for number, provide in enumerate(model.provides, start=1):
             with _at(f"provide statement {number} (for {provide.communication})"):
                 _validate_provide(provide, names)
@@ -421,6 +424,23 @@ def _validate_aim(aim: Goal | Assumption, names: _Names) -> None:
         _require_boolean(expression, names.scope)
 
 
+def _validate_missions(model: Model, names: _Names) -> None:
+    """Missions have names of their own and visits; preferences are about requests, and do not contradict each other."""
+    _require_unique((mission.name for mission in model.missions), "missions")
+    for mission in model.missions:
+        with _at(f"mission {mission.name}"):
+            if not mission.visits or not all(detour.visits for detour in mission.detours):
+                raise InvalidSupervisorError("a mission and each of its detours need a visit")
+            for expression in mission.expressions:
+                _require_boolean(expression, names.scope)
+    for number, preference in enumerate(model.preferences, start=1):
+        with _at(f"preference {number}"):
+            for name in (*preference.preferred, *preference.others):
+                _request_type(name, names)
+    if contradiction(model.preferences):
+        raise InvalidSupervisorError("the preferences contradict each other")
+
+
 def _validate_provide(provide: Provide, names: _Names) -> None:
     _validate_provided(provide.value, _request_type(provide.communication, names), names)
     if provide.condition is not None:
@@ -449,7 +469,7 @@ def _validate_provided(value: ProvidedValue, type_: Type, names: _Names) -> None
 def _validate_synthesis_variables(model: Model, names: _Names) -> None:
     """Check that all that synthesis reads is in synthesis and finite.
 
-    That is all that guards, requirements, goals, assumptions, data conditions and synthesis variables read.
+    That is all that guards, requirements, goals, assumptions, missions, data conditions and synthesis variables read.
     """
     variables = {
         (component.name, variable.name): variable
@@ -475,7 +495,7 @@ def _synthesis_expressions(
         yield requirement.expression, None
     for invariant in model.invariants:
         yield invariant.expression, None
-    aims: tuple[Goal | Assumption, ...] = (*model.goals, *model.assumptions)
+    aims: tuple[Goal | Assumption | Mission, ...] = (*model.goals, *model.assumptions, *model.missions)
     for aim in aims:
         yield from ((expression, None) for expression in aim.expressions)
     for provide in model.provides:
@@ -507,16 +527,18 @@ def _validate_certificate(certificate: Certificate) -> None:
 
 def _validate_strategy(supervisor: Supervisor) -> None:
     """Check that a strategy is there exactly where a controller has goals, and that it chooses among requests."""
-    strategy, goals = supervisor.strategy, supervisor.model.goals
-    is_needed = bool(goals) and supervisor.deployment is Deployment.CONTROLLER
+    strategy, model = supervisor.strategy, supervisor.model
+    is_needed = model.has_goals and supervisor.deployment is Deployment.CONTROLLER
     if (strategy is not None) is not is_needed:
-        raise InvalidSupervisorError("a strategy belongs to a controller with goals, and to no other supervisor")
+        raise InvalidSupervisorError(
+            "a strategy belongs to a controller with goals or missions, and to no other supervisor"
+        )
     if (supervisor.certificate.goals is not None) is not is_needed:
         raise InvalidSupervisorError("the certificate speaks of goals exactly where there is a strategy")
     if strategy is None:
         return
-    if len(strategy.modes) != len(goals):
-        raise InvalidSupervisorError("the strategy has not one mode for each goal")
+    if len(strategy.modes) != len(model.goals) + sum(len(mission.all_visits) for mission in model.missions):
+        raise InvalidSupervisorError("the strategy has not one mode for each goal and each visit of a mission")
     requests = set(supervisor.executable.requests)
     domains = diagram_domains(supervisor.executable.remembering_automata)
     for number, mode in enumerate(strategy.modes, start=1):

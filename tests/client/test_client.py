@@ -97,9 +97,9 @@ def talk(connect: Any) -> Talk:
 def test_public_names() -> None:
     assert sorted(robosc_client.__all__) == [
         "AsyncClient", "CallerLoad", "Check", "Client", "ClientError", "CredentialsError", "DeadlineError", "Explain",
-        "Explained", "Exploration", "Explore", "Format", "Formatted", "Generate", "Generation", "Job", "JobError",
-        "JobFailure", "JobState", "NO_RETRIES", "NotThereError", "Progress", "RequestRefusedError", "RetryPolicy",
-        "ServerBusyError", "ServerInfo", "ServerLimits", "ServerUnavailableError",
+        "Explained", "Exploration", "Explore", "Format", "Formatted", "Generate", "Generation", "GoalSummary", "Job",
+        "JobError", "JobFailure", "JobState", "NO_RETRIES", "NotThereError", "Progress", "RequestRefusedError",
+        "RetryPolicy", "ServerBusyError", "ServerInfo", "ServerLimits", "ServerUnavailableError",
         "ServiceError", "ServiceLoad", "StateGraph", "StateValues", "Statistics", "Submission", "Summary",
         "Synthesis", "SynthesisOptions", "SynthesisStatus", "Synthesize", "Task", "TaskKind", "TaskResult",
         "Verification", "VerificationStatus", "Verify",
@@ -666,12 +666,14 @@ class TestConversion:
             states=str(10**40),
             added=[pb.AddedCondition(event="move.request", condition="true")],
             text="text\n",
+            goals=pb.Goals(aims=["once Base.here"], assumptions=["A leads to B"], has_strategy=True, modes=1),
         )
         statistics = pb.Statistics(engine="autoref", state_bits=7, iterations=3, peak_nodes=10**12)
         answer = supervisor(b"x", summary=summary, statistics=statistics, signature=b"s")
         with talk(Synthesize=[[answer]]) as (client, _):
             found = client.synthesize(BUNDLE)
-        assert found.summary == robosc_client.Summary(2, 3, 10**40, None, (("move.request", "true"),), "text\n")
+        goals = robosc_client.GoalSummary(("once Base.here",), ("A leads to B",), True, 1)
+        assert found.summary == robosc_client.Summary(2, 3, 10**40, None, (("move.request", "true"),), "text\n", goals)
         assert found.statistics == robosc_client.Statistics("autoref", 7, 3, 10**12)
         assert (found.supervisor, found.signature, found.reason) == (b"x", b"s", "")
 

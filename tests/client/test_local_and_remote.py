@@ -168,6 +168,7 @@ def test_values_that_mean_the_same_are_the_same() -> None:
         *(
             "Explained",
             "Generation",
+            "GoalSummary",
             "Summary",
             "SynthesisOptions",
             "SynthesisStatus",

@@ -1,6 +1,7 @@
 """Every target does what the reference executor does: the same runs, compared step by step."""
 
-from collections.abc import Iterator
+from collections import Counter
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -26,8 +27,10 @@ from support.equivalence.scenario import Action, Scenario
 from support.equivalence.targets import compare
 from support.equivalence.worlds import WORLDS, live, robot_supervisor
 from support.generated import load_module, loaded_file
+from support.goal_porter import porter_supervisor
 from support.models import model_of
 from support.random_controllers import random_controller, random_robot
+from support.random_couriers import strategic_courier
 from support.random_goals import strategic_controller
 from support.random_supervisors import CERTIFICATE, random_supervisor
 
@@ -126,32 +129,52 @@ def test_random_robots_in_c(tmp_path_factory: pytest.TempPathFactory, seed: int)
 
 
 def _strategic(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
-    """Yield random robots whose strategies choose requests, with a run of each under its strategy."""
+    """Yield the porter and random robots whose strategies choose requests, with a run of each under its strategy."""
+    porter = porter_supervisor()
+    scenario = random_scenario(porter, first, 400)
+    yield porter, replace(scenario, settings={**scenario.settings, "assumption_timeout_s": 0.25})
     for seed in range(first, first + 1_500):
         supervisor = strategic_controller(seed)
         if supervisor is not None and supervisor.strategy and any(supervisor.strategy.modes):
             yield supervisor, random_scenario(supervisor, seed, 80)
 
 
-def test_strategies_in_python() -> None:
-    requests = 0
-    for supervisor, scenario in _strategic(0):
+def _couriers(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
+    """Yield random robots with missions, with a run of each under its strategy."""
+    for seed in range(first, first + 60):
+        supervisor = strategic_courier(seed)
+        if supervisor is not None:
+            yield supervisor, random_scenario(supervisor, seed, 80)
+
+
+# Assumptions of the couriers that were reported as owed are rarely met again.
+@pytest.mark.parametrize(
+    ("robots", "least", "kinds"),
+    [(_strategic, 50, ("reached", "approach", "owed", "met")), (_couriers, 300, ("reached", "approach", "owed"))],
+)
+def test_strategies_in_python(
+    robots: Callable[[int], Iterator[tuple[Supervisor, Scenario]]], least: int, kinds: tuple[str, ...]
+) -> None:
+    requests, logged = 0, Counter[str]()
+    for supervisor, scenario in robots(0):
         expected = observe(supervisor, scenario)
         compare(generated_python(supervisor, load_module(supervisor)), scenario, expected)
         requests += sum(len(item.issued) for item in expected)
-    assert requests > 50
+        logged.update(line["kind"] for item in expected for line in item.log)
+    assert requests > least and all(logged[kind] > 5 for kind in kinds), logged
 
 
 @needs_gcc
 def test_strategies_in_c(tmp_path: Path) -> None:
-    requests = 0
-    for number, (supervisor, scenario) in enumerate(islice(_strategic(1_500), 6)):
+    requests, logged = 0, Counter[str]()
+    for number, (supervisor, scenario) in enumerate((*islice(_strategic(1_500), 4), *islice(_couriers(60), 6))):
         expected = observe(supervisor, scenario)
         # Some with sanitizers, which take the compiler three times as long.
         options = () if number % 4 == 0 else ("-O0",)
         compare(C99Target(supervisor, tmp_path / str(number), *options), scenario, expected)
         requests += sum(len(item.issued) for item in expected)
-    assert requests > 5
+        logged.update(line["kind"] for item in expected for line in item.log)
+    assert requests > 30 and all(logged[kind] for kind in ("reached", "approach", "owed", "met")), logged
 
 
 TWO_WHEELS = """robot TwoWheels {

@@ -9,6 +9,7 @@ from robosc.targets import GeneratedFiles, GenerateOptions, generate
 from robosc.targets.registry import StateMessage
 from support.execution import supervisor_of
 from support.generated import example_supervisor
+from support.goal_porter import porter_supervisor
 from support.models import EXAMPLES, model_of
 
 LAYER = "line_follower/line_follower_layer"
@@ -49,5 +50,7 @@ PACKAGES: dict[str, Callable[[], GeneratedFiles]] = {
     "ros2-cpp": lambda: generate(example_supervisor(MAZE), "ros2-cpp"),
     "ros2-msgs": lambda: generate(example_supervisor(MAZE), "ros2-msgs"),
     "ros1": lambda: generate(example_supervisor(MAZE), "ros1"),
+    "ros2-goals": lambda: generate(porter_supervisor(), "ros2"),
+    "ros1-goals": lambda: generate(porter_supervisor(), "ros1"),
     "ros1-layer-long": lambda: long_names("ros1", Deployment.LAYER),
 }

@@ -410,6 +410,8 @@ def settings_words(layout: Layout, settings: Settings) -> list[object]:
     words += [settings.seed, int(settings.every == "event")]
     words += [("default", "keep", "fault").index(settings.on_unknown)]
     words += [microseconds(settings.service_timeout_s), microseconds(settings.action_timeout_s)]
+    if layout.supervisor.strategy is not None:
+        words.append(microseconds(settings.assumption_timeout_s))
     for item in layout.model.communications:
         is_sensor = item.kind is CommunicationKind.OUTGOING_MESSAGE
         age = settings.max_age_s.get(item.identifier, item.max_age) if is_sensor else None

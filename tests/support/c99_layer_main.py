@@ -65,7 +65,7 @@ _SIGNATURES: dict[str, tuple[str, ...]] = {
 }
 
 _MAIN = (
-    LOG
+    LOG.replace("@more@", '"blocked"')
     + """
 static void do_new(void)
 {

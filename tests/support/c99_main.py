@@ -81,7 +81,7 @@ static @p@_t r;
 LOG = """static void do_log(void *context, @p@_log_t kind, int what)
 {
     static const char *const kinds[]
-        = {"event", "unexpected", "unknown", "release", "fault", "stop", "resume", "restart", "blocked"};
+        = {"event", "unexpected", "unknown", "release", "fault", "stop", "resume", "restart", @more@};
     (void)context;
     if (kind == @P@_LOG_FAULT || kind == @P@_LOG_STOP || kind == @P@_LOG_RESTART || kind == @P@_LOG_RESUME) {
         printf("log %s\\n", kinds[kind]);
@@ -136,7 +136,7 @@ END = """        case 'c': {
 """End of the program: the last command of either deployment, and what follows each."""
 
 _CALLBACKS = (
-    LOG
+    LOG.replace("@more@", '"reached", "approach", "owed", "met"')
     + """
 static bool do_publish(void *context, const @p@_request_t *request)
 {
@@ -214,6 +214,7 @@ static void do_new(void)
     settings.on_unknown = (@p@_on_unknown_t)read_integer();
     settings.service_timeout_us = read_time();
     settings.action_timeout_us = read_time();
+@assumption_timeout@
 """
     + BEGIN
     + """        case 't': @p@_tick(&r, now_us); break;
@@ -232,6 +233,15 @@ static void do_new(void)
 """
     + END
 )
+
+
+_PRINT_PROGRESS = """\
+    printf(" progress %d %d", @p@_approached(&r), @p@_chosen(&r));
+    for (int number = 0; number < @P@_AIM_COUNT + @P@_ASSUMPTION_COUNT; number++) {
+        const @p@_standing_t found = @p@_standing(&r, number, now_us);
+        printf(" %d %d %d %" PRIu32 " %" PRIu64, found.is_met, found.is_unmet, found.is_overdue, found.count,
+               found.unmet_us);
+    }"""
 
 
 class _Program:
@@ -325,7 +335,9 @@ class _Program:
             self.print_state(),
             _CALLBACKS,
         ]
-        return "\n".join(parts).replace("@p@", layout.prefix).replace("@P@", layout.upper)
+        setting = "" if layout.supervisor.strategy is None else "    settings.assumption_timeout_us = read_time();"
+        text = "\n".join(parts).replace("@assumption_timeout@\n", setting + "\n")
+        return text.replace("@p@", layout.prefix).replace("@P@", layout.upper)
 
     def print_request(self) -> str:
         lines = [
@@ -357,6 +369,8 @@ class _Program:
         lines += [
             f'    printf("%d", (int)@p@_enabled(&r, {layout.events[event]}));' for event in layout.executable.issued
         ]
+        if layout.supervisor.strategy is not None:
+            lines += _PRINT_PROGRESS.splitlines()
         lines.append(
             '    printf(" status %d fault %d counters %u %u %u\\n", (int)@p@_status(&r, now_us), @p@_fault(&r) != 0,'
             " (unsigned)r.counters.unknown, (unsigned)r.counters.unexpected, (unsigned)r.counters.faults);"

@@ -6,7 +6,7 @@ W. Zielonka, "Infinite games on finitely coloured graphs with applications to au
 Computer Science 200(1-2), 1998, pp. 135-183.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,11 +14,14 @@ from robosc.automata import ExecutableSystem
 from robosc.automata.compile import NO_DATA, Function, compile_expression
 from robosc.automata.state import subjects
 from robosc.controller_properties.controller import Controller, Node
+from robosc.expressions import Expression
 from robosc.model.structure import Assumption, Goal, GoalForm
 from robosc.supervisor import AddedCondition
+from support.mission_twin import Mark, MissionTwin, mission_twin
 
-Marks = tuple[bool, ...]
-"""Memory of each assumption, then of each goal: that an answer is owed, or that it came true."""
+Marks = tuple[Any, ...]
+"""Memory of each assumption, then of each goal and visit: that an answer is owed, that it came true; of a visit, where
+its mission is."""
 
 Position = tuple[Node, Marks]
 
@@ -27,12 +30,14 @@ LOST = "lost"
 
 
 @dataclass
-class _Item:
+class Item:
     """A goal or an assumption over explicit states."""
 
+    name: str
     form: GoalForm
     condition: Callable[[Any], bool]
     trigger: Callable[[Any], bool]
+    start: Any = False
 
     def mark(self, mark: bool, state: Any) -> bool:
         if self.form is GoalForm.LEADS_TO:
@@ -44,12 +49,36 @@ class _Item:
             return not mark
         return mark if self.form is GoalForm.ONCE else self.condition(state)
 
+    def memory(self, mark: bool) -> dict[str, bool]:
+        return {f"{self.name} {'was reached' if self.form is GoalForm.ONCE else 'is owed'}": mark}
+
+
+@dataclass
+class _Visit:
+    """A visit over explicit states, which keeps account of its whole mission."""
+
+    mission: MissionTwin
+    is_done: Callable[[Mark, Any], bool]
+
+    @property
+    def start(self) -> Mark:
+        return self.mission.start
+
+    def mark(self, mark: Mark, state: Any) -> Mark:
+        return self.mission.after(mark, state)
+
+    def holds(self, mark: Any, state: Any) -> bool:
+        return self.is_done(mark, state)
+
+    def memory(self, mark: Mark) -> dict[str, bool]:
+        return self.mission.memory(mark)
+
 
 def _is_true(function: Function) -> Callable[[Any], bool]:
     return lambda state: function(state, NO_DATA) is True
 
 
-NEVER = _Item(GoalForm.ALWAYS_EVENTUALLY, lambda state: False, lambda state: False)
+NEVER = Item("never", GoalForm.ALWAYS_EVENTUALLY, lambda state: False, lambda state: False)
 """A goal that is never true."""
 
 
@@ -63,22 +92,22 @@ class Game:
         first: The position in which the executor begins, or None if it never gets to one.
     """
 
-    assumptions: list[_Item]
-    goals: list[_Item]
+    assumptions: list[Item]
+    goals: list[Item | _Visit]
     successors: dict[Position, set[Any]] = field(default_factory=dict)
     choices: dict[Position, dict[str, Any]] = field(default_factory=dict)
     first: Any = None
-    asked: tuple[list[_Item], list[_Item]] | None = None
+    asked: tuple[list[Item], list[Item | _Visit]] | None = None
 
-    def asking(self, assumptions: list[_Item], goals: list[_Item]) -> "Game":
+    def asking(self, assumptions: list[Item], goals: list[Item | _Visit]) -> "Game":
         """Return the same game about other assumptions and goals, of those that it keeps account of."""
         return replace(self, asked=(assumptions, goals))
 
-    def holds(self, position: Position, item: _Item) -> bool:
+    def holds(self, position: Position, item: Item | _Visit) -> bool:
         """Return True if an assumption or a goal counts as come true in a position."""
         (state, _), marks = position
         place = next((place for place, kept in enumerate((*self.assumptions, *self.goals)) if kept is item), None)
-        return item.holds(place is not None and marks[place], state)
+        return item.holds(False if place is None else marks[place], state)
 
     def can_meet_again_and_again(self, goals: Iterable[int]) -> bool:
         """Return True if both sides together can make goals true again and again."""
@@ -89,10 +118,17 @@ class Game:
         # Each position can be waited in: a turn at which a goal is true is a turn in its component.
         return any(
             all(any(self.holds(position, self.goals[item]) for position in component) for item in goals)
-            for component in _components(list(following), following.__getitem__)
+            for component in components(list(following), following.__getitem__)
         )
 
-    def holding(self, position: Position, items: list[_Item]) -> tuple[bool, ...]:
+    def memory(self, position: Position) -> dict[str, bool]:
+        """Return what is remembered of assumptions, goals and missions in a position, by the names of the memory."""
+        found: dict[str, bool] = {}
+        for item, mark in zip((*self.assumptions, *self.goals), position[1], strict=True):
+            found |= item.memory(mark)
+        return found
+
+    def holding(self, position: Position, items: Sequence[Item | _Visit]) -> tuple[bool, ...]:
         (state, _), marks = position
         offset = 0 if items is self.assumptions else len(self.assumptions)
         return tuple(item.holds(marks[offset + place], state) for place, item in enumerate(items))
@@ -105,17 +141,24 @@ def game_of(executable: ExecutableSystem, added: Iterable[AddedCondition], limit
     controller._choices.clear()
     places = {subject: place for place, subject in enumerate(subjects(controller.system))}
 
-    def items(given: tuple[Goal, ...] | tuple[Assumption, ...]) -> list[_Item]:
+    def test(condition: Expression) -> Callable[[Any], bool]:
+        return _is_true(compile_expression(condition, places))
+
+    def items(given: Sequence[Goal | Assumption], word: str) -> list[Item]:
         return [
-            _Item(
+            Item(
+                f"{word} {number}",
                 item.form,
-                _is_true(compile_expression(item.condition, places)),
-                (lambda state: False) if item.trigger is None else _is_true(compile_expression(item.trigger, places)),
+                test(item.condition),
+                (lambda state: False) if item.trigger is None else test(item.trigger),
             )
-            for item in given
+            for number, item in enumerate(given, start=1)
         ]
 
-    game = Game(items(executable.model.assumptions), items(executable.model.goals))
+    model = executable.model
+    twins = [mission_twin(mission, test) for mission in model.missions]
+    visits = [_Visit(twin, is_done) for twin in twins for _, is_done in twin.aims()]
+    game = Game(items(model.assumptions, "assumption"), [*items(model.goals, "goal"), *visits])
     everything = [*game.assumptions, *game.goals]
 
     def arrived(node: Node, marks: Marks) -> Any:
@@ -124,7 +167,7 @@ def game_of(executable: ExecutableSystem, added: Iterable[AddedCondition], limit
             return LOST
         return end, tuple(item.mark(mark, end[0]) for item, mark in zip(everything, marks, strict=True))
 
-    game.first = arrived(controller.start, (False,) * len(everything))
+    game.first = arrived(controller.start, tuple(item.start for item in everything))
     queue = [] if game.first == LOST else [game.first]
     for position in queue:
         if position in game.choices:
@@ -257,7 +300,7 @@ def _missed(game: Game, goal: int, moves: dict[Any, set[Any]], turns: dict[Any, 
     def after(vertex: Any) -> set[Any]:
         return {*moves[vertex], *([passing[vertex]] if vertex in passing else [])}
 
-    for component in _components(list(moves), after):
+    for component in components(list(moves), after):
         met = [vertex for vertex in component if vertex in passing and passing[vertex] in component]
         holding = [game.holding(vertex[0], game.assumptions) for vertex in met]
         if met and all(any(item[place] for item in holding) for place in range(len(game.assumptions))):
@@ -265,8 +308,8 @@ def _missed(game: Game, goal: int, moves: dict[Any, set[Any]], turns: dict[Any, 
     return None
 
 
-def _components(vertices: list[Any], after: Callable[[Any], set[Any]]) -> Iterator[set[Any]]:
-    """The strongly connected components, by two searches (Kosaraju)."""
+def components(vertices: list[Any], after: Callable[[Any], set[Any]]) -> Iterator[set[Any]]:
+    """Yield the strongly connected components, by two searches (Kosaraju)."""
     order: list[Any] = []
     seen: set[Any] = set()
     for root in vertices:
@@ -296,3 +339,46 @@ def _components(vertices: list[Any], after: Callable[[Any], set[Any]]) -> Iterat
                     component.add(item)
                     queue.append(item)
             yield component
+
+
+def distances(game: Game, won: set[Position], goal: int) -> dict[Position, int]:
+    """Return the distance of each winning position from a goal, by the rounds of the least fixed point.
+
+    A position has distance k + 1 where, for some assumption, the surroundings cannot prevent that each turn gets to
+    distance k or less, or to the goal, or stays where that assumption fails. This is the definition, round by round:
+    N. Piterman, A. Pnueli and Y. Sa'ar, "Synthesis of reactive(1) designs", VMCAI 2006, LNCS 3855, pp. 364-380.
+
+    Args:
+        game: The game.
+        won: The positions from which the controller wins.
+        goal: Number of the goal or visit.
+    """
+    item = game.goals[goal]
+    found: dict[Position, int] = {}
+
+    def turns(position: Position) -> set[Any]:
+        return {position, *game.choices[position].values()}
+
+    reached = {position for position in won if game.holds(position, item) and turns(position) & won}
+    failing = [{position for position in won if not game.holds(position, owed)} for owed in game.assumptions]
+    while True:
+        progress = {position for position in won if position in reached or turns(position) & found.keys()}
+        near = set[Position]()
+        # The empty assumption is one that never fails.
+        for failed in failing or [set[Position]()]:
+            staying = set(won)
+            while True:
+                kept = {
+                    position
+                    for position in staying
+                    if game.successors[position] <= staying
+                    and (position in progress or (position in failed and turns(position) & staying))
+                }
+                if kept == staying:
+                    break
+                staying = kept
+            near |= staying
+        if near <= found.keys():
+            return found
+        rank = max(found.values(), default=0) + 1
+        found |= {position: rank for position in near if position not in found}

@@ -1,7 +1,7 @@
 """The text of a model: what an author would write for a checked model that tests made without one."""
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 
 import msgspec
 
@@ -28,6 +28,7 @@ from robosc.model.structure import (
     Component,
     EnumDefinition,
     Goal,
+    Mission,
     Model,
     ObjectValue,
     ProvidedValue,
@@ -94,6 +95,10 @@ class _Writer:
         yield from (f"goal {self._aim(goal)}" for goal in model.goals)
         for assumption in model.assumptions:
             yield f"assume {'allow ' if assumption.is_allowed else ''}{self._aim(assumption)}"
+        yield from map(self._mission, model.missions)
+        for preference in model.preferences:
+            sides = (", ".join(map(spelled, side)) for side in (preference.preferred, preference.others))
+            yield "prefer {{ {} }} over {{ {} }}".format(*sides)
         for item_ in model.provides:
             condition = "" if item_.condition is None else f" if {self._expression(item_.condition)}"
             yield f"provide {spelled(item_.communication)} with {self._provided(item_.value)}{condition}"
@@ -171,6 +176,16 @@ class _Writer:
         # The parentheses keep words of a condition from being taken for those of the form.
         conditions = [f"({self._expression(expression)})" for expression in item.expressions]
         return f" {item.form} ".join(conditions) if len(conditions) > 1 else f"{item.form} {conditions[0]}"
+
+    def _mission(self, item: Mission) -> str:
+        condition = "" if item.condition is None else f" while {self._expression(item.condition)}"
+        parts = [self._visits(item.visits)]
+        for detour in item.detours:
+            parts.append(f"on {self._expression(detour.trigger)} from anywhere {self._visits(detour.visits)}")
+        return f"mission {spelled(item.name)}{condition} {{\n" + "\n".join(parts) + "\n}"
+
+    def _visits(self, visits: Iterable[Expression]) -> str:
+        return "visit " + " then ".join(f"({self._expression(visit)})" for visit in visits)
 
     def _provided(self, value: ProvidedValue) -> str:
         if not isinstance(value, ObjectValue):

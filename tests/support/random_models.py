@@ -16,17 +16,18 @@ from support.failing import bundle_files, made
 _STATES = ("idle", "busy", "^state", "always", "depth", "then_")
 _VARIABLES = ("level", "^value", "never", "count", "max", "flag")
 _GOAL_WORDS = ("allow", "always", "eventually", "goal", "leads", "once")
+_MISSION_WORDS = ("anywhere", "mission", "over", "prefer", "then", "visit", "while")
 _BLANKS = (" ", " ", " ", " ", "\n", "\n\n", "\t", "  ")
 _COMMENTS = ("/* a } b */", "/**/", "// to the end {\n", "/* two\n lines */", "//\n")
 
 
 def models(*, part_b: bool = True, goals: bool = False) -> st.SearchStrategy[Bundle]:
-    """Bundles of a robot and perhaps a library that it imports from; the robot perhaps with goals and assumptions."""
+    """Bundles of a robot and perhaps a library that it imports from; the robot perhaps with goals and missions."""
     return st.integers(0, 2**32 - 1).map(lambda seed: random_bundle(seed, part_b=part_b, goals=goals))
 
 
 def random_bundle(seed: int, *, part_b: bool = True, goals: bool = False) -> Bundle:
-    """The bundle of a seed; with goals, it is the same but for them and for the constants that they read."""
+    """The bundle of a seed; with goals and missions it is the same but for them and the constants that they read."""
     dice = Random(seed)
     author = _Author(dice, part_b, goals)
     library = author.library() if dice.random() < 0.5 else None
@@ -65,7 +66,7 @@ class _Author:
     Args:
         dice: Source of chance that decides everything.
         part_b: True if the language's extensions are used.
-        goals: True if the robot has goals and assumptions.
+        goals: True if the robot has goals, assumptions, missions and preferences.
     """
 
     def __init__(self, dice: Random, part_b: bool, goals: bool = False) -> None:
@@ -97,8 +98,11 @@ class _Author:
         parts += own
         parts += self._restrictions(self._components, self._dice.randint(0, 4))
         if self._has_goals:
-            parts += [f"constant {word}: boolean = {self._dice.choice(('true', 'false'))}" for word in _GOAL_WORDS]
+            words = (*_GOAL_WORDS, *_MISSION_WORDS)
+            parts += [f"constant {word}: boolean = {self._dice.choice(('true', 'false'))}" for word in words]
             parts += [self._goal() for _ in range(self._dice.randint(1, 5))]
+            parts += [self._mission(name) for name in self._dice.sample(words, self._dice.randint(0, 2))]
+            parts += self._preferences()
         self._dice.shuffle(parts)
         return f"robot {self._new('Robot')} {{ {' '.join(parts)} }}"
 
@@ -339,6 +343,32 @@ class _Author:
         if first == "goal":
             forms.append(f"goal once {condition}")
         return self._dice.choice(forms)
+
+    def _mission(self, name: str) -> str:
+        """A mission; its words are names in it, too."""
+        conditions = self._readable(self._components) | dict.fromkeys(_MISSION_WORDS, "")
+
+        def visits() -> str:
+            found = (self._condition(2, conditions, {}) for _ in range(self._dice.randint(1, 3)))
+            return f"visit {' then '.join(found)}"
+
+        head = f"mission {name}" + (f" while {self._condition(2, conditions, {})}" if self._chance(0.5) else "")
+        detours = (
+            f"on {self._condition(2, conditions, {})} from anywhere {visits()}" for _ in range(self._dice.randint(0, 2))
+        )
+        return f"{head} {{ {visits()} {' '.join(detours)} }}"
+
+    def _preferences(self) -> list[str]:
+        """Preferences that one order of the requests obeys."""
+        names = sorted({name for component in self._components for name in component.requests})
+        self._dice.shuffle(names)
+        found: list[str] = []
+        for _ in range(self._dice.randint(0, 2) if len(names) > 1 else 0):
+            cut = self._dice.randint(1, len(names) - 1)
+            sides = [self._dice.sample(part, self._dice.randint(1, len(part))) for part in (names[:cut], names[cut:])]
+            texts = [side[0] if len(side) == 1 and self._chance(0.7) else f"{{ {', '.join(side)} }}" for side in sides]
+            found.append(f"prefer {texts[0]} over {texts[1]}")
+        return found
 
     def _restrictions(self, components: list[_Component], count: int) -> list[str]:
         states = self._readable(components)

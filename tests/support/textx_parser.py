@@ -154,6 +154,17 @@ class _Converter:
                 place = self._first(node, "assume")
                 self._in_robot(node, place)
                 return syntax.Assumption(node.allowed is not None, *self._aim(node.allowed or node), place)
+            case "Mission":
+                place = self._first(node, "mission")
+                self._in_robot(node, place)
+                detours = tuple(self._detour(detour) for detour in node.detours)
+                condition, visits = self._condition(node.condition), self._visits(node.visits)
+                return syntax.Mission(self._name(node.name), condition, visits, detours, place)
+            case "Preference":
+                place = self._first(node, "prefer")
+                self._in_robot(node, place)
+                preferred, others = (tuple(map(self._name, part.names)) for part in (node.preferred, node.others))
+                return syntax.Preference(preferred, others, place)
             case _:
                 value, condition = self._provided(node.value), self._condition(node.condition)
                 return syntax.Provide(self._name(node.communication), value, condition, self._first(node, "provide"))
@@ -176,6 +187,12 @@ class _Converter:
         if node.recurring is not None:
             return "always eventually", None, self._expression(node.recurring.condition)
         return "once", None, self._expression(node.once.condition)
+
+    def _visits(self, node: Any) -> tuple[syntax.Visit, ...]:
+        return tuple(syntax.Visit(self._expression(visit.condition), self._at(visit)) for visit in node.visits)
+
+    def _detour(self, node: Any) -> syntax.Detour:
+        return syntax.Detour(self._expression(node.trigger), self._visits(node.visits), self._first(node, "on"))
 
     def _provided(self, node: Any) -> syntax.ObjectValue | syntax.Expression:
         if node.object is None:

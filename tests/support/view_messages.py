@@ -126,6 +126,36 @@ def update(**changes: Any) -> Message:
     return {**message, **changes}
 
 
+def progress(**changes: Any) -> Message:
+    """Two goals of which one is approached, and an assumption that is owed."""
+    message = {
+        "aims": [
+            {
+                "name": "goal 1",
+                "words": "Caller.waiting leads to Base.inside",
+                "is_met": False,
+                "times": 1,
+                "unmet_s": 5.2,
+            },
+            {"name": "goal 2", "words": "always eventually Base.outside", "is_met": True, "times": 3, "unmet_s": None},
+        ],
+        "assumptions": [
+            {
+                "name": "assumption 1",
+                "words": "Door.opening leads to Door.ajar",
+                "is_met": False,
+                "times": 0,
+                "unmet_s": 4,
+            },
+        ],
+        "overdue": [],
+        "is_followed": True,
+        "approached": "goal 1",
+        "chosen": "open",
+    }
+    return {**message, **changes}
+
+
 def drive(x_m: float, y_m: float, heading_rad: float) -> Message:
     """A drive base at a pose."""
     return {

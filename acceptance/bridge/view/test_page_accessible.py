@@ -10,7 +10,7 @@ from playwright.sync_api import Browser
 
 from support.browser import Visit, visit
 from support.live_view import PAGE, TOKEN, StandIn
-from support.view_messages import definition, entry, events, taken, update
+from support.view_messages import definition, entry, events, progress, taken, update
 
 LEAST_TEXT, LEAST_SHAPE = 4.5, 3.0
 """Ratios of contrast that WCAG 2.2 asks for (1.4.3 and 1.4.11, level AA)."""
@@ -20,7 +20,7 @@ LOG = {"begin_s": 1_750_000_000.0, "end_s": 1_750_000_060.0, "count": 100}
 
 @pytest.fixture
 def server() -> Iterator[StandIn]:
-    with StandIn([definition(log=LOG), update()]) as standing_in:
+    with StandIn([definition(log=LOG), update(progress=progress())]) as standing_in:
         yield standing_in
 
 
@@ -85,8 +85,10 @@ def test_landmarks_and_headings(seen: Visit) -> None:
         assert seen.page.get_by_role(role).count() == 1
     assert seen.page.get_by_role("heading", level=1).all_inner_texts() == ["Carrier"]
     titles = seen.page.get_by_role("heading", level=2).all_inner_texts()
-    assert titles == ["Status", "Replay", "Components", "Surroundings", "Requests", "Events"]
-    assert seen.page.get_by_role("heading", level=3).all_inner_texts() == ["Gripper", "Base", "Sensor"]
+    assert titles == ["Status", "Replay", "Components", "Surroundings", "Goals", "Requests", "Events"]
+    assert seen.page.get_by_role("heading", level=3).all_inner_texts() == [
+        *("Gripper", "Base", "Sensor", "Assumed of the surroundings")
+    ]
     for name in titles:
         assert seen.page.get_by_role("region", name=name, exact=True).count() == 1
     assert seen.page.locator("html").get_attribute("lang") == "en"

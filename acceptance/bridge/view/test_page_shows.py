@@ -8,7 +8,7 @@ from playwright.sync_api import Browser
 
 from support.browser import Visit, visit
 from support.live_view import StandIn
-from support.view_messages import component, definition, entry, events, graph, taken, update
+from support.view_messages import component, definition, entry, events, graph, progress, taken, update
 
 
 @pytest.fixture
@@ -223,3 +223,35 @@ def test_a_graph_in_full_size_goes_on_living(server: StandIn, seen: Visit) -> No
     # A dialog reports that it is closed a moment later.
     seen.page.locator("[data-component=Base] svg.graph").wait_for()
     seen.wait("() => document.activeElement?.getAttribute('aria-label') === 'Enlarge the graph of Base'")
+
+
+# Goals and assumptions in the browser by name: the state of each, and the words about it.
+GOALS = """() => Object.fromEntries([...document.querySelectorAll(".goal")].map((goal) => [
+  goal.dataset.name, [goal.dataset.state, goal.lastElementChild.innerText.replace(/\\s+/g, " ").trim()]]))"""
+
+
+def test_goals_are_shown_with_the_one_that_is_approached(server: StandIn, seen: Visit) -> None:
+    server.send(update())
+    seen.wait(STATE_IS, "running")
+    assert seen.page.locator("#goals").is_hidden()
+
+    server.send(update(progress=progress()))
+    seen.wait("() => !document.querySelector('#goals').hidden")
+    assert seen.page.evaluate(GOALS) == {
+        "goal 1": ["now", "goal 1 now, for 5 s reached once Caller.waiting leads to Base.inside"],
+        "goal 2": ["met", "goal 2 true reached 3 times always eventually Base.outside"],
+        "assumption 1": ["owed", "assumption 1 has been owed for 4 s Door.opening leads to Door.ajar"],
+    }
+    assert seen.page.locator("#goals-count").inner_text() == "1 of 2 true"
+    assert seen.page.locator("#goals-choice").inner_text() == "The strategy requests open, for goal 1."
+
+    late = {**progress()["assumptions"][0], "unmet_s": 130.0}
+    server.send(update(progress=progress(overdue=["assumption 1"], assumptions=[late], chosen=None)))
+    seen.wait("() => document.querySelector('.goal[data-state=overdue]') !== null")
+    assert seen.page.evaluate(GOALS)["assumption 1"][1].startswith("assumption 1 has been owed for 2 min")
+    assert seen.page.locator("#goals-choice").inner_text() == "The strategy waits, for goal 1."
+    # A screen reader hears it.
+    seen.wait("() => document.querySelector('#polite').textContent.includes('assumption 1 is owed for too long.')")
+
+    server.send(update())
+    seen.wait("() => document.querySelector('#goals').hidden")

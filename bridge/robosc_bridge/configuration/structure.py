@@ -127,6 +127,14 @@ class Execution(_Section, frozen=True):
         float,
         Meta(ge=0, le=86400, description="In a layer, seconds of silence after which the last request ends; 0: never."),
     ] = 1.0
+    assumption_timeout_s: Annotated[
+        float,
+        Meta(
+            ge=0,
+            le=86400,
+            description="With goals, seconds after which an assumption that is owed is reported; 0: never.",
+        ),
+    ] = 30.0
 
 
 def _scan_timeouts() -> str:

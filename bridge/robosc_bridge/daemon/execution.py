@@ -9,6 +9,7 @@ from robosc.execution.runtime.clock import Clock
 from robosc.execution.runtime.event_log import EventLog
 from robosc.execution.runtime.executor import Executor
 from robosc.execution.runtime.layer import Layer
+from robosc.execution.runtime.progress import Progress
 from robosc.execution.runtime.protocol import requesting
 from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import CommunicationKind
@@ -139,6 +140,11 @@ class Execution:
     def changes(self) -> int:
         """Number that changes whenever the state that watchers see may have changed."""
         return self._run + (0 if self._system is None else self._system.changes)
+
+    @property
+    def progress(self) -> Progress | None:
+        """State of what the strategy aims at and assumes; None: there is no strategy, or nothing is executed."""
+        return None if self.executor is None else self.executor.progress
 
     def components(self) -> Mapping[str, Mapping[str, Any]]:
         """State and variables of each component with a behaviour; empty: nothing is executed."""

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field
 from typing import Any
 
 from robosc.execution.runtime.event_log import Entry, EventLog
+from robosc.execution.runtime.progress import Progress
 from robosc_bridge.daemon.states import State
 from robosc_bridge.daemon.threads.reports import Device
 from robosc_bridge.daemon.timing import TimingFigures
@@ -42,6 +43,7 @@ class Snapshot:
         overruns: Number of decisions that were left out because the previous one took too long.
         communications: Location of each service and action, by name; empty: nothing is executed.
         timing: The bridge's own times, and the counts of its lines.
+        progress: State of what the strategy aims at and assumes; None: there is no strategy, or nothing is executed.
     """
 
     number: int
@@ -59,6 +61,7 @@ class Snapshot:
     overruns: int
     communications: Mapping[str, str] = field(default_factory=dict)
     timing: TimingFigures = field(default_factory=TimingFigures)
+    progress: Progress | None = None
 
 
 @dataclass(frozen=True)

@@ -16,6 +16,7 @@ from prometheus_client.core import (
 from prometheus_client.registry import Collector
 
 from robosc._version import __version__
+from robosc.execution.runtime.progress import Progress
 from robosc_api.metrics_server import MetricsServer
 from robosc_api.security import SecurityError, ServerSecurity, check_listening
 from robosc_api.security.addresses import split_address
@@ -136,6 +137,8 @@ def _metrics(snapshot: Snapshot) -> Iterator[Metric]:
     reading = snapshot.reading
     if reading is not None and reading.battery_v is not None:
         yield GaugeMetricFamily("robosc_bridge_battery_volts", "Voltage of the battery.", reading.battery_v)
+    if snapshot.progress is not None:
+        yield from _progress(snapshot.progress)
     latencies = HistogramMetricFamily(
         "robosc_bridge_latency_seconds", "Times that the bridge measures of itself.", labels=["what"]
     )
@@ -149,6 +152,23 @@ def _metrics(snapshot: Snapshot) -> Iterator[Metric]:
         for name, count in counts.items():
             lines.add_metric([line, name], count)
     yield lines
+
+
+def _progress(progress: Progress) -> Iterator[Metric]:
+    reached = CounterMetricFamily(
+        "robosc_bridge_goal_reached", "Times that a goal has become true since the run began.", labels=["goal"]
+    )
+    for aim in progress.aims:
+        reached.add_metric([aim.name], aim.times)
+    yield reached
+    owed = GaugeMetricFamily(
+        "robosc_bridge_assumption_owed_seconds",
+        "Time since when an assumption is owed; 0 if it is met.",
+        labels=["assumption"],
+    )
+    for assumption in progress.assumptions:
+        owed.add_metric([assumption.name], assumption.unmet_s or 0.0)
+    yield owed
 
 
 def _buckets(latency: Latency) -> Iterator[tuple[str, float]]:

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping
 from typing import Any, Protocol
 
 from robosc.execution.runtime.clock import Clock
+from robosc.execution.runtime.progress import Progress
 from robosc_bridge.daemon.feed import Feed, Snapshot
 from robosc_bridge.daemon.readiness import Readiness
 from robosc_bridge.daemon.states import State
@@ -26,6 +27,10 @@ class ExecutionState(Protocol):
     @property
     def changes(self) -> int:
         """Number that grows with each change of state."""
+
+    @property
+    def progress(self) -> Progress | None:
+        """State of what the strategy aims at and assumes, if there is one."""
 
     def components(self) -> Mapping[str, Mapping[str, Any]]:
         """State and variables of each component."""
@@ -108,5 +113,6 @@ class Snapshots:
                 self._execution.overruns,
                 self._communications,
                 self._timing(),
+                self._execution.progress,
             )
         )

@@ -13,6 +13,7 @@ from google.protobuf.struct_pb2 import Struct
 from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
 from robosc.execution.runtime.event_log import Entry, plain
+from robosc.execution.runtime.progress import Progress, Standing
 from robosc.expressions import ObjectType
 from robosc.model.structure import Communication, CommunicationKind, Model
 from robosc.supervisor import Supervisor, encode
@@ -184,6 +185,8 @@ def _snapshot(snapshot: Snapshot) -> pb.Snapshot:
         has_scan=snapshot.scan is not None,
         overruns=snapshot.overruns,
     )
+    if snapshot.progress is not None:
+        made.progress.CopyFrom(_progress(snapshot.progress))
     for latency in snapshot.timing.latencies:
         made.latencies.add(
             name=latency.name,
@@ -199,6 +202,22 @@ def _snapshot(snapshot: Snapshot) -> pb.Snapshot:
     if snapshot.reading is not None:
         made.drive.CopyFrom(_drive(snapshot.reading))
     return made
+
+
+def _progress(progress: Progress) -> pb.StrategyProgress:
+    return pb.StrategyProgress(
+        aims=map(_standing, progress.aims),
+        assumptions=map(_standing, progress.assumptions),
+        overdue=progress.overdue,
+        is_followed=progress.is_followed,
+        approached=progress.approached or "",
+        chosen=progress.chosen or "",
+    )
+
+
+def _standing(item: Standing) -> pb.Standing:
+    name, words, is_met, times, unmet_s = item
+    return pb.Standing(name=name, words=text_of(words), is_met=is_met, times=times, unmet_s=unmet_s)
 
 
 def _notice(item: Reason | Caution) -> pb.Notice:

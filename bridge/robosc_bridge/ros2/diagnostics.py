@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 from robosc_bridge.terminal.client import DriveState, Snapshot, is_fault, state_name
-from robosc_bridge.terminal.formatting import STALE_S
+from robosc_bridge.terminal.formatting import STALE_S, owed_text
 
 _STANDBY = "STANDBY"
 
@@ -54,7 +54,9 @@ class Link:
 
 
 BRIDGE, SAFETY, SUPERVISOR, WARNINGS = "bridge", "safety", "supervisor", "warnings"
-"""Entries that there always are; the others are about the devices, by name."""
+"""Entries that there always are; the others are about goals, and about the devices by name."""
+
+GOALS = "goals"
 
 
 def entries(link: Link, snapshot: Snapshot | None, age_s: float) -> tuple[Entry, ...]:
@@ -79,13 +81,15 @@ def entries(link: Link, snapshot: Snapshot | None, age_s: float) -> tuple[Entry,
         _safety(snapshot),
         _supervisor(snapshot),
         _warnings(snapshot),
+        *_goals(snapshot),
         *_devices(snapshot),
     )
 
 
 def _stale(snapshot: Snapshot | None, why: str) -> Iterator[Entry]:
     devices = [] if snapshot is None else [item.name for item in snapshot.devices]
-    for name in (SAFETY, SUPERVISOR, WARNINGS, *devices):
+    goals = [GOALS] if snapshot is not None and snapshot.HasField("progress") else []
+    for name in (SAFETY, SUPERVISOR, WARNINGS, *goals, *devices):
         yield Entry(name, Level.STALE, why)
 
 
@@ -115,6 +119,26 @@ def _supervisor(snapshot: Snapshot) -> Entry:
     if snapshot.stops:
         return Entry(SUPERVISOR, Level.WARN, f"Nothing is requested: {'; '.join(snapshot.stops)}", values)
     return Entry(SUPERVISOR, Level.OK, "The supervisor is executed.", values)
+
+
+def _goals(snapshot: Snapshot) -> Iterator[Entry]:
+    """Yield the entry about the strategy's goals, if there is a strategy."""
+    if not snapshot.HasField("progress"):
+        return
+    progress = snapshot.progress
+    values = {}
+    for item in (*progress.aims, *progress.assumptions):
+        standing = (
+            "true" if item.is_met else f"not for {item.unmet_s:.0f} s" if item.HasField("unmet_s") else "not known"
+        )
+        values[item.name] = f"{standing}, reached {item.times} times: {item.words}"
+    values |= {"approached": progress.approached, "chosen": progress.chosen}
+    owed = [owed_text(item) for item in progress.assumptions if item.name in progress.overdue]
+    if owed:
+        yield Entry(GOALS, Level.WARN, "; ".join(owed), values)
+        return
+    message = f"The strategy approaches {progress.approached}." if progress.approached else "No goal is approached."
+    yield Entry(GOALS, Level.OK, message, values)
 
 
 def _warnings(snapshot: Snapshot) -> Entry:

@@ -42,6 +42,8 @@ _PATIENCE_S = 2.0
 
 Snapshot = pb.Snapshot
 DriveState = pb.DriveState
+StrategyProgress = pb.StrategyProgress
+Standing = pb.Standing
 Scan = pb.Scan
 Definition = pb.GetDefinitionResponse
 WatchResponse = pb.WatchResponse

@@ -5,12 +5,20 @@ import time
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from robosc_bridge.terminal.client import DriveState, Snapshot, WatchResponse, events_of, state_name
+from robosc_bridge.terminal.client import (
+    DriveState,
+    Snapshot,
+    Standing,
+    StrategyProgress,
+    WatchResponse,
+    events_of,
+    state_name,
+)
 
 STALE_S = 2.0
 """A snapshot that is older comes from a loop that hangs."""
 
-_MARKED = ("blocked", "fault")
+_MARKED = ("blocked", "fault", "owed")
 _SHOWN_APART = ("time", "kind", "state", "controllable", "decision_us")
 
 
@@ -43,6 +51,8 @@ def status_lines(snapshot: Snapshot) -> Iterator[str]:
     for item in snapshot.components:
         variables = " ".join(f"{name}={_word(value)}" for name, value in sorted(item.variables.items()))
         yield printable(f"  {item.name:{width}}  {item.state} {variables}".rstrip())
+    if snapshot.HasField("progress"):
+        yield from map(printable, _progress_lines(snapshot.progress))
     if snapshot.enabled:
         yield printable(f"  allowed now: {', '.join(snapshot.enabled)}")
 
@@ -60,6 +70,26 @@ def _drive_lines(drive: DriveState) -> Iterator[str]:
     pose, velocity = drive.pose, drive.velocity
     yield f"  at x {pose.x_m:.2f} m, y {pose.y_m:.2f} m, heading {math.degrees(pose.heading_rad):.0f} degrees"
     yield f"  moves at {velocity.linear_m_s:.2f} m/s, {velocity.angular_rad_s:.2f} rad/s"
+
+
+def _progress_lines(progress: StrategyProgress) -> Iterator[str]:
+    for aim in progress.aims:
+        turn = ", approached now" if aim.name == progress.approached else ""
+        since = (
+            "true" if aim.is_met else f"not yet, for {aim.unmet_s:.0f} s" if aim.HasField("unmet_s") else "not known"
+        )
+        yield f"  {aim.name}: {since}{turn}, reached {aim.times} times: {aim.words}"
+    if progress.is_followed:
+        yield f"  the strategy {f'requests {progress.chosen}' if progress.chosen else 'waits'}"
+    for item in progress.assumptions:
+        if item.HasField("unmet_s"):
+            mark = "warning: " if item.name in progress.overdue else ""
+            yield f"  {mark}{owed_text(item)}"
+
+
+def owed_text(item: Standing) -> str:
+    """Return in words for how long an assumption has been owed."""
+    return f"{item.name} has been owed for {item.unmet_s:.0f} s: {item.words}"
 
 
 class Lines:

@@ -3,6 +3,7 @@
 import argparse
 import sys
 from collections.abc import Callable, Collection, Mapping
+from dataclasses import asdict
 from datetime import datetime
 from enum import StrEnum
 from pathlib import Path
@@ -555,6 +556,8 @@ def result_json(found: TaskResult) -> dict[str, Any]:
     match found:
         case Synthesis():
             result["summary"] = found.summary and found.summary.text
+            if found.summary and found.summary.goals:
+                result["goals"] = asdict(found.summary.goals)
         case Generation():
             result["files"] = list(found.files or ())
         case Exploration():

@@ -10,6 +10,7 @@ from robosc.targets import TargetInfo
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.errors import malformed
 from robosc_client.results import (
+    GoalSummary,
     Progress,
     ServerInfo,
     ServerLimits,
@@ -155,7 +156,14 @@ def summary_of(message: pb.Summary) -> Summary:
         transitions=_count(message.transitions) if message.transitions else None,
         added=tuple((item.event, item.condition) for item in message.added),
         text=message.text,
+        goals=_goals_of(message.goals) if message.HasField("goals") else None,
     )
+
+
+def _goals_of(message: pb.Goals) -> GoalSummary:
+    for items in (message.aims, message.assumptions):
+        require_at_most(MAXIMUM_ITEMS, len(items), "goals")
+    return GoalSummary(tuple(message.aims), tuple(message.assumptions), message.has_strategy, message.modes)
 
 
 def statistics_of(message: pb.Statistics) -> Statistics:

@@ -134,7 +134,7 @@ class GetStatusResponse(_message.Message):
     def __init__(self, snapshot: _Optional[_Union[Snapshot, _Mapping]] = ...) -> None: ...
 
 class Snapshot(_message.Message):
-    __slots__ = ("number", "time", "age_s", "state", "problem", "reasons", "warnings", "stops", "devices", "components", "enabled", "drive", "has_scan", "overruns", "communications", "latencies", "lines")
+    __slots__ = ("number", "time", "age_s", "state", "problem", "reasons", "warnings", "stops", "devices", "components", "enabled", "drive", "has_scan", "overruns", "communications", "latencies", "lines", "progress")
     NUMBER_FIELD_NUMBER: _ClassVar[int]
     TIME_FIELD_NUMBER: _ClassVar[int]
     AGE_S_FIELD_NUMBER: _ClassVar[int]
@@ -152,6 +152,7 @@ class Snapshot(_message.Message):
     COMMUNICATIONS_FIELD_NUMBER: _ClassVar[int]
     LATENCIES_FIELD_NUMBER: _ClassVar[int]
     LINES_FIELD_NUMBER: _ClassVar[int]
+    PROGRESS_FIELD_NUMBER: _ClassVar[int]
     number: int
     time: _timestamp_pb2.Timestamp
     age_s: float
@@ -169,7 +170,38 @@ class Snapshot(_message.Message):
     communications: _containers.RepeatedCompositeFieldContainer[CommunicationState]
     latencies: _containers.RepeatedCompositeFieldContainer[Latency]
     lines: _containers.RepeatedCompositeFieldContainer[LineCounts]
-    def __init__(self, number: _Optional[int] = ..., time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., age_s: _Optional[float] = ..., state: _Optional[_Union[BridgeState, str]] = ..., problem: _Optional[str] = ..., reasons: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., warnings: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., stops: _Optional[_Iterable[str]] = ..., devices: _Optional[_Iterable[_Union[DeviceState, _Mapping]]] = ..., components: _Optional[_Iterable[_Union[ComponentState, _Mapping]]] = ..., enabled: _Optional[_Iterable[str]] = ..., drive: _Optional[_Union[DriveState, _Mapping]] = ..., has_scan: _Optional[bool] = ..., overruns: _Optional[int] = ..., communications: _Optional[_Iterable[_Union[CommunicationState, _Mapping]]] = ..., latencies: _Optional[_Iterable[_Union[Latency, _Mapping]]] = ..., lines: _Optional[_Iterable[_Union[LineCounts, _Mapping]]] = ...) -> None: ...
+    progress: StrategyProgress
+    def __init__(self, number: _Optional[int] = ..., time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., age_s: _Optional[float] = ..., state: _Optional[_Union[BridgeState, str]] = ..., problem: _Optional[str] = ..., reasons: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., warnings: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., stops: _Optional[_Iterable[str]] = ..., devices: _Optional[_Iterable[_Union[DeviceState, _Mapping]]] = ..., components: _Optional[_Iterable[_Union[ComponentState, _Mapping]]] = ..., enabled: _Optional[_Iterable[str]] = ..., drive: _Optional[_Union[DriveState, _Mapping]] = ..., has_scan: _Optional[bool] = ..., overruns: _Optional[int] = ..., communications: _Optional[_Iterable[_Union[CommunicationState, _Mapping]]] = ..., latencies: _Optional[_Iterable[_Union[Latency, _Mapping]]] = ..., lines: _Optional[_Iterable[_Union[LineCounts, _Mapping]]] = ..., progress: _Optional[_Union[StrategyProgress, _Mapping]] = ...) -> None: ...
+
+class StrategyProgress(_message.Message):
+    __slots__ = ("aims", "assumptions", "overdue", "is_followed", "approached", "chosen")
+    AIMS_FIELD_NUMBER: _ClassVar[int]
+    ASSUMPTIONS_FIELD_NUMBER: _ClassVar[int]
+    OVERDUE_FIELD_NUMBER: _ClassVar[int]
+    IS_FOLLOWED_FIELD_NUMBER: _ClassVar[int]
+    APPROACHED_FIELD_NUMBER: _ClassVar[int]
+    CHOSEN_FIELD_NUMBER: _ClassVar[int]
+    aims: _containers.RepeatedCompositeFieldContainer[Standing]
+    assumptions: _containers.RepeatedCompositeFieldContainer[Standing]
+    overdue: _containers.RepeatedScalarFieldContainer[str]
+    is_followed: bool
+    approached: str
+    chosen: str
+    def __init__(self, aims: _Optional[_Iterable[_Union[Standing, _Mapping]]] = ..., assumptions: _Optional[_Iterable[_Union[Standing, _Mapping]]] = ..., overdue: _Optional[_Iterable[str]] = ..., is_followed: _Optional[bool] = ..., approached: _Optional[str] = ..., chosen: _Optional[str] = ...) -> None: ...
+
+class Standing(_message.Message):
+    __slots__ = ("name", "words", "is_met", "times", "unmet_s")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    WORDS_FIELD_NUMBER: _ClassVar[int]
+    IS_MET_FIELD_NUMBER: _ClassVar[int]
+    TIMES_FIELD_NUMBER: _ClassVar[int]
+    UNMET_S_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    words: str
+    is_met: bool
+    times: int
+    unmet_s: float
+    def __init__(self, name: _Optional[str] = ..., words: _Optional[str] = ..., is_met: _Optional[bool] = ..., times: _Optional[int] = ..., unmet_s: _Optional[float] = ...) -> None: ...
 
 class Latency(_message.Message):
     __slots__ = ("name", "count", "p50_s", "p99_s", "max_s", "sum_s")

@@ -232,20 +232,34 @@ class Statistics(_message.Message):
     def __init__(self, engine: _Optional[str] = ..., state_bits: _Optional[int] = ..., iterations: _Optional[int] = ..., peak_nodes: _Optional[int] = ...) -> None: ...
 
 class Summary(_message.Message):
-    __slots__ = ("controllable_events", "uncontrollable_events", "states", "transitions", "added", "text")
+    __slots__ = ("controllable_events", "uncontrollable_events", "states", "transitions", "added", "text", "goals")
     CONTROLLABLE_EVENTS_FIELD_NUMBER: _ClassVar[int]
     UNCONTROLLABLE_EVENTS_FIELD_NUMBER: _ClassVar[int]
     STATES_FIELD_NUMBER: _ClassVar[int]
     TRANSITIONS_FIELD_NUMBER: _ClassVar[int]
     ADDED_FIELD_NUMBER: _ClassVar[int]
     TEXT_FIELD_NUMBER: _ClassVar[int]
+    GOALS_FIELD_NUMBER: _ClassVar[int]
     controllable_events: int
     uncontrollable_events: int
     states: str
     transitions: str
     added: _containers.RepeatedCompositeFieldContainer[AddedCondition]
     text: str
-    def __init__(self, controllable_events: _Optional[int] = ..., uncontrollable_events: _Optional[int] = ..., states: _Optional[str] = ..., transitions: _Optional[str] = ..., added: _Optional[_Iterable[_Union[AddedCondition, _Mapping]]] = ..., text: _Optional[str] = ...) -> None: ...
+    goals: Goals
+    def __init__(self, controllable_events: _Optional[int] = ..., uncontrollable_events: _Optional[int] = ..., states: _Optional[str] = ..., transitions: _Optional[str] = ..., added: _Optional[_Iterable[_Union[AddedCondition, _Mapping]]] = ..., text: _Optional[str] = ..., goals: _Optional[_Union[Goals, _Mapping]] = ...) -> None: ...
+
+class Goals(_message.Message):
+    __slots__ = ("aims", "assumptions", "has_strategy", "modes")
+    AIMS_FIELD_NUMBER: _ClassVar[int]
+    ASSUMPTIONS_FIELD_NUMBER: _ClassVar[int]
+    HAS_STRATEGY_FIELD_NUMBER: _ClassVar[int]
+    MODES_FIELD_NUMBER: _ClassVar[int]
+    aims: _containers.RepeatedScalarFieldContainer[str]
+    assumptions: _containers.RepeatedScalarFieldContainer[str]
+    has_strategy: bool
+    modes: int
+    def __init__(self, aims: _Optional[_Iterable[str]] = ..., assumptions: _Optional[_Iterable[str]] = ..., has_strategy: _Optional[bool] = ..., modes: _Optional[int] = ...) -> None: ...
 
 class AddedCondition(_message.Message):
     __slots__ = ("event", "condition")

@@ -1,8 +1,10 @@
 """The static part of a controlled system, for the interpreter and for generated code alike."""
 
+from collections.abc import Iterable
 from math import prod
 
-from robosc.execution.runtime.protocol import CommunicationInfo, Description
+from robosc.conditions.goals import aims_in_words, assumptions_in_words
+from robosc.execution.runtime.protocol import Aim, CommunicationInfo, Description
 from robosc.expressions import conjuncts
 from robosc.model.structure import Communication, CommunicationKind, EventKind, Model, Transition, is_tau
 from robosc.supervisor import Supervisor
@@ -25,7 +27,13 @@ def describe(supervisor: Supervisor) -> Description:
         taus=tuple(transition.event for transition in _taus(model)),
         silent_bound=silent_bound(model),
         has_strategy=supervisor.strategy is not None,
+        aims=() if supervisor.strategy is None else _aims(aims_in_words(supervisor)),
+        assumptions=() if supervisor.strategy is None else _aims(assumptions_in_words(model)),
     )
+
+
+def _aims(found: Iterable[tuple[str, str]]) -> tuple[Aim, ...]:
+    return tuple(Aim(name, words) for name, words in found)
 
 
 def silent_bound(model: Model) -> int:

@@ -1,9 +1,11 @@
-"""Goals and assumptions, as an executor keeps account of them, and the strategy that reaches them."""
+"""Goals, missions and assumptions, as an executor keeps account of them, and the strategy that reaches them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Protocol
 
 from robosc.execution.interpreter.functions import Function, Place, State, diagram_function, function_of, holds
+from robosc.execution.interpreter.missions import MissionOfSystem, MissionPlace
 from robosc.expressions import Value
 from robosc.model.structure import Assumption, CommunicationKind, Goal, GoalForm, Model
 from robosc.supervisor import Strategy
@@ -67,8 +69,23 @@ class _Held:
         return kept and state[self._plant, None] == "executing" and not holds(self._condition, state)
 
 
+@dataclass(frozen=True, slots=True)
+class Account:
+    """All that is remembered.
+
+    Attributes:
+        kept: Truth values, by name.
+        missions: For each mission, where it is.
+        mode: Number of the goal or visit that is approached.
+    """
+
+    kept: Mapping[str, bool]
+    missions: tuple[MissionPlace, ...]
+    mode: int
+
+
 class GoalsOfSystem:
-    """Account of the goals of one system.
+    """Account of the goals and missions of one system.
 
     Args:
         model: The model.
@@ -90,13 +107,17 @@ class GoalsOfSystem:
                     name = f"requirement {number} of {communication.name} was met"
                     self._held.append((f"{communication.name}.cancel", name, held))
                     self._kept[name] = held
+        self._assumptions: list[_Item] = []
         for number, assumption in enumerate(model.assumptions, start=1):
             owed = _Item(assumption, f"assumption {number}")
             self._kept[owed.name] = owed
+            self._assumptions.append(owed)
         self._goals = [_Item(goal, f"goal {number}") for number, goal in enumerate(model.goals, start=1)]
         self._kept |= {item.name: item for item in self._goals}
+        self._missions = [MissionOfSystem(mission) for mission in model.missions]
         places: dict[Place, Sequence[Value]] = dict(domains)
-        places.update({(_MEMORY, name): (False, True) for name in self._kept})
+        names = [*self._kept, *(name for mission in self._missions for name in mission.names)]
+        places.update({(_MEMORY, name): (False, True) for name in names})
         self._modes = [
             [(requests.index(item.event), diagram_function(item.condition, places)) for item in mode]
             for mode in strategy.modes
@@ -105,40 +126,63 @@ class GoalsOfSystem:
 
     def restart(self) -> None:
         """Forget everything."""
-        self._memory = dict.fromkeys(self._kept, False)
-        self._mode = 0
+        missions = tuple(mission.start for mission in self._missions)
+        self._account = Account(dict.fromkeys(self._kept, False), missions, 0)
 
     def observe(self, state: State) -> None:
         """Take in a stable state."""
-        self._memory = {name: kept.after(self._memory[name], state) for name, kept in self._kept.items()}
+        before = self._account
+        kept = {name: item.after(before.kept[name], state) for name, item in self._kept.items()}
+        places = zip(self._missions, before.missions, strict=True)
+        self._account = Account(kept, tuple(item.after(place, state) for item, place in places), before.mode)
 
     def due_cancels(self, state: State) -> Iterator[str]:
         """Yield the cancels that an executor would issue by itself now, if they are allowed."""
         for event, name, held in self._held:
-            if held.has_fallen(self._memory[name], state):
+            if held.has_fallen(self._account.kept[name], state):
                 yield event
+
+    def are_met(self, state: State) -> tuple[bool, ...]:
+        """Return for each goal, visit and assumption True if it is met in a stable state that was taken in."""
+        owed = (item.is_true(self._account.kept[item.name], state) for item in self._assumptions)
+        return (*self._is_nothing_wanted(state), *owed)
+
+    @property
+    def mode(self) -> int:
+        """Number of the goal or visit whose turn it is."""
+        return self._account.mode
 
     def are_true(self, state: State) -> tuple[bool, ...]:
         """Return for each goal True if it counts as come true in a stable state that was taken in."""
-        return tuple(goal.is_true(self._memory[goal.name], state) for goal in self._goals)
+        return tuple(goal.is_true(self._account.kept[goal.name], state) for goal in self._goals)
+
+    def missions(self) -> tuple[MissionPlace, ...]:
+        """Return for each mission where it is since the last stable state that was taken in."""
+        return self._account.missions
+
+    def _is_nothing_wanted(self, state: State) -> Iterator[bool]:
+        """Yield for each goal and each visit True if nothing is to be done for it in a state that was taken in."""
+        yield from self.are_true(state)
+        for mission, place in zip(self._missions, self._account.missions, strict=True):
+            yield from (not is_wanted for is_wanted in mission.wanted(place, state))
 
     def choose(self, state: State) -> int | None:
         """Return the number of the request that the strategy chooses in a stable state, None to wait."""
-        for _ in self._goals:
-            goal = self._goals[self._mode]
-            if not goal.is_true(self._memory[goal.name], state):
-                break
-            self._mode = (self._mode + 1) % len(self._goals)
-        else:
+        account, done = self._account, tuple(self._is_nothing_wanted(state))
+        mode = next((mode for mode in (*range(account.mode, len(done)), *range(account.mode)) if not done[mode]), None)
+        if mode is None:
             return None
+        self._account = Account(account.kept, account.missions, mode)
         whole: dict[Place, Value] = dict(state)
-        whole.update({(_MEMORY, name): value for name, value in self._memory.items()})
-        return next((request for request, condition in self._modes[self._mode] if condition(whole)), None)
+        whole.update({(_MEMORY, name): value for name, value in account.kept.items()})
+        for mission, place in zip(self._missions, account.missions, strict=True):
+            whole.update({(_MEMORY, name): value for name, value in mission.remembered(place).items()})
+        return next((request for request, condition in self._modes[mode] if condition(whole)), None)
 
-    def snapshot(self) -> tuple[dict[str, bool], int]:
+    def snapshot(self) -> Account:
         """Return what is kept, as a value to come back to."""
-        return self._memory, self._mode
+        return self._account
 
-    def restore(self, snapshot: tuple[dict[str, bool], int]) -> None:
+    def restore(self, snapshot: Account) -> None:
         """Back to what `snapshot` has returned."""
-        self._memory, self._mode = snapshot
+        self._account = snapshot

@@ -7,7 +7,8 @@ from typing import Any
 from robosc.automata.plants import communication_plant_name
 from robosc.execution.interpreter.description import describe
 from robosc.execution.interpreter.functions import Data, Place, function_of, holds, no_data
-from robosc.execution.interpreter.goals import GoalsOfSystem
+from robosc.execution.interpreter.goals import Account, GoalsOfSystem
+from robosc.execution.interpreter.missions import MissionPlace
 from robosc.execution.interpreter.received import Reader
 from robosc.execution.interpreter.rules import (
     EventRule,
@@ -46,11 +47,11 @@ class Snapshot:
 
     Attributes:
         state: Value of each place.
-        goals: Memory of the goals; None where there is no strategy.
+        goals: Memory of the goals and missions; None where there is no strategy.
     """
 
     state: Mapping[Place, Value]
-    goals: tuple[dict[str, bool], int] | None
+    goals: Account | None
 
 
 class InterpretedSystem:
@@ -201,10 +202,17 @@ class InterpretedSystem:
         """Return the location of a service or action; an unknown name is a KeyError."""
         return str(self._state[communication_plant_name(self._model.communication(communication)), None])
 
-    def observe(self) -> None:
-        """Take in a stable state, for what the strategy remembers."""
-        if self._goals is not None:
-            self._goals.observe(self._state)
+    def observe(self) -> tuple[bool, ...]:
+        """Take in a stable state, for what the strategy remembers; for each aim and assumption, whether it is met."""
+        if self._goals is None:
+            return ()
+        self._goals.observe(self._state)
+        return self._goals.are_met(self._state)
+
+    @property
+    def mode(self) -> int:
+        """Number of the aim whose turn it is."""
+        return 0 if self._goals is None else self._goals.mode
 
     def choose(self) -> int | None:
         """Number of the request that the strategy chooses in this stable state, or None if it waits."""
@@ -225,6 +233,10 @@ class InterpretedSystem:
     def reached(self) -> tuple[bool, ...]:
         """Return for each goal True if it counts as come true in this stable state; nothing without a strategy."""
         return () if self._goals is None else self._goals.are_true(self._state)
+
+    def missions(self) -> tuple[MissionPlace, ...]:
+        """Return for each mission where it is since the last stable state; nothing without a strategy."""
+        return () if self._goals is None else self._goals.missions()
 
     def state(self) -> dict[str, dict[str, Any]]:
         """State and variables of every component with a behaviour."""

@@ -11,7 +11,7 @@ from __future__ import annotations
 import random
 from typing import List, Protocol, Sequence, Tuple
 
-from robosc.execution.runtime.protocol import StrategicSystem
+from robosc.execution.runtime.progress import ProgressAccount
 
 _NEVER = -1
 
@@ -20,7 +20,11 @@ class Policy(Protocol):
     """Policy that decides between requests that are enabled together."""
 
     def candidates(self, enabled: Tuple[int, ...]) -> Tuple[int, ...]:
-        """Return those of the enabled requests that may be issued at this decision."""
+        """
+        Return those of the enabled requests that may be issued at a decision.
+
+        They are asked for once in each stable state.
+        """
 
     def choose(self, candidates: Sequence[int]) -> int:
         """One of the candidates (at least one, ascending)."""
@@ -158,13 +162,13 @@ class StrategyPolicy:
     """
     The request that the supervisor's strategy chooses, or none.
 
-    :param system: System with a strategy.
+    :param progress: Account of the strategy's progress, which asks the strategy.
     """
 
-    __slots__ = ('_system',)
+    __slots__ = ('_progress',)
 
-    def __init__(self, system: StrategicSystem) -> None:
-        self._system = system
+    def __init__(self, progress: ProgressAccount) -> None:
+        self._progress = progress
 
     def candidates(self, enabled: Tuple[int, ...]) -> Tuple[int, ...]:
         """
@@ -172,7 +176,7 @@ class StrategyPolicy:
 
         An action whose cancelled goal is not known to have ended is not enabled: it is waited for.
         """
-        chosen = self._system.choose()
+        chosen = self._progress.decide()
         return (chosen,) if chosen in enabled else ()
 
     def choose(self, candidates: Sequence[int]) -> int:

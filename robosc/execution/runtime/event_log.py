@@ -10,6 +10,10 @@ An entry is a dict with `time` (seconds since 1970-01-01 UTC), `kind` and, by ki
     unknown     event and what was unknown; a request of this kind was not issued
     release     the default message went out: identifier
     blocked     a supervision layer held a request back: identifier, why
+    reached     an aim of the strategy has become true: aim, count (how often so far), what
+    approach    the strategy approaches another aim now: aim (null: all are met), what
+    owed        an assumption has been owed for too long: assumption, owed_s, what
+    met         an assumption is met of which that was said: assumption, owed_s, what
     fault       a fault: what
     stop        a safe stop that is no fault (a stale sensor, a signal): what
     resume      the end of such a stop: what

@@ -6,12 +6,12 @@ It issues the requests itself (semantics 3.5), on top of what all executors do.
 
 from __future__ import annotations
 
-from typing import cast, Optional
+from typing import Optional
 
 from robosc.execution.runtime.clock import Clock
 from robosc.execution.runtime.decision import make_policy, Policy, StrategyPolicy
 from robosc.execution.runtime.event_log import EventLog
-from robosc.execution.runtime.protocol import ControlledSystem, Middleware, StrategicSystem
+from robosc.execution.runtime.protocol import ControlledSystem, Middleware
 from robosc.execution.runtime.requests import Decisions
 from robosc.execution.runtime.runner import Runner
 from robosc.execution.runtime.safe_stop import describe_error
@@ -88,6 +88,7 @@ class Executor(Runner):
     def _new_policy(self) -> Policy:
         settings = self.settings
         policy = settings.policy or 'fair'
-        if policy == 'strategy':
-            return StrategyPolicy(cast(StrategicSystem, self._system))
+        if policy == 'strategy' and self._progress is not None:
+            self._progress.is_followed = True
+            return StrategyPolicy(self._progress)
         return make_policy(policy, self._request_names, settings.priority, settings.seed)

@@ -49,6 +49,18 @@ class CommunicationInfo(NamedTuple):
     has_condition: bool = False
 
 
+class Aim(NamedTuple):
+    """
+    Condition that a strategy makes true again and again, or that it assumes to be made true.
+
+    :ivar name: Its name, such as `goal 1` or `assumption 2`.
+    :ivar words: The goal or assumption as a user writes it.
+    """
+
+    name: str
+    words: str
+
+
 class Description(NamedTuple):
     """
     The static part of a controlled system; all tuples in source order.
@@ -61,6 +73,8 @@ class Description(NamedTuple):
     :ivar taus: Tau events that can change something.
     :ivar silent_bound: Maximum number of silent steps in a row of a run that ends.
     :ivar has_strategy: True if the supervisor has a strategy that reaches the goals of the model.
+    :ivar aims: Aims of the strategy, in its order.
+    :ivar assumptions: Its assumptions about the surroundings, in source order.
     """
 
     name: str
@@ -71,6 +85,8 @@ class Description(NamedTuple):
     taus: Tuple[str, ...]
     silent_bound: int
     has_strategy: bool = False
+    aims: Tuple[Aim, ...] = ()
+    assumptions: Tuple[Aim, ...] = ()
 
 
 def requesting(infos: Sequence[CommunicationInfo]) -> Tuple[CommunicationInfo, ...]:
@@ -223,13 +239,22 @@ class ControlledSystem(Protocol):
 
 
 class StrategicSystem(ControlledSystem, Protocol):
-    """A controlled system with a strategy, which its description says."""
+    """
+    A controlled system with a strategy, which its description says.
 
-    def observe(self) -> None:
+    :ivar mode: Number of the aim whose turn it is: the one that the last choice approached, unless
+        all of them were met.
+    """
+
+    mode: int
+
+    def observe(self) -> Tuple[bool, ...]:
         """
         Take in a stable state, for what the strategy remembers of goals and assumptions.
 
         To observe a state again changes nothing.
+
+        :returns: For each aim, then for each assumption, whether it is met in this state.
         """
 
     def choose(self) -> Optional[int]:

@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, NamedTuple, Sequence
+from typing import Any, Dict, NamedTuple, Optional, Sequence
 
 from robosc.execution.runtime.clock import Clock
 from robosc.execution.runtime.event_log import EventLog
-from robosc.execution.runtime.protocol import ControlledSystem
+from robosc.execution.runtime.protocol import Aim, ControlledSystem
 
 
 class Counters(NamedTuple):
@@ -106,6 +106,30 @@ class Recorder:
     def blocked(self, identifier: str, why: str) -> None:
         """Note that a supervision layer held a request back."""
         self._write({'kind': 'blocked', 'identifier': identifier, 'why': why})
+
+    def reached(self, aim: Aim, count: int) -> None:
+        """Note that an aim was reached, and how often so far."""
+        self._write({'kind': 'reached', 'aim': aim.name, 'count': count, 'what': aim.words})
+
+    def approach(self, aim: Optional[Aim]) -> None:
+        """Note that another aim is approached now; None: none is, since all of them are met."""
+        if aim is None:
+            self._write({'kind': 'approach', 'aim': None, 'what': 'all are met'})
+        else:
+            self._write({'kind': 'approach', 'aim': aim.name, 'what': aim.words})
+
+    def owed(self, assumption: Aim, owed_s: float) -> None:
+        """Note that an assumption has been owed for too long."""
+        self._write_assumption('owed', assumption, owed_s)
+
+    def met(self, assumption: Aim, owed_s: float) -> None:
+        """Note that an assumption is met that was reported as owed."""
+        self._write_assumption('met', assumption, owed_s)
+
+    def _write_assumption(self, kind: str, assumption: Aim, owed_s: float) -> None:
+        name, words = assumption
+        entry = {'assumption': name, 'owed_s': round(owed_s, 3), 'what': words}
+        self._write({'kind': kind, **entry})
 
     def note(self, kind: str, what: str) -> None:
         """Note a stop, its end, or a restart."""

@@ -85,6 +85,7 @@ class Decisions:
 
     __slots__ = (
         '_calls',
+        '_candidates',
         '_goals',
         '_middleware',
         '_recorder',
@@ -116,6 +117,8 @@ class Decisions:
         self._calls = calls
         self._goals = goals
         self.policy = policy
+        # The policy's choice among what is enabled depends on the stable state alone.
+        self._candidates: Tuple[int, ...] = ()
 
     def decide(self, now_s: float) -> bool:
         """
@@ -127,9 +130,10 @@ class Decisions:
         enabled = self._steps.enabled
         if enabled is None:
             enabled = self._steps.enabled = self._find_enabled()
+            # A strategy notes the goals that are true, also where it has nothing to choose.
+            self._candidates = self.policy.candidates(enabled)
         issued = None
-        # A strategy notes the goals that are true, also where it has nothing to choose.
-        candidates = self.policy.candidates(enabled)
+        candidates = self._candidates
         if enabled:
             if self._releases.waiting:
                 ending, others = self._split(candidates)

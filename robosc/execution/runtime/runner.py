@@ -21,12 +21,14 @@ from typing import Any, Callable, cast, Optional, Tuple, TypeVar
 from robosc.execution.runtime.calls import Calls, Goals
 from robosc.execution.runtime.clock import Clock, SystemClock
 from robosc.execution.runtime.event_log import EventLog, NullLog
+from robosc.execution.runtime.progress import Progress, ProgressAccount
 from robosc.execution.runtime.protocol import (
     batches,
     ControlledSystem,
     Description,
     OUTGOING,
     RobotSide,
+    StrategicSystem,
 )
 from robosc.execution.runtime.recorder import Counters, Recorder
 from robosc.execution.runtime.release import Releases
@@ -126,8 +128,15 @@ class Runner:
         )
         self._has_watched_sensors = bool(self._sensors)
         self._safe_stop = SafeStop(robot, self._releases, self._goals)
+        self._progress = self._new_progress()
         self._steps = Steps(
-            system, robot, self._recorder, self._releases, self._goals, self.settings.on_unknown
+            system,
+            robot,
+            self._recorder,
+            self._releases,
+            self._goals,
+            self.settings.on_unknown,
+            self._progress,
         )
         self._replies = Replies(self._steps, robot, self._recorder, self._calls, self._goals)
         self._batches = batches(infos)
@@ -171,6 +180,13 @@ class Runner:
     def counters(self) -> Counters:
         """Return counts of what went wrong so far."""
         return self._recorder.counters()
+
+    @property
+    def progress(self) -> Optional[Progress]:
+        """Return how far the strategy is; None where there is none."""
+        if self._progress is None:
+            return None
+        return self._progress.at(self._clock.monotonic())
 
     # Reports of an adapter.
 
@@ -328,7 +344,23 @@ class Runner:
             self._check_time(now)
 
     def _next_deadline(self, now: float) -> float:
-        return min(self._replies.deadline_s(), self._sensors.deadline_s(now))
+        next_s = min(self._replies.deadline_s(), self._sensors.deadline_s(now))
+        return next_s if self._progress is None else min(next_s, self._progress.due_s)
+
+    def _new_progress(self) -> Optional[ProgressAccount]:
+        if not self._system.description.has_strategy:
+            return None
+        account = ProgressAccount(
+            cast(StrategicSystem, self._system),
+            self._recorder,
+            tuple(request.name for request in self._requests),
+            self.settings.assumption_timeout_s,
+        )
+        account.wake = self._wake_at
+        return account
+
+    def _wake_at(self, due_s: float) -> None:
+        self._deadline_s = min(self._deadline_s, due_s)
 
     def _check_time(self, now: float) -> None:
         """
@@ -343,8 +375,10 @@ class Runner:
             self._fail(describe_error(error))
 
     def _end_what_is_over(self, now: float) -> None:
-        """Handle replies that did not come in time, and stale sensors."""
+        """Handle replies and assumptions that did not come in time, and stale sensors."""
         self._replies.expire(now)
+        if self._progress is not None:
+            self._progress.expire(now)
         for name, identifier in self._sensors.stale(now):
             if _stale_key(name) not in self._safe_stop.reasons:
                 self._stop(_stale_key(name), '{} on {} is stale'.format(name, identifier))

@@ -42,6 +42,8 @@ class Settings(NamedTuple):
         `keep`, `fault`.
     :ivar command_timeout_s: Seconds without a message from the existing controller on a release
         identifier after which its last one is released, in a supervision layer; 0: never.
+    :ivar assumption_timeout_s: Seconds after which an assumption of the model that is owed is
+        reported, where there is a strategy; 0: never.
     """
 
     period_s: float = 0.1
@@ -55,11 +57,12 @@ class Settings(NamedTuple):
     action_timeout_s: Optional[float] = None
     on_unknown: str = 'default'
     command_timeout_s: float = 1.0
+    assumption_timeout_s: float = 30.0
 
 
 OTHER_DEPLOYMENT = {
     'controller': ('command_timeout_s',),
-    'layer': ('policy', 'priority', 'seed', 'every'),
+    'layer': ('policy', 'priority', 'seed', 'every', 'assumption_timeout_s'),
 }
 """
 For each deployment the settings that mean something in the other one only.
@@ -101,6 +104,9 @@ def validated(settings: Settings) -> Settings:
         action_timeout_s=_optional_seconds('action_timeout_s', settings.action_timeout_s),
         on_unknown=_choice('on_unknown', settings.on_unknown, ON_UNKNOWN),
         command_timeout_s=_seconds_or_zero('command_timeout_s', settings.command_timeout_s),
+        assumption_timeout_s=_seconds_or_zero(
+            'assumption_timeout_s', settings.assumption_timeout_s
+        ),
     )
 
 
@@ -114,6 +120,11 @@ def settings_for(settings: Settings, description: Description) -> Settings:
     if checked.policy == 'strategy' and not description.has_strategy:
         raise SettingsError(
             "setting 'policy' is 'strategy', but the supervisor has none: its model has no goals"
+        )
+    default_s = Settings().assumption_timeout_s
+    if checked.assumption_timeout_s != default_s and not description.has_strategy:
+        raise SettingsError(
+            "setting 'assumption_timeout_s' means nothing here: the supervisor has no strategy"
         )
     infos = description.communications
     _require_known(

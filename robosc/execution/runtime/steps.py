@@ -8,11 +8,12 @@ within a batch counts as new: a second check gives the same result.
 
 from __future__ import annotations
 
-from typing import Any, cast, Dict, Optional, Tuple
+from typing import Any, Dict, Optional, Tuple
 
 from robosc.execution.runtime.calls import Goals
 from robosc.execution.runtime.livelock import LivelockDetector
-from robosc.execution.runtime.protocol import ControlledSystem, Reading, RobotSide, StrategicSystem
+from robosc.execution.runtime.progress import ProgressAccount
+from robosc.execution.runtime.protocol import ControlledSystem, Reading, RobotSide
 from robosc.execution.runtime.recorder import Recorder
 from robosc.execution.runtime.release import Releases
 from robosc.execution.runtime.safe_stop import request_cancel
@@ -32,6 +33,7 @@ class Steps:
     :param releases: Messages that keep acting.
     :param goals: Goals under way.
     :param on_unknown: Meaning of an unknown enum: `default`, `keep` or `fault`.
+    :param progress: Account of the strategy's progress; None where there is no strategy.
     :ivar enabled: Numbers of the requests that the stable state enables, or None before they are
         computed.
     :ivar unchanging: Messages whose request was issued in this stable state and changed nothing:
@@ -42,9 +44,9 @@ class Steps:
     __slots__ = (
         '_goals',
         '_middleware',
-        '_observes',
         '_on_unknown',
         '_pending',
+        '_progress',
         '_recorder',
         '_releases',
         '_stable',
@@ -61,6 +63,7 @@ class Steps:
         releases: Releases,
         goals: Goals,
         on_unknown: str,
+        progress: Optional[ProgressAccount] = None,
     ) -> None:
         self._system = system
         self._middleware = middleware
@@ -68,7 +71,7 @@ class Steps:
         self._releases = releases
         self._goals = goals
         self._on_unknown = on_unknown
-        self._observes = system.description.has_strategy
+        self._progress = progress
         self.enabled: Optional[Tuple[int, ...]] = None
         self.unchanging: Dict[str, Tuple[Any, bool]] = {}
         # The system's `changes` in the last stable state, or None if the state may not be stable.
@@ -79,6 +82,8 @@ class Steps:
     def restart(self) -> None:
         """Return to the initial state, which may not be stable."""
         self._system.restart()
+        if self._progress is not None:
+            self._progress.restart()
         self._stable = None
         self.enabled = None
         self.unchanging.clear()
@@ -171,8 +176,11 @@ class Steps:
             if event is not None:
                 self._run_on(event)
             self._stable = self._system.changes
-            if self._observes:
-                self._observe()
+            progress = self._progress
+            if progress is not None:
+                met = progress.observe()
+                if met != progress.met:
+                    progress.change(met)
             if self._goals:
                 self._goals.observe_stable_state()
             for identifier in self._releases.due(issuing):
@@ -187,9 +195,6 @@ class Steps:
         self._middleware.publish_default(identifier)
         self._releases.released(identifier)
         self._recorder.release(identifier)
-
-    def _observe(self) -> None:
-        cast(StrategicSystem, self._system).observe()
 
     def _run_on(self, event: Optional[str]) -> None:
         """Take silent steps after the first one, `event`, until none is enabled."""

@@ -19,9 +19,11 @@ def observing(executable: ExecutableSystem, scope: ExpressionWriter, namer: Name
     return [*found, *(Assign(scope.variable_place(MEMORY, place.name), local) for place, local in kept)]
 
 
-def reached(executable: ExecutableSystem, number: int, scope: ExpressionWriter) -> Block:
-    """Return the statements that say whether a goal is true."""
-    return [Return(scope.truth(executable.obligations.goals[number]))]
+def met(executable: ExecutableSystem, scope: ExpressionWriter) -> list[Code]:
+    """Return for each aim, then each assumption, the condition that it is met in a stable state that was taken in."""
+    obligations = executable.obligations
+    conditions = (*(aim.condition for aim in obligations.aims), *obligations.assumptions)
+    return [scope.truth(condition) for condition in conditions]
 
 
 def choosing(executable: ExecutableSystem, strategy: Strategy, number: int, diagrams: Diagrams, nothing: Code) -> Block:
@@ -30,7 +32,7 @@ def choosing(executable: ExecutableSystem, strategy: Strategy, number: int, diag
     Args:
         executable: Executable system of the robot.
         strategy: Its strategy.
-        number: Number of the goal.
+        number: Number of the goal or visit.
         diagrams: Writer of the conditions.
         nothing: Result where nothing is chosen.
     """

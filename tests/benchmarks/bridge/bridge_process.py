@@ -25,7 +25,8 @@ from robosc_bridge.configuration import load, map_channels
 from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.states import OperatorCommand, State
 from robosc_bridge.daemon.supervisors import Source, obtain
-from robosc_view import ViewEndpoint, ViewSettings
+from robosc_bridge.daemon.view_settings import ViewSettings
+from robosc_view import ViewEndpoint
 
 LIMIT_S = 60.0
 SETTLE_S = 1.0

@@ -5,10 +5,13 @@ from pathlib import Path
 
 import pytest
 
+from robosc.execution.interpreter import InterpretedSystem
 from robosc.supervisor import Supervisor
 from robosc_view.definition import DefinitionError
 from robosc_view.messages import MessageBuilder, PreparedRobot
 from robosc_view.ros2_topic import MAXIMUM_CHARACTERS, StateReader
+from support.execution import Bench
+from support.goal_porter import porter_supervisor
 from support.live import large_model, supervisor_without_synthesis
 from support.view_nodes import Node
 
@@ -113,3 +116,23 @@ def test_what_makes_no_sense_is_reported_in_a_sentence(large: Supervisor, tmp_pa
     other = supervisor_without_synthesis(large_model(3))
     with pytest.raises(DefinitionError, match="another model"):
         StateReader(other).read(json.dumps(good), 1.0)
+
+
+def test_the_progress_of_a_strategy_is_read_as_the_node_writes_it(tmp_path: Path) -> None:
+    node, reader = Node(porter_supervisor(), tmp_path), StateReader(porter_supervisor())
+    assert reader.read(node.system.report(), 1.0)[1].progress is None
+    bench = Bench(InterpretedSystem(porter_supervisor()), assumption_timeout_s=2.0)
+    bench.receive("/call")
+    bench.tick(40)
+    progress = bench.executor.progress
+    assert progress is not None and progress.overdue == ("assumption 1",)
+    text = node.system.report(progress)
+    rounded = tuple(item._replace(unmet_s=item.unmet_s and round(item.unmet_s, 3)) for item in progress.assumptions)
+    found = reader.read(text, 1.0)[1].progress
+    assert found is not None
+    assert (found.assumptions, found.approached, found.overdue) == (rounded, "goal 1", ("assumption 1",))
+    document = json.loads(text)
+    changes: tuple[dict[str, object], ...] = ({"aims": [{}]}, {"chosen": 7}, {"aims": None})
+    for wrong in ([], *({**document["progress"], **change} for change in changes)):
+        with pytest.raises(DefinitionError, match="the progress on /state makes no sense"):
+            reader.read(json.dumps({**document, "progress": wrong}), 1.0)

@@ -100,6 +100,7 @@ def test_the_summary_tells_for_each_goal_what_is_requested_where(supervisor: Sup
     assert "    goals                 passed\n" in text
     found = json.loads(json.dumps(summary_json(supervisor)))
     assert found["goals"][1] == {
+        "name": "goal 2",
         "goal": "always eventually Base.outside and not Door.opening",
         "choices": [{"event": "leave.request", "condition": "Base.inside"}],
     }

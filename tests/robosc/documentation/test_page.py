@@ -246,6 +246,26 @@ def test_a_requirement_is_a_sentence(requirement: str, lines: list[str]) -> None
                 "from coming true, C.b."
             ],
         ),
+        ("mission m { visit C.a }", "Missions", ["m: The robot reaches, round after round, C.a."]),
+        (
+            "mission m while C.b { visit C.a then C.b and C.a on C.a or C.b from anywhere visit C.a then C.b "
+            "on C.b from anywhere visit C.a }",
+            "Missions",
+            [
+                "m: While C.b, the robot reaches, round after round, C.a, then C.b and C.a. Whenever C.a or C.b, it "
+                "reaches before that C.a, then C.b. Whenever C.b, it reaches before that C.a."
+            ],
+        ),
+        (
+            "goal once C.a prefer go over stay",
+            "Preferences",
+            ["go is requested rather than stay, where both lead nearer to a goal."],
+        ),
+        (
+            "goal once C.a prefer {go, stay} over {}",
+            "Preferences",
+            ["A preference without effect: one of its sides names no request."],
+        ),
     ],
 )
 def test_goals_and_assumptions_are_sentences(statement: str, title: str, lines: list[str]) -> None:
@@ -258,10 +278,17 @@ def test_only_a_robot_with_goals_counts_them() -> None:
         model = model_of(REQUIREMENTS % " ".join(statements))
         return {row[0]: row[1:] for row in section(read_page(page(model)), "Overview").tables[0]}
 
-    assert not {"goals", "assumptions"} & counted("requirement go needs C.a").keys()
+    younger = {"goals", "assumptions", "missions", "preferences"}
+    assert not younger & counted("requirement go needs C.a").keys()
     found = counted("goal once C.a", "goal once C.b", "assume always eventually C.a", "assume allow C.a leads to C.b")
     assert found["goals"] == ["2", ""]
     assert found["assumptions"] == ["2", "1 that the robot may break"]
+    assert not {"missions", "preferences"} & found.keys()
+    found = counted("mission a { visit C.a then C.b }", "mission b { visit C.a }", "prefer go over stay")
+    assert (found["missions"], found["preferences"]) == (["2", "3 visits"], ["1", ""])
+    assert "goals" not in found
+    found = counted("mission a { visit C.a on C.b from anywhere visit C.a }")
+    assert found["missions"] == ["1", "1 visit, 1 detour"]
 
 
 PROVIDES = """robot R {

@@ -217,6 +217,7 @@ def test_behind_what_is_called_not_stands_an_operator_too() -> None:
 AIMED = """robot R {{
     component goal {{
         outgoing message seen with type: none
+        incoming message push with type: none
         behaviour {{ initial marked state shut {{ on response from seen goto open }} marked state open {{ }} }}
     }}
     requirement never goal.shut and goal.open
@@ -241,10 +242,33 @@ AIMED = """robot R {{
         ("assume allow |", {"always", "goal"}, {"once", "allow"}),
         ("assume allow always |", {"eventually"}, {"once", "allow"}),
         ("goal once goal.open assume goal.open leads to goal.|", {"open"}, {"goal"}),
+        ("|", {"mission", "prefer"}, {"visit", "while", "over"}),
+        ("mission |", set(), {"goal", "mission", "while", "true"}),
+        ("mission m |", {"while"}, {"visit", "mission"}),
+        ("mission m while |", {"goal", "not", "true"}, {"visit", "while"}),
+        ("mission m while goal.open |", {"and", "or"}, {"visit", "while"}),
+        ("mission m {{ |", {"visit"}, {"on", "then", "goal"}),
+        ("mission m {{ visit |", {"goal", "not"}, {"then", "visit"}),
+        ("mission m {{ visit goal.|", {"shut", "open"}, {"goal"}),
+        ("mission m {{ visit goal.open |", {"then", "on", "and"}, {"visit", "from"}),
+        ("mission m {{ visit goal.open then |", {"goal", "not"}, {"then"}),
+        ("mission m {{ visit goal.open on |", {"goal", "not"}, {"response", "from"}),
+        ("mission m {{ visit goal.open on goal.shut |", {"from", "and"}, {"visit", "anywhere"}),
+        ("mission m {{ visit goal.open on goal.shut from |", {"anywhere"}, {"seen", "goal"}),
+        ("mission m {{ visit goal.open on goal.shut from anywhere |", {"visit"}, {"then"}),
+        ("mission m {{ visit goal.open on goal.shut from anywhere visit |", {"goal"}, {"visit"}),
+        ("prefer |", {"push"}, {"seen", "goal", "over"}),
+        ("prefer push |", {"over"}, {"push", "and"}),
+        ("prefer push over |", {"push"}, {"seen", "goal"}),
+        ("prefer {{ |", {"push"}, {"seen", "goal"}),
+        ("prefer {{ push, |", {"push"}, {"seen", "goal"}),
+        ("prefer {{ push }} |", {"over"}, {"push"}),
+        ("prefer {{ push }} over |", {"push"}, {"seen", "goal"}),
+        ("prefer {{ push }} over {{ push, |", {"push"}, {"seen", "goal"}),
     ],
 )
 def test_the_words_of_goals_are_offered(words: str, expected: set[str], unfit: set[str]) -> None:
-    found = offered(AIMED.format(words)).keys()
+    found = offered(AIMED.format(words.replace("{{", "{").replace("}}", "}"))).keys()
     assert expected <= found
     assert not unfit & found
 
@@ -256,7 +280,7 @@ def test_goals_begin_items_and_names_do_not() -> None:
         return " ".join(place.item)
 
     for before in ("requirement a needs b", "requirement a needs 1", "provide m with goal.once", "component C { }"):
-        for word in ("goal once", "assume allow"):
+        for word in ("goal once", "assume allow", "mission m", "prefer a"):
             assert item(f"{before} {word}") == word, before
     for words in ("component goal", "constant assume", "requirement a needs not goal", "goal once goal", "goal goal"):
         assert item(words) == words

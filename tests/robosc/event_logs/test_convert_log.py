@@ -86,6 +86,10 @@ def test_every_entry_stands_in_the_log_topic_in_words(tmp_path: Path) -> None:
         entry("fault", what="it broke"),
         entry("release", identifier="/cmd_vel"),
         entry("dropped", count=3),
+        entry("reached", aim="goal 1", count=2, what="always eventually Arm.up"),
+        entry("approach", aim=None, what="all are met"),
+        entry("owed", assumption="assumption 1", owed_s=30.0, what="Arm.up leads to Arm.down"),
+        entry("met", assumption="assumption 1", owed_s=31.5, what="Arm.up leads to Arm.down"),
     )
     found = convert_log(log, tmp_path / "run.mcap")
     read_back = [(item.level, item.name, item.msg, item.function, item.line) for item in on(found.path, "/robosc/log")]
@@ -96,6 +100,10 @@ def test_every_entry_stands_in_the_log_topic_in_words(tmp_path: Path) -> None:
         (40, "fault", "fault: it broke", "fault", 4),
         (20, "release", "release: /cmd_vel", "release", 5),
         (30, "dropped", "dropped: 3", "dropped", 6),
+        (20, "reached", "reached: goal 1, always eventually Arm.up, 2", "reached", 7),
+        (20, "approach", "approach: all are met", "approach", 8),
+        (30, "owed", "owed: assumption 1, Arm.up leads to Arm.down", "owed", 9),
+        (20, "met", "met: assumption 1, Arm.up leads to Arm.down", "met", 10),
     ]
     ((blocked,),) = (item.status for item in on(found.path, "/robosc/blocked"))
     assert (blocked.level, blocked.name, blocked.message) == (1, "/cmd_vel", "forbidden")

@@ -17,6 +17,7 @@ from support.controller_twin import World
 from support.execution import Bench
 from support.models import bundle_of
 from support.random_controllers import random_robot
+from support.random_couriers import strategic_courier
 from support.random_goals import strategic_controller
 
 
@@ -68,6 +69,16 @@ def test_the_executor_issues_what_the_strategy_chooses() -> None:
             walk(supervisor, Random(seed), met)
             met["robots"] += 1
     assert met["robots"] > 60 and met["requests"] > 40 and met["waits"] > 1_000, met
+
+
+def test_the_executor_issues_what_the_strategy_of_a_courier_chooses() -> None:
+    met: Counter[str] = Counter()
+    for seed in range(120):
+        supervisor = strategic_courier(seed)
+        if supervisor is not None:
+            walk(supervisor, Random(seed), met)
+            met["robots"] += 1
+    assert met["robots"] > 60 and met["requests"] > 400 and met["waits"] > 400, met
 
 
 BLOCKED = """robot Blocked {

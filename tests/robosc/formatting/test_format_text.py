@@ -210,6 +210,7 @@ def formatted_item(item: str) -> str:
 
 
 LONG = "Component.remaining"
+NAMED = "remaining_requests_of_it"
 
 
 @pytest.mark.parametrize(
@@ -240,6 +241,37 @@ LONG = "Component.remaining"
         (
             f"goal once {LONG} and {LONG} and {LONG} and {LONG} and {LONG} and {LONG}",
             f"goal once {LONG}\n" + "\n".join([f"    and {LONG}"] * 5),
+        ),
+        ("mission m{visit(a)then-b<c}", "mission m {\n    visit (a) then -b < c\n}"),
+        (
+            "mission m while(a)and not b{visit if a then b else c then then on!a from anywhere visit b then c}",
+            "mission m while (a) and not b {\n    visit if a then b else c then then\n"
+            "    on !a from anywhere visit b then c\n}",
+        ),
+        (
+            f"mission m while {LONG} and {LONG} or {LONG} and {LONG} and {LONG} {{ visit {LONG} then {LONG}"
+            f" then not ({LONG} and {LONG} and {LONG} and {LONG} and {LONG}) on {LONG} and {LONG} from anywhere visit"
+            f" {LONG} then {LONG} then {LONG} }}",
+            f"mission m\n    while {LONG} and {LONG}\n        or {LONG} and {LONG} and {LONG} {{\n"
+            f"    visit {LONG}\n        then {LONG}\n        then not (\n            {LONG}\n"
+            + f"            and {LONG}\n"
+            * 4
+            + f"        )\n    on {LONG} and {LONG} from anywhere\n        visit {LONG}\n        then {LONG}\n"
+            f"        then {LONG}\n}}",
+        ),
+        (
+            "mission m { // one\n visit a // two\n then b // three\n // four\n }",
+            "mission m {  // one\n    visit a  // two\n        then b  // three\n    // four\n}",
+        ),
+        ("prefer a over{b,c}", "prefer a over { b, c }"),
+        ("prefer{a}over b", "prefer { a } over b"),
+        (
+            f"prefer {{ {NAMED}, {NAMED}, {NAMED} }} over {{ {NAMED}, {NAMED} }}",
+            f"prefer {{ {NAMED}, {NAMED}, {NAMED} }}\n    over {{ {NAMED}, {NAMED} }}",
+        ),
+        (
+            f"prefer a over {{ {', '.join([NAMED] * 6)} }}",
+            "prefer a\n    over {\n" + f"        {NAMED},\n" * 5 + f"        {NAMED}\n    }}",
         ),
         ("requirement always-a<b disables c", "requirement always - a < b disables c"),
         (

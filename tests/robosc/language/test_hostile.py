@@ -65,6 +65,9 @@ def both(times: int, before: str, after: str) -> str:
         ("robot R { goal once -" + "(" * 201 + "a" + ")" * 201 + " }", "nesting-too-deep"),
         ("robot R { goal " + "!" * 201 + "a leads to a }", "nesting-too-deep"),
         ("robot R { assume allow a leads to a" + " + a" * 201 + " }", "nesting-too-deep"),
+        ("robot R { mission m { visit " + "(" * 201 + "a" + ")" * 201 + " } }", "nesting-too-deep"),
+        ("robot R { mission m { visit a on " + "!" * 201 + "a from anywhere visit a } }", "nesting-too-deep"),
+        ("robot R { mission m while a" + " + a" * 201 + " { visit a } }", "nesting-too-deep"),
         ("robot R { provide r with " + "{ a: " * 201 + "1" + " }" * 201 + " }", "nesting-too-deep"),
         ("robot R { datatype object O { x: " + "array(" * 201 + "double" + ")" * 201 + " } }", "nesting-too-deep"),
         ("robot " + "r" * 1_000_000 + " { }", "name-too-long"),
@@ -114,6 +117,19 @@ LARGE: dict[str, Callable[[int], str]] = {
         "robot R { component C { incoming message m with type: none behaviour { initial marked state s { } } }\n"
         + "goal once C.s\ngoal C.s leads to C.s\nassume allow always eventually C.s\n" * n
         + "}"
+    ),
+    "missions": lambda n: (
+        "robot R { component C { incoming message a with type: none incoming message b with type: none behaviour { "
+        + "initial marked state s { } } }\n"
+        + "".join(f"mission m{i} while C.s {{ visit C.s then C.s on C.s from anywhere visit C.s }}\n" for i in range(n))
+        + "prefer a over b\n" * n
+        + "}"
+    ),
+    "visits": lambda n: (
+        "robot R { component C { behaviour { initial marked state s { } } } mission m { visit C.s"
+        + " then C.s" * n
+        + "\non C.s from anywhere visit C.s" * n
+        + " } }"
     ),
     "actions": lambda n: (
         "robot R { interface i use T from p\n"

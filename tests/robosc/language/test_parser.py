@@ -328,6 +328,15 @@ def test_a_long_hostile_text_takes_no_time_worth_mentioning(piece: str) -> None:
         "once - ",
         "goal x leads to ",
         "goal always eventually x ",
+        "mission x { ",
+        "mission x while not ",
+        "visit x then ",
+        "visit x on x ",
+        "visit x on response ",
+        "x on y from anywhere visit ",
+        "prefer { x ",
+        "prefer x over not ",
+        "not mission x ",
     ],
 )
 def test_nor_does_a_long_row_of_words_of_goals(piece: str) -> None:

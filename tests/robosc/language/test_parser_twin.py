@@ -29,9 +29,9 @@ HIDDEN = ("empty-file", "unclosed-comment", "unclosed-string")
 
 UNFIT = re.compile(
     "so it has no|what must never be|has no 'allow'|stands here twice|stands behind 'always'|or 'leads to' behind|"
-    "in one statement"
+    "in one statement|expected a condition|'and then' does not fit|needs a name before 'while'"
 )
-"""Messages about goals and assumptions whose place is a word before the one that fits nowhere."""
+"""Messages about goals and missions whose place is a word before the one that fits nowhere."""
 
 OPTIONS = ("qos", "depth", "max_age", "stamped", "when")
 
@@ -115,7 +115,7 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
     # The next token shows that `3 needs x` wants a name, and `integer < x` something else than this word; and that an
     # item begins behind a name `not`.
     is_next = offset(text, *stops) == tokens.starts[at + 1]
-    is_item = token in ("goal", "assume") and tokens.texts[at - 1] == "not"
+    is_item = token in ("goal", "assume", "mission", "prefer") and tokens.texts[at - 1] == "not"
     return is_next and (following == "needs" or token in ("integer", "double") or is_item)
 
 
@@ -165,12 +165,12 @@ ALL_KINDS = {
 def test_random_texts() -> None:
     found: set[type] = set()
     read = 0
-    for seed in range(500):
+    for seed in range(600):
         random = Random(seed)
         tree = compare(joined(grammar_tokens(random, 60), random))
         read += tree is not None
         found |= kinds_of(tree)
-    assert read > 300
+    assert read > 360
     # The walk over the grammar reaches everything that a text can say.
     assert found >= ALL_KINDS
 
@@ -349,6 +349,11 @@ PLACES = (
     "robot R {{ goal {} leads to {} assume allow {} leads to {} }}",
     "robot R {{ goal always eventually {} goal once {} assume allow always eventually {} }}",
     "library L {{ goal {} leads to x assume always eventually x }}",
+    "robot R {{ mission m while {} {{ visit {} then {} on {} from anywhere visit {} then {} }} }}",
+    "robot R {{ mission m {{ visit x on {} from anywhere visit {} on {} from anywhere visit x }} }}",
+    "robot R {{ mission m {{ visit {} }} mission n {{ visit {} }} }}",
+    "robot R {{ requirement m needs {} mission m {{ visit {} }} requirement m needs {} prefer x over y }}",
+    "library L {{ mission m {{ visit {} then x }} prefer x over {{}} }}",
 )
 """Texts in which an expression is wanted, with something behind it."""
 
@@ -375,6 +380,11 @@ def test_words_as_names(word: str) -> None:
         f"robot R {{ provide m with {{ {word}: {word}, {word}: {{ {word}: if {word} then {word} else {word} }} }} }}",
         f"robot R {{ goal {word} leads to {word} goal once {word} goal always eventually {word}.{word} }}",
         f"robot R {{ assume {word} leads to {word} assume allow {word} leads to {word} goal {word} = 1 leads to x }}",
+        f"robot R {{ mission {word} while {word} {{ visit {word} then {word} on {word} from anywhere visit {word} then"
+        f" {word} on {word} from anywhere visit {word} }} mission {word} {{ visit {word} }} prefer {word} over {word}"
+        f" prefer {{ {word}, {word} }} over {{{word}}} }}",
+        f"robot R {{ requirement m needs {word} prefer {word} over {word} requirement m needs {word} mission {word} {{"
+        f" visit {word} }} }}",
         f"robot R {{ requirement m needs any({word} in {word}[{word}..{word}]: {word}) = min({word}, {word}) }}",
     )
     trees = [compare(text) for text in texts]

@@ -31,7 +31,7 @@ VALUES = [
         "SystemSupervisor",
         "SystemSynthesis",
     ),
-    *("GoalApproach", "Goals", "Verification", "VerificationStatus", "WalkFinding", "WalkFindingKind"),
+    *("GoalApproach", "GoalSummary", "Goals", "Verification", "VerificationStatus", "WalkFinding", "WalkFindingKind"),
 ]
 ERRORS = [
     *(

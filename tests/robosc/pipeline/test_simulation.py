@@ -269,7 +269,7 @@ def test_what_the_strategy_chooses_in_a_random_run_is_what_its_check_says(seed: 
         if run._system.is_stable():
             memory = twin.observed(state, memory)
             chosen, mode = twin.decided(state, memory, mode)
-            assert (run.chosen, run.reached) == (chosen, twin.goals(state, memory))
+            assert (run.chosen, run.reached) == (chosen, twin.goals(state, memory)[: len(core.model.goals)])
             met += 1
         else:
             assert run.chosen is None

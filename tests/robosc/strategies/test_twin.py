@@ -1,7 +1,7 @@
 """Strategies of random robots against an explicit game, which is solved and checked another way."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from random import Random
 from typing import Any
 
@@ -10,31 +10,34 @@ import pytest
 from robosc.automata import ExecutableSystem
 from robosc.automata.goal_memory import Obligations
 from robosc.controller_properties.goals import check_strategy
-from robosc.model.structure import Deployment, GoalForm, Model
+from robosc.model.structure import Deployment, Model
+from robosc.strategies.counter_strategy import CounterPlayer, CounterStage, CounterStrategy
 from robosc.strategies.gr1 import solve
 from robosc.strategies.synthesize import StrategyResult, StrategySynthesis
-from robosc.supervisor import Strategy
+from robosc.supervisor import AddedCondition, DecisionDiagram, Strategy
 from robosc.supervisor.predicates import state_predicate
 from robosc.synthesis.workspace import workspace
-from support.goal_twin import LOST, NEVER, Game, Position, game_of, unfair_goal, winning_positions
+from support.counter_twin import fault_of_counter
+from support.goal_twin import LOST, NEVER, Game, Position, distances, game_of, unfair_goal, winning_positions
 from support.random_controllers import random_controller
+from support.random_couriers import random_courier
 from support.random_goals import with_random_goals
 
 LIMIT = 3_000
 
+Robot = tuple[Model, tuple[AddedCondition, ...]]
+"""A model, and what its supervisor adds."""
 
-def values_of(position: Position, model: Model, owed: Obligations) -> tuple[Any, ...]:
+Decide = Callable[[Position, int], tuple[str | None, int]]
+"""The request that a strategy chooses in a position and a mode, None for none, and the mode after it."""
+
+
+def values_of(game: Game, position: Position, owed: Obligations) -> tuple[Any, ...]:
     """Return a position of the explicit game as a state of the automata with their memory."""
-    (state, held), marks = position
-    memory: dict[str, bool] = {}
+    state, held = position[0]
+    memory = game.memory(position)
     for cancel, mask in zip(owed.cancels, held, strict=True):
         memory |= {place.name: bool(mask >> bit & 1) for bit, place in enumerate(cancel.places)}
-    names = [f"assumption {number} is owed" for number, _ in enumerate(model.assumptions, start=1)]
-    names += [
-        f"goal {number} {'was reached' if goal.form is GoalForm.ONCE else 'is owed'}"
-        for number, goal in enumerate(model.goals, start=1)
-    ]
-    memory |= dict(zip(names, marks, strict=True))
     return (*state, "only", *(memory[place.name] for place in owed.places))
 
 
@@ -45,54 +48,63 @@ def next_mode(game: Game, position: Position, mode: int) -> int | None:
     return next((number for number in following if not holding[number]), None)
 
 
-def compare(seed: int, engine: str, met: Counter[str]) -> None:
+def random_goals(seed: int) -> Robot | None:
+    """Return a random robot with goals and missions, and what its supervisor adds, or None if there is none."""
     supervisor = random_controller(seed)
-    if supervisor is None:
+    return None if supervisor is None else (with_random_goals(supervisor.model, Random(seed)), supervisor.added)
+
+
+def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> None:
+    if robot is None:
         return
-    model = with_random_goals(supervisor.model, Random(seed))
+    model, added = robot
     executable = ExecutableSystem(model, Deployment.CONTROLLER)
-    game = game_of(executable, supervisor.added, LIMIT)
+    game = game_of(executable, added, LIMIT)
     if game is None:
         return
     won = winning_positions(game)
     owed, system = executable.obligations, executable.remembering_automata
     with workspace(system, engine, lambda: False, lambda progress: None) as place:
-        synthesis = StrategySynthesis(executable, supervisor.added, place)
+        synthesis = StrategySynthesis(executable, added, place)
         false = place.encoding.manager.false
         winning = solve(synthesis.arena, synthesis.assumptions, synthesis.goals, false=false).winning
         for position in game.choices:
-            state = place.encoding.state(values_of(position, model, owed))
+            state = place.encoding.state(values_of(game, position, owed))
             assert state & ~synthesis.arena.positions == false, seed
             assert (state & winning != false) == (position in won), seed
         every = range(len(model.assumptions))
         result = synthesis.result(allowed=every)
         strategy = result.strategy
         preventable = synthesis.result().preventable
+        counter = synthesis.counter(result.unreached) if result.unreached else None
     is_won = game.first != LOST and game.first in won
     assert (strategy is not None) == is_won, seed
     if game.first != LOST:
-        compare_reasons(game, result, seed, met)
+        compare_reasons(game, result, result.unreached, seed, met)
         prevented = [item for item in every if winning_positions(game.asking([game.assumptions[item]], [NEVER]))]
         assert list(preventable) == prevented, seed
         met["preventable"] += bool(prevented)
     met["models"] += 1
     met["positions"] += len(game.choices)
     met["won" if is_won else "lost"] += 1
+    if counter is not None and game.first != LOST:
+        compare_counter(game, executable, counter, result.unreached, seed, met)
     if strategy is None:
         return
     modes = [[(item.event, state_predicate(system, item.condition)) for item in mode] for mode in strategy.modes]
     met["with requests"] += any(modes)
-    check = check_strategy(executable, supervisor.added, strategy)
+    check = check_strategy(executable, added, strategy)
     assert check.result == "passed", (seed, check)
 
     def decide(position: Position, mode: int) -> tuple[str | None, int]:
         number = next_mode(game, position, mode)
         if number is None:
             return None, mode
-        values = values_of(position, model, owed)
+        values = values_of(game, position, owed)
         return next((event for event, condition in modes[number] if condition(values)), None), number
 
     assert unfair_goal(game, decide) is None, seed
+    compare_preferences(game, won, model, decide, seed, met)
     # A strategy that was damaged is judged alike: without any request, or with some forgotten, for other goals.
     dice = Random(seed)
     kept = [[item for item in mode if dice.random() < 0.6] for mode in strategy.modes]
@@ -101,12 +113,12 @@ def compare(seed: int, engine: str, met: Counter[str]) -> None:
         modes = [[(item.event, state_predicate(system, item.condition)) for item in mode] for mode in damaged.modes]
         if all(request in game.choices[position] for position, request in _chosen(game, decide)):
             is_missed = unfair_goal(game, decide) is not None
-            found = check_strategy(executable, supervisor.added, damaged)
+            found = check_strategy(executable, added, damaged)
             assert found.result == ("failed" if is_missed else "passed"), seed
             met["damaged, missed" if is_missed else "damaged, still reached"] += 1
 
 
-def _chosen(game: Game, decide: Callable[[Position, int], tuple[str | None, int]]) -> Iterator[tuple[Position, str]]:
+def _chosen(game: Game, decide: Decide) -> Iterator[tuple[Position, str]]:
     """Yield every request that may be chosen somewhere, with the position."""
     for position in game.choices:
         for mode in range(len(game.goals)):
@@ -115,7 +127,36 @@ def _chosen(game: Game, decide: Callable[[Position, int], tuple[str | None, int]
                 yield position, request
 
 
-def compare_reasons(game: Game, result: StrategyResult, seed: int, met: Counter[str]) -> None:
+def compare_preferences(
+    game: Game, won: set[Position], model: Model, decide: Decide, seed: int, met: Counter[str]
+) -> None:
+    """Check that nothing is chosen where a request that is preferred to it leads nearer, too.
+
+    A request leads nearer if the position after it is nearer to the goal of the mode than the position before it, by
+    the twin's distances.
+    """
+    requests = [item.name for item in model.communications]
+    pairs = [(first, second) for item in model.preferences for first in item.preferred for second in item.others]
+    for mode in range(len(game.goals)) if pairs else ():
+        far = distances(game, won, mode)
+        for position in won:
+            request, number = decide(position, mode)
+            if request is None or number != mode:
+                continue
+            choices = game.choices[position]
+            nearer = {
+                name.removesuffix(".request") for name, end in choices.items() if far.get(end, 10**9) < far[position]
+            }
+            chosen = request.removesuffix(".request")
+            assert chosen in nearer, seed
+            for first, second in pairs:
+                assert not (second == chosen and first in nearer), (seed, mode, first, second)
+                is_refined = first == chosen and second in nearer and requests.index(second) < requests.index(first)
+                met["preferred to an earlier one"] += is_refined
+                met["not preferred, as it leads nowhere"] += second == chosen and f"{first}.request" in choices
+
+
+def compare_reasons(game: Game, result: StrategyResult, unreached: Sequence[int], seed: int, met: Counter[str]) -> None:
     """Check the goals that are said not to be reached, and the assumptions that are said not to be needed."""
 
     def is_won(assumptions: Iterable[int], goals: Iterable[int]) -> bool:
@@ -123,11 +164,11 @@ def compare_reasons(game: Game, result: StrategyResult, seed: int, met: Counter[
         return game.first in winning_positions(asked)
 
     every = set(range(len(game.assumptions)))
-    if result.unreached:
-        assert not is_won(every, result.unreached), seed
-        for item in result.unreached if len(result.unreached) > 1 else ():
-            assert is_won(every, set(result.unreached) - {item}), seed
-        assert result.is_hopeless is not game.can_meet_again_and_again(result.unreached), seed
+    if unreached:
+        assert not is_won(every, unreached), seed
+        for item in unreached if len(unreached) > 1 else ():
+            assert is_won(every, set(unreached) - {item}), seed
+        assert result.is_hopeless is not game.can_meet_again_and_again(unreached), seed
         met["hopeless" if result.is_hopeless else "prevented by the surroundings"] += 1
     else:
         goals = range(len(game.goals))
@@ -138,18 +179,58 @@ def compare_reasons(game: Game, result: StrategyResult, seed: int, met: Counter[
         met["needed"] += bool(needed)
 
 
+def compare_counter(
+    game: Game,
+    executable: ExecutableSystem,
+    counter: CounterStrategy,
+    unreached: tuple[int, ...],
+    seed: int,
+    met: Counter[str],
+) -> None:
+    """Check that a counter-strategy keeps the goals from coming true, and that a damaged one is seen not to."""
+    owed = executable.obligations
+
+    def values(position: Position) -> tuple[Any, ...]:
+        return values_of(game, position, owed)
+
+    def fault(counter: CounterStrategy) -> str:
+        player = CounterPlayer.of(executable.remembering_automata, owed, counter)
+        return fault_of_counter(game, unreached, player, values)
+
+    assert fault(counter) == "", seed
+    met["counter-strategies"] += 1
+    # A counter-strategy that only gives the controller its turn.
+    everywhere = DecisionDiagram((), 1)
+    idle = CounterStage(0, everywhere, ((everywhere,),) * max(1, len(game.assumptions)))
+    met["idle, seen"] += bool(fault(CounterStrategy((idle,))))
+
+
 @pytest.mark.parametrize("first", range(0, 2_400, 400))
 def test_random_robots_agree(first: int, record_property: Callable[[str, object], None]) -> None:
     met: Counter[str] = Counter()
     for seed in range(first, first + 400):
-        compare(seed, "auto", met)
+        compare(random_goals(seed), seed, "auto", met)
     for name, count in sorted(met.items()):
         record_property(name, count)
-    assert met["models"] > 100 and min(met["won"], met["lost"]) > 30 and met["with requests"] > 1, met
+    assert met["models"] > 100 and min(met["won"], met["lost"]) > 30, met
+    assert met["counter-strategies"] > 30 and met["idle, seen"] > 2, met
+
+
+@pytest.mark.parametrize("first", range(0, 300, 100))
+def test_random_couriers_agree(first: int, record_property: Callable[[str, object], None]) -> None:
+    met: Counter[str] = Counter()
+    for seed in range(first, first + 100):
+        compare(random_courier(seed), seed, "auto", met)
+    for name, count in sorted(met.items()):
+        record_property(name, count)
+    assert met["with requests"] > 30 and met["lost"] > 20 and met["damaged, missed"] > 30, met
+    assert min(met["preferred to an earlier one"], met["not preferred, as it leads nowhere"]) > 30, met
 
 
 def test_engines_agree() -> None:
     met: Counter[str] = Counter()
-    for seed in range(120):
-        compare(seed, "autoref", met)
+    for seed in range(60):
+        compare(random_goals(seed), seed, "autoref", met)
+    for seed in range(20):
+        compare(random_courier(seed), seed, "autoref", met)
     assert met["won"] > 5 and met["lost"] > 5, met

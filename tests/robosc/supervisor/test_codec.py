@@ -1,6 +1,7 @@
 import json
 import random
 import re
+from collections.abc import Callable
 from functools import cache
 from typing import Any
 
@@ -13,7 +14,17 @@ from robosc.automata import to_automata
 from robosc.certification import make_supervisor
 from robosc.errors import InvalidSupervisorError, UnsupportedModelError
 from robosc.expressions import TRUE, Binary, Constant, StateTest, Unary, VariableRead
-from robosc.model.structure import Assumption, Deployment, Goal, GoalForm, Requirement, RequirementForm
+from robosc.model.structure import (
+    Assumption,
+    Deployment,
+    Detour,
+    Goal,
+    GoalForm,
+    Mission,
+    Preference,
+    Requirement,
+    RequirementForm,
+)
 from robosc.supervisor import Strategy, Supervisor
 from robosc.supervisor.codec import MAXIMUM_BYTES, MAXIMUM_EXPRESSION_DEPTH, decode, encode
 from support.damaged_json import change_value
@@ -61,8 +72,28 @@ def with_goals() -> Supervisor:
     )
 
 
+def with_missions() -> Supervisor:
+    """A supervisor of a model with missions and preferences."""
+    made = supervisor()
+    idle, few = StateTest("Base", "idle"), Binary("<", VariableRead("Base", "failures"), Constant(2))
+    missions = (Mission("rounds", (idle, few), few, (Detour(few, (idle,)),)), Mission("rest", (idle,)))
+    preferences = (Preference(("move",), ("calibrate",)), Preference(("calibrate",), ()))
+    return msgspec.structs.replace(
+        made,
+        model=msgspec.structs.replace(made.model, missions=missions, preferences=preferences),
+        certificate=msgspec.structs.replace(made.certificate, goals="not checked"),
+        strategy=Strategy(((),) * 4),
+    )
+
+
 def document_with_goals() -> dict[str, Any]:
     found = json.loads(encode(with_goals()))
+    assert isinstance(found, dict)
+    return found
+
+
+def document_with_missions() -> dict[str, Any]:
+    found = json.loads(encode(with_missions()))
     assert isinstance(found, dict)
     return found
 
@@ -95,6 +126,12 @@ class TestRoundTrip:
         assert decode(encode(made)) == made
         assert encode(decode(encode(made))) == encode(made)
         assert type(decode(encode(made)).model.goals[0].form) is GoalForm
+
+    def test_missions_there_and_back(self) -> None:
+        made = with_missions()
+        assert decode(encode(made)) == made
+        assert encode(decode(encode(made))) == encode(made)
+        assert b'"missions"' not in canonical() and b'"preferences"' not in canonical()
 
     def test_without_goals_nothing_is_written_of_them(self) -> None:
         assert b'"goals"' in encode(with_goals()) and b'"assumptions"' in encode(with_goals())
@@ -383,9 +420,45 @@ INCONSISTENT_GOALS: list[tuple[str, Any, str]] = [
 ]
 
 
-@pytest.mark.parametrize(("path", "new", "words"), INCONSISTENT_GOALS)
-def test_inconsistent_goals(path: Any, new: Any, words: str) -> None:
-    value = document_with_goals()
+IDLE = {"node": "state", "component": "Base", "state": "idle"}
+
+INCONSISTENT_MISSIONS: list[tuple[str, Any, str]] = [
+    ("missions.0.visits", [], "mission rounds: a mission and each of its detours need a visit"),
+    ("missions.0.detours.0.visits", [], "mission rounds: a mission and each of its detours need a visit"),
+    ("missions.0.visits.1", NUMBER, "mission rounds: a condition is .*, not boolean"),
+    ("missions.0.visits.1", ASIDE, "Sensor.level is read in synthesis"),
+    ("missions.0.visits.0", RECEIVED, "mission rounds: "),
+    ("missions.0.visits.0", None, "malformed"),
+    ("missions.0.condition", NUMBER, "mission rounds: a condition is .*, not boolean"),
+    ("missions.0.condition", ASIDE, "Sensor.level is read in synthesis"),
+    ("missions.0.condition", {"node": "state", "component": "Base", "state": "flying"}, "mission rounds: .*no state"),
+    ("missions.0.detours.0.trigger", NUMBER, "mission rounds: a condition is .*, not boolean"),
+    ("missions.0.detours.0.trigger", ASIDE, "Sensor.level is read in synthesis"),
+    ("missions.0.detours.0.trigger", None, "malformed"),
+    ("missions.0.detours.0.visits.0", ASIDE, "Sensor.level is read in synthesis"),
+    ("missions.0.detours.0.name", "x", "unknown field 'name'"),
+    ("missions.1.name", "Rounds", "missions"),
+    ("missions.1.name", "a mission", "malformed"),
+    ("missions.1.visits", [IDLE, IDLE], "not one mode for each goal and each visit"),
+    ("missions", [], "strategy belongs to a controller with goals or missions"),
+    ("preferences.0.preferred", ["fly"], "preference 1: there is no communication fly"),
+    ("preferences.0.others", ["scan"], "preference 1: scan has no request"),
+    ("preferences.0.others", ["move"], "the preferences contradict each other"),
+    ("preferences.1.others", ["move"], "the preferences contradict each other"),
+    ("preferences.1.others", "move", "malformed"),
+    ("preferences.1.over", [], "unknown field 'over'"),
+]
+
+
+@pytest.mark.parametrize(
+    ("document_of", "path", "new", "words"),
+    [
+        *((document_with_goals, *item) for item in INCONSISTENT_GOALS),
+        *((document_with_missions, *item) for item in INCONSISTENT_MISSIONS),
+    ],
+)
+def test_inconsistent_goals(document_of: Callable[[], dict[str, Any]], path: Any, new: Any, words: str) -> None:
+    value = document_of()
     decode(as_bytes(value))
     *place, last = [int(key) if key.isdigit() else key for key in path.split(".")]
     at(value["supervisor"]["model"], place)[last] = new
@@ -464,7 +537,7 @@ def test_mutated_bytes(seed: Any) -> None:
 @given(seed=st.integers(0, 2**64))
 def test_mutated_values(seed: Any) -> None:
     chance = random.Random(seed)
-    value = chance.choice((document, document_with_goals))()
+    value = chance.choice((document, document_with_goals, document_with_missions))()
     for _ in range(chance.randint(1, 2)):
         change_value(value, chance)
     survives(as_bytes(value))

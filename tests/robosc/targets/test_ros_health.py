@@ -10,6 +10,7 @@ from robosc.execution.runtime.executor import Executor
 from robosc.execution.runtime.settings import Settings
 from robosc.targets.ros.runtime.health import HealthMonitor, Level
 from support.generated import example_supervisor
+from support.goal_porter import porter_supervisor
 
 
 class Silent:
@@ -82,4 +83,29 @@ def test_a_sensor_that_was_not_seen_or_is_stale(clock: ManualClock) -> None:
     executor.watch()
     assert monitor.report()[:2] == (Level.ERROR, "stopped: scan on /scan is stale")
     executor.receive("/scan", {"ranges": [2.0] * 360})
+    assert monitor.report()[:2] == (Level.OK, "running")
+
+
+def test_an_assumption_that_is_owed_for_too_long_is_a_warning_until_it_is_met(clock: ManualClock) -> None:
+    middleware: Any = Silent()
+    settings = Settings(assumption_timeout_s=2.0)
+    executor = Executor(InterpretedSystem(porter_supervisor()), middleware, settings, clock)
+    monitor = HealthMonitor(executor)
+    assert monitor.report().values["goal 1"] == "not known, reached 0 times: Caller.waiting leads to Base.inside"
+    executor.start()
+    executor.receive("/call", None)
+    executor.tick()
+    assert monitor.report()[:2] == (Level.OK, "running")
+    clock.advance(42.0)
+    executor.watch()
+    health = monitor.report()
+    owed = "assumption 1 has been owed for 42 s: Door.opening leads to Door.ajar"
+    assert health[:2] == (Level.WARN, owed)
+    assert health.values["assumption 1"] == "not for 42 s, reached 0 times: Door.opening leads to Door.ajar"
+    assert (health.values["approached"], health.values["chosen"]) == ("goal 1", "open")
+    executor.receive("/call", None)
+    executor.on_reply(7, None)
+    assert monitor.report().message == f"{owed}; since the last report: 1 unexpected"
+    monitor.next_interval()
+    executor.receive("/door/opened", None)
     assert monitor.report()[:2] == (Level.OK, "running")

@@ -7,9 +7,12 @@ import pytest
 
 from robosc.errors import UnsupportedModelError
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.interpreter.description import describe
 from robosc.targets import GenerateOptions, generate, write_files
+from robosc.targets.ros.runtime.parameters import ParameterError, declarations, validate
 from support.execution import unsupervised
 from support.generated import example_supervisor, imported, require_sound_python
+from support.goal_porter import porter_supervisor
 from support.own_tests import PYTEST, own_tests
 
 yaml = pytest.importorskip("yaml", reason="PyYAML, a part of ROS 2, is not installed")
@@ -208,3 +211,27 @@ def test_texts_of_the_model_stay_texts(target: str, tmp_path: Path) -> None:
         assert system.state() == interpreted.state()
     result = own_tests(tmp_path / "package")
     assert result.returncode == 0, result.stdout + result.stderr
+
+
+@pytest.mark.parametrize("target", ["ros1", "ros1-cpp", "ros2", "ros2-cpp"])
+def test_a_node_with_goals_has_a_time_for_assumptions(target: str) -> None:
+    for supervisor, expected in ((porter_supervisor(), 30.0), (example_supervisor(FOLLOWER), None)):
+        files = generate(supervisor, target)
+        given = yaml.safe_load(files["config/parameters.yaml"])
+        values = given["/**"]["ros__parameters"] if "/**" in given else given
+        assert values.get("assumption_timeout") == expected
+        assert ("`assumption_timeout`" in files["README.md"]) is (expected is not None)
+
+
+@BOTH
+def test_the_files_of_a_node_with_goals_are_sound(target: str, tmp_path: Path) -> None:
+    write_files(generate(porter_supervisor(), target), tmp_path)
+    require_sound_python(tmp_path)
+
+
+def test_the_time_for_assumptions_is_a_setting_of_the_executor() -> None:
+    given = {item.name: item.default for item in declarations((), policy="strategy")}
+    description = describe(porter_supervisor())
+    assert validate({**given, "assumption_timeout": 2.5}, description).settings.assumption_timeout_s == 2.5
+    with pytest.raises(ParameterError, match=r"parameter 'assumption_timeout' is -1\.0; it must be a number"):
+        validate({**given, "assumption_timeout": -1.0}, description)

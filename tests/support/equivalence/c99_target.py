@@ -40,7 +40,7 @@ class C99Target:
 
     name = "c99"
     # Its callback for a log gives kind and event, or the topic of a release.
-    sight = Sight(log_keys=frozenset({"kind", "event", "identifier"}))
+    sight = Sight(log_keys=frozenset({"kind", "event", "identifier", "aim", "assumption"}))
     _commands: Mapping[str, str] = {"tick": "t", "wait": "w", "restart": "R"}
 
     def __init__(self, supervisor: Supervisor, folder: Path, *options: str) -> None:
@@ -132,6 +132,11 @@ class C99Target:
     def _entry(self, kind: str, number: str = "-1") -> Entry:
         if kind == "release":
             return {"kind": kind, "identifier": self._topics[int(number)]}
+        description = self._layout.description
+        if kind in ("reached", "approach"):
+            return {"kind": kind, "aim": None if int(number) < 0 else description.aims[int(number)].name}
+        if kind in ("owed", "met"):
+            return {"kind": kind, "assumption": description.assumptions[int(number)].name}
         if int(number) < 0:
             return {"kind": kind}
         return {"kind": kind, "event": self._events[int(number)]}
@@ -164,6 +169,10 @@ class C99Target:
         }
         assert next(left) == "enabled"
         flags = next(left) if self._layout.executable.issued else ""
+        progress = None
+        if self._layout.supervisor.strategy is not None:
+            assert next(left) == "progress"
+            progress = self._progress([int(next(left)) for _ in range(self._progress_length)])
         named = dict(zip(left, left, strict=False))
         return Observation(
             issued=tuple(issued),
@@ -174,7 +183,34 @@ class C99Target:
             ),
             locations=locations,
             status=(_STATUSES[int(named["status"])].value, named["fault"] == "1"),
+            progress=progress,
         )
+
+    @property
+    def _progress_length(self) -> int:
+        description = self._layout.description
+        return 2 + 5 * (len(description.aims) + len(description.assumptions))
+
+    def _progress(self, numbers: list[int]) -> dict[str, Any]:
+        """Return the progress of the strategy as the executor in Python tells it."""
+        description = self._layout.description
+        approached, chosen, *rest = numbers
+        items = [
+            (item.name, item.words, is_met == 1, count, unmet_us / 1e6 if is_unmet else None)
+            for item, is_met, is_unmet, _, count, unmet_us in zip(
+                (*description.aims, *description.assumptions), *(rest[place::5] for place in range(5)), strict=True
+            )
+        ]
+        assert not any(rest[2 : 5 * len(description.aims) : 5])
+        owed = rest[5 * len(description.aims) :]
+        overdue = [item.name for item, late in zip(description.assumptions, owed[2::5], strict=True) if late]
+        return {
+            "aims": items[: len(description.aims)],
+            "assumptions": items[len(description.aims) :],
+            "overdue": overdue,
+            "approached": None if approached < 0 else description.aims[approached].name,
+            "chosen": None if chosen < 0 else self._communications[chosen],
+        }
 
     def close(self) -> Observation:
         """End the program: a sanitizer may still complain."""

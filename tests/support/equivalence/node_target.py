@@ -22,7 +22,10 @@ from support.equivalence.scenario import Action, Scenario
 LIMIT_S = 15.0
 RESEND_S = 3.0
 
-IN_CPP = Sight(log_keys=frozenset({"kind", "event", "controllable", "data", "state", "identifier"}), has_readings=False)
+IN_CPP = Sight(
+    log_keys=frozenset({"kind", "event", "controllable", "data", "state", "identifier", "aim", "assumption", "count"}),
+    has_readings=False,
+)
 """Sight of nodes in C++ through their logs: what was unknown is not reported in the same words."""
 
 
@@ -195,7 +198,7 @@ def node_parameters(scenario: Scenario, folder: Path, deployment: Deployment) ->
 
 def given(interface: Interface, message: Any) -> dict[str, Any]:
     """Return the contents of a message, given as a dict, by path; parts that have their default are left out."""
-    return set_parts(message.get("data") if interface.package == "std_msgs" else message)
+    return set_parts((message or {}).get("data") if interface.package == "std_msgs" else message)
 
 
 def set_parts(value: Any) -> dict[str, Any]:

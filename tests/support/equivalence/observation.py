@@ -36,6 +36,7 @@ class Observation:
         locations: Location of each service and action.
         status: Activity of the executor, and True if it is faulty.
         counters: Counts of what was unknown, of what was unexpected, and of faults.
+        progress: Progress of the strategy.
     """
 
     issued: tuple[Issued, ...] = ()
@@ -45,6 +46,7 @@ class Observation:
     locations: Mapping[str, str] | None = None
     status: tuple[str, bool] | None = None
     counters: tuple[int, int, int] | None = None
+    progress: Mapping[str, Any] | None = None
 
 
 @dataclass(frozen=True)
@@ -96,7 +98,7 @@ def difference(target: str, number: int, what: str, expected: Observation, found
     ]
     if sight.has_log:
         pairs.append(("the event log", _visible(expected.log, sight), _visible(found.log, sight)))
-    for name in ("state", "locations", "enabled", "status", "counters"):
+    for name in ("state", "locations", "enabled", "status", "counters", "progress"):
         if getattr(found, name) is not None:
             pairs.append((name, getattr(expected, name), getattr(found, name)))
     for name, left, right in pairs:

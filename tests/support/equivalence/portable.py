@@ -244,4 +244,18 @@ class Driver:
             "locations": {name: system.location(name) for name in servers},
             "status": (self.executor.status.value, self.executor.is_faulty),
             "counters": (counters.unknown, counters.unexpected, counters.faults),
+            "progress": progress_of(self.executor.progress),
         }
+
+
+def progress_of(progress: Any) -> dict[str, Any] | None:
+    """Progress of a strategy as plain values; None where there is no strategy."""
+    if progress is None:
+        return None
+    return {
+        "aims": [tuple(item) for item in progress.aims],
+        "assumptions": [tuple(item) for item in progress.assumptions],
+        "overdue": list(progress.overdue),
+        "approached": progress.approached,
+        "chosen": progress.chosen,
+    }

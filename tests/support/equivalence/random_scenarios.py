@@ -138,6 +138,8 @@ def random_settings(supervisor: Supervisor, dice: Random) -> dict[str, Any]:
     }
     if supervisor.deployment is Deployment.LAYER:
         decisions = {"command_timeout_s": dice.choice((0.0, 0.5, 2.0))}
+    if supervisor.strategy is not None:
+        decisions["assumption_timeout_s"] = dice.choice((0.0, 0.25, 1.0))
     return {
         **decisions,
         "on_unknown": dice.choice(("default", "default", "keep", "fault")),

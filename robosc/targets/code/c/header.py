@@ -6,7 +6,7 @@ from itertools import groupby
 
 from robosc._version import __version__
 from robosc.automata.executable import CALLED_KINDS
-from robosc.automata.goal_memory import MEMORY
+from robosc.automata.goal_memory import MEMORY, counted
 from robosc.automata.plants import PLANT_LOCATIONS, communication_plant_name
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import (
@@ -187,6 +187,11 @@ def counts(layout: Layout) -> dict[str, int]:
         "RECEIVED": len(uncontrollable),
         "CONJUNCT": max((info.conjunct_count for info in infos), default=0),
         "REQUIREMENT": max((info.requirement_count for info in infos if info.kind == "action"), default=0),
+        **(
+            {}
+            if layout.supervisor.strategy is None
+            else {"AIM": len(layout.description.aims), "ASSUMPTION": len(layout.description.assumptions)}
+        ),
         **({"WHEN": sum(item.when is not None for item in model.communications)} if layout.is_layer else {}),
     }
 
@@ -339,8 +344,8 @@ def _state(layout: Layout) -> list[str]:
     if layout.supervisor.strategy is not None:
         places = layout.executable.obligations.places
         body += [f"bool {layout.variables[MEMORY, place.name][0]}; /* {place.name} */" for place in places]
-        goals = len(layout.supervisor.strategy.modes)
-        body.append(f"{width(goals)} {layout.mode}; /* goal that is approached, of {goals} */")
+        aims = layout.executable.obligations.aims
+        body.append(f"{width(len(aims))} {layout.mode}; /* number of what is approached, of {counted(aims)} */")
     return [
         "/* The state: where everything is. */",
         "typedef struct {",

@@ -25,7 +25,7 @@ from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, double,
 from robosc.targets.code.steps import initial_state
 from robosc.targets.text import indent
 
-_ENGINE = "log releases goals steps policies decisions safe_stop time replies lifecycle".split()
+_ENGINE = "log progress releases goals steps policies decisions safe_stop time replies lifecycle".split()
 _LAYER_ENGINE = "log releases goals steps safe_stop callers time replies layer lifecycle".split()
 """The parts of the engines, each after those that it calls."""
 
@@ -50,6 +50,8 @@ def source_file(unit: Unit) -> str:
     if layout.supervisor.strategy is not None:
         chosen = strategy_functions(unit, conditions, layout.supervisor.strategy)
     parts = _LAYER_ENGINE if layout.is_layer else _ENGINE
+    if layout.supervisor.strategy is None:
+        parts = [part for part in parts if part != "progress"]
     engine = [runtime_text(layout, f"{part}.c").rstrip().splitlines() for part in parts]
     asked = request_functions(unit) if layout.is_layer else []
     ends = [*engine, *happens, *asked, *_entries(layout), *_names(layout)]
@@ -178,7 +180,12 @@ def _tables(layout: Layout, numbers: dict[str, int]) -> list[str]:
     lines += _table(members, "ACTIONS", ends)
     silent = [layout.events[name] for name in (*layout.description.resets, *layout.description.taus)]
     lines += _table(event, "SILENT", silent if numbers["SILENT"] else [], "Resets, then taus, in source order.")
-    return lines + _table(communication, "SENSORS", [layout.communications[name] for name in sensors])
+    lines += _table(communication, "SENSORS", [layout.communications[name] for name in sensors])
+    items = [
+        [string_literal(text) for text in item] for item in (*layout.description.aims, *layout.description.assumptions)
+    ]
+    words = "Aims of the strategy, then its assumptions."
+    return lines + _table(["const char *name", "const char *words"], "ITEMS", items, words)
 
 
 def _table(type_: str | list[str], name: str, rows: Sequence[str | list[str]], words: str = "") -> list[str]:

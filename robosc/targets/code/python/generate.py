@@ -180,10 +180,10 @@ def _class(writer: Writer) -> list[str]:
 def _description(description: Description) -> list[str]:
     lines = ["description = Description("]
     for field, content in description._asdict().items():
-        if field == "has_strategy" and not content:
+        if field in ("has_strategy", "aims", "assumptions") and not content:
             continue
-        if field == "communications":
-            lines += ["    communications=(", *(f"        {item!a}," for item in content), "    ),"]
+        if field in ("communications", "aims", "assumptions"):
+            lines += [f"    {field}=(", *(f"        {item!a}," for item in content), "    ),"]
         else:
             lines.append(f"    {field}={content!a},")
     return [*lines, ")"]

@@ -19,6 +19,7 @@ PROTOCOL_NAMES = (
     "enabled_silent",
     "location",
     "matches",
+    "mode",
     "observe",
     "provide",
     "read",

@@ -1,29 +1,33 @@
-"""Generated methods of a strategy: its memory of goals, and its choices."""
+"""Generated methods of a strategy: its memory of goals and missions, and its choices."""
+
+from collections.abc import Sequence
 
 from robosc.supervisor import Strategy
-from robosc.targets.code.expressions import Sort, literal
+from robosc.targets.code.expressions import FALSE_CODE, Code, Sort, literal
+from robosc.targets.code.python.expressions import code_text
 from robosc.targets.code.python.naming import PythonNamer
 from robosc.targets.code.python.statements import method
 from robosc.targets.code.python.writer import Writer
-from robosc.targets.code.strategy import choosing, observing, reached
+from robosc.targets.code.strategy import choosing, met, observing
+from robosc.targets.text import indent
 
 _NOTHING = literal("None", Sort.INTEGER)
+_OBSERVE = "Take in a stable state; return for each aim and assumption whether it is met."
 
 
 def forgetting_lines(writer: Writer) -> list[str]:
-    """Statements that forget all that was remembered of goals."""
+    """Statements that forget all that was remembered of goals and missions."""
     if writer.layout.supervisor.strategy is None:
         return []
-    return [*(f"self.{attribute} = False" for attribute in writer.layout.memory.values()), "self._mode = 0"]
+    memory = (f"self.{attribute} = False" for attribute in writer.layout.memory.values())
+    nothing = _tuple([FALSE_CODE] * len(met(writer.layout.executable, writer.scope)))
+    return [*memory, "self.mode = 0", f"self._met = {nothing}"]
 
 
 def mode_tables(strategy: Strategy) -> list[str]:
-    """Statements of the constructor: the methods of each goal."""
+    """Statements of the constructor: the methods of each goal and visit."""
     numbers = range(1, len(strategy.modes) + 1)
-    return [
-        "self._is_reached = (" + "".join(f"self._is_goal_{number}_reached, " for number in numbers).rstrip() + ")",
-        "self._approach = (" + "".join(f"self._approach_goal_{number}, " for number in numbers).rstrip() + ")",
-    ]
+    return ["self._approach = (" + "".join(f"self._approach_{number}, " for number in numbers).rstrip() + ")"]
 
 
 def strategy_methods(writer: Writer, strategy: Strategy) -> list[list[str]]:
@@ -31,20 +35,24 @@ def strategy_methods(writer: Writer, strategy: Strategy) -> list[list[str]]:
     executable, scope = writer.layout.executable, writer.scope
     count = len(strategy.modes)
     methods = [
-        method("observe", "Take in a stable state.", observing(executable, scope, PythonNamer())),
+        [
+            *method("observe", _OBSERVE, observing(executable, scope, PythonNamer())),
+            *indent([f"met = self._met = {_tuple(met(executable, scope))}", "return met"]),
+        ],
         f'''\
 def choose(self):
     """Return the number of the request that the strategy chooses, None to wait."""
     for _ in range({count}):
-        if not self._is_reached[self._mode]():
-            return self._approach[self._mode]()
-        self._mode = (self._mode + 1) % {count}
+        if not self._met[self.mode]:
+            return self._approach[self.mode]()
+        self.mode = (self.mode + 1) % {count}
     return None'''.splitlines(),
     ]
-    for number in range(count):
-        name = f"goal {number + 1}"
+    for number, aim in enumerate(executable.obligations.aims):
         body = choosing(executable, strategy, number, writer.conditions, _NOTHING)
-        is_reached = reached(executable, number, scope)
-        methods.append(method(f"_is_goal_{number + 1}_reached", f"Return True if {name} is true.", is_reached))
-        methods.append(method(f"_approach_goal_{number + 1}", f"Return the request that approaches {name}.", body))
+        methods.append(method(f"_approach_{number + 1}", f"Return the request that approaches {aim.name}.", body))
     return methods
+
+
+def _tuple(items: Sequence[Code]) -> str:
+    return "(" + "".join(f"{code_text(item)}, " for item in items).rstrip() + ")"

@@ -528,6 +528,15 @@ private:
         add_news(robot_.counters.unexpected - last_.unexpected, "unexpected");
         add_news(robot_.counters.faults - last_.faults, "faults");
         add_news(dropped - last_dropped_, "dropped");
+        if (!news.empty()) {
+            news = "since the last report: " + news;
+        }
+#if ROBOT_HAS_STRATEGY
+        const std::string owed = add_progress(result);
+        if (!owed.empty()) {
+            news = owed + (news.empty() ? "" : "; ") + news;
+        }
+#endif
         result.level = Level::WARN;
         if (!reasons_.empty()) {
             result.level = Level::FAULTY;
@@ -537,7 +546,7 @@ private:
         } else if (status == ROBOT_STATUS_WAITING) {
             result.message = "waiting for the first message of every sensor with a maximum age";
         } else if (!news.empty()) {
-            result.message = "since the last report: " + news;
+            result.message = news;
         } else {
             result.level = Level::OK;
             result.message = "running";
@@ -556,8 +565,96 @@ private:
         model::visit_state(robot_.state, report);
         model::visit_communications(robot_.state, report);
         report.transitions = std::exchange(transitions_, {});
+#if ROBOT_HAS_STRATEGY
+        report.progress = progress_json();
+#endif
         return report;
     }
+#if ROBOT_HAS_STRATEGY
+
+    /* Progress of the strategy. */
+
+    static std::string or_null(const char* text)
+    {
+        std::string json = "null";
+        if (text != nullptr) {
+            json.clear();
+            put_json(json, text);
+        }
+        return json;
+    }
+
+    const char* approached_name() const
+    {
+        const int aim = robot_approached(&robot_);
+        return aim < 0 ? nullptr : robot_standing(&robot_, aim, 0).name;
+    }
+
+    std::string standings_json(int first, int end, std::uint64_t time_us) const
+    {
+        std::string text = "[";
+        for (int number = first; number < end; number++) {
+            const robot_standing_t found = robot_standing(&robot_, number, time_us);
+            text += number > first ? ", {\"name\": " : "{\"name\": ";
+            put_json(text, found.name);
+            text += ", \"words\": ";
+            put_json(text, found.words);
+            text += ", \"is_met\": ";
+            put_json(text, found.is_met);
+            text += ", \"times\": " + std::to_string(found.count) + ", \"unmet_s\": ";
+            text += found.is_unmet ? number_text(static_cast<double>(found.unmet_us / 1000) / 1000.0) : "null";
+            text += "}";
+        }
+        return text + "]";
+    }
+
+    std::string progress_json() const
+    {
+        const std::uint64_t time_us = now();
+        const int count = ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT;
+        const int chosen = robot_chosen(&robot_);
+        std::string text = "{\"aims\": " + standings_json(0, ROBOT_AIM_COUNT, time_us);
+        text += ", \"assumptions\": " + standings_json(ROBOT_AIM_COUNT, count, time_us) + ", \"overdue\": [";
+        const char* between = "";
+        for (int number = ROBOT_AIM_COUNT; number < count; number++) {
+            const robot_standing_t found = robot_standing(&robot_, number, time_us);
+            if (found.is_overdue) {
+                text += between;
+                put_json(text, found.name);
+                between = ", ";
+            }
+        }
+        text += "], \"is_followed\": ";
+        put_json(text, robot_.settings.policy == ROBOT_POLICY_STRATEGY);
+        text += ", \"approached\": " + or_null(approached_name());
+        text += ", \"chosen\": " + or_null(chosen < 0 ? nullptr : robot_communication_name(chosen));
+        return text + "}";
+    }
+
+    /* Add the progress to a report; returns in words what is owed for too long. */
+    std::string add_progress(Health& report) const
+    {
+        const std::uint64_t time_us = now();
+        std::string owed;
+        for (int number = 0; number < ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT; number++) {
+            const robot_standing_t found = robot_standing(&robot_, number, time_us);
+            const std::string seconds = std::to_string((found.unmet_us + 500000) / 1000000) + " s";
+            const std::string state
+                = found.is_unmet ? "not for " + seconds : std::string(found.is_met ? "true" : "not known");
+            report.values.emplace_back(
+                found.name, state + ", reached " + std::to_string(found.count) + " times: " + found.words);
+            if (found.is_overdue) {
+                owed += (owed.empty() ? "" : "; ") + std::string(found.name) + " has been owed for " + seconds + ": "
+                    + found.words;
+            }
+        }
+        const char* const approached = approached_name();
+        const int chosen = robot_chosen(&robot_);
+        report.values.emplace_back("approached", approached == nullptr ? "" : approached);
+        report.values.emplace_back("chosen", chosen < 0 ? "" : robot_communication_name(chosen));
+        return owed;
+    }
+#endif
 
     /* Operations that the engine asks for. */
 
@@ -679,9 +776,48 @@ private:
             reasons_.clear();
             write("restart", "what", "");
             return;
+#if ROBOT_HAS_STRATEGY
+        case ROBOT_LOG_REACHED:
+            write_item("reached", "aim", what);
+            return;
+        case ROBOT_LOG_APPROACH:
+            write_item("approach", "aim", what);
+            return;
+        case ROBOT_LOG_OWED:
+            write_item("owed", "assumption", ROBOT_AIM_COUNT + what);
+            return;
+        case ROBOT_LOG_MET:
+            write_item("met", "assumption", ROBOT_AIM_COUNT + what);
+            return;
+#endif
         }
     }
 
+#if ROBOT_HAS_STRATEGY
+    /* Write what has happened to an aim or an assumption; -1: there is none. */
+    void write_item(const char* kind, const char* key, int number)
+    {
+        if (!log_.is_active()) {
+            return;
+        }
+        std::string line = head(kind) + ",\"" + key + "\":";
+        if (number < 0) {
+            log_.write(line + "null,\"what\":\"all are met\"}");
+            return;
+        }
+        const robot_standing_t found = robot_standing(&robot_, number, robot_.now_us);
+        put_json(line, found.name);
+        if (number >= ROBOT_AIM_COUNT) {
+            line += ",\"owed_s\":" + number_text(static_cast<double>(found.unmet_us / 1000) / 1000.0);
+        } else if (std::string(kind) == "reached") {
+            line += ",\"count\":" + std::to_string(found.count);
+        }
+        line += ",\"what\":";
+        put_json(line, found.words);
+        log_.write(line + "}");
+    }
+
+#endif
     static std::string stale_key(int communication) { return "stale " + std::to_string(communication); }
 
     std::string fault_text(robot_fault_t fault)

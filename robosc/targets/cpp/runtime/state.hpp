@@ -47,6 +47,8 @@ struct StateReport {
     std::vector<NamedValue> communications;
     /* Numbers of the transitions taken since the last report. */
     std::vector<int> transitions;
+    /* Progress of the strategy as JSON; empty: there is none. */
+    std::string progress;
 
     void component(const char* name, const char* state) { components.push_back({name, state, {}}); }
 
@@ -134,7 +136,11 @@ inline std::string state_json(const StateReport& report)
         text += between + std::to_string(number);
         between = ", ";
     }
-    return text + "], \"definition\": " + model::DEFINITION + "}";
+    text += "], ";
+    if (!report.progress.empty()) {
+        text += "\"progress\": " + report.progress + ", ";
+    }
+    return text + "\"definition\": " + model::DEFINITION + "}";
 }
 
 /* Fill in a robosc_msgs/SupervisorState, but for its stamp. */

@@ -9,6 +9,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import NamedTuple
 
+from robosc.execution.runtime.progress import owed_texts, Progress, standing_text
 from robosc.execution.runtime.recorder import Counters
 from robosc.execution.runtime.runner import Runner, Status
 
@@ -66,10 +67,17 @@ class HealthMonitor:
         values['last decision (us)'] = (
             '' if self._decision_us is None else f'{self._decision_us:.1f}'
         )
-        level, message = self._judge(status, counters)
+        progress = executor.progress
+        if progress is not None:
+            for item in (*progress.aims, *progress.assumptions):
+                values[item.name] = standing_text(item)
+            values.update(approached=progress.approached or '', chosen=progress.chosen or '')
+        level, message = self._judge(status, counters, progress)
         return Health(level, message, values)
 
-    def _judge(self, status: Status, counters: Counters) -> tuple[Level, str]:
+    def _judge(
+        self, status: Status, counters: Counters, progress: Progress | None
+    ) -> tuple[Level, str]:
         reasons = self._executor.reasons
         if reasons:
             return Level.ERROR, 'stopped: ' + '; '.join(reasons)
@@ -86,6 +94,9 @@ class HealthMonitor:
             )
             if after > before
         ]
+        warnings = [] if progress is None else owed_texts(progress)
         if new:
-            return Level.WARN, 'since the last report: ' + ', '.join(new)
+            warnings.append('since the last report: ' + ', '.join(new))
+        if warnings:
+            return Level.WARN, '; '.join(warnings)
         return Level.OK, 'running'

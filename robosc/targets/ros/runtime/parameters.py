@@ -37,6 +37,7 @@ _SETTING_NAMES = {
     'period': 'period_s',
     'max_age': 'max_age_s',
     'command_timeout': 'command_timeout_s',
+    'assumption_timeout': 'assumption_timeout_s',
 }
 
 
@@ -65,6 +66,17 @@ _PERIODS = (MINIMUM_PERIOD_S, MAXIMUM_PERIOD_S)
 _SECONDS = (0.0, sys.float_info.max)
 
 
+_WITH_GOALS = (
+    Parameter(
+        'assumption_timeout',
+        30.0,
+        'Seconds after which an assumption that the surroundings owe is reported, in the event '
+        'log and on /diagnostics; 0 for never.',
+        _SECONDS,
+    ),
+)
+
+
 def _of_a_controller(policy: str) -> tuple[Parameter, ...]:
     goals = ', strategy (what reaches the goals of the model)' if policy == 'strategy' else ''
     choices = f'fair, random, priority (the list, then fair){goals}'
@@ -83,6 +95,7 @@ def _of_a_controller(policy: str) -> tuple[Parameter, ...]:
             'period',
             'Times of decisions: each period, or after each event as well (event).',
         ),
+        *(_WITH_GOALS if policy == 'strategy' else ()),
     )
 
 
@@ -277,6 +290,7 @@ def _of_deployment(given: Mapping[str, Any], deployment: str) -> Settings:
         priority=_texts(given, 'priority'),
         seed=given['seed'],
         every=given['every'],
+        assumption_timeout_s=given.get('assumption_timeout', Settings().assumption_timeout_s),
     )
 
 

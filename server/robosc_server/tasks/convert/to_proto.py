@@ -6,6 +6,7 @@ from robosc.automata import to_automata
 from robosc.certification import OutcomeStatus
 from robosc.conditions.summary import added_texts, summary_text
 from robosc.errors import Diagnostic, RelatedPlace, Severity
+from robosc.pipeline.goals import goal_summary
 from robosc.source import Location
 from robosc.supervisor import Supervisor
 from robosc.synthesis import Statistics
@@ -71,4 +72,12 @@ def summary(supervisor: Supervisor) -> pb.Summary:
             for event, condition in added_texts(supervisor, system).items()
         ],
         text=summary_text(supervisor),
+        goals=_goals(supervisor),
     )
+
+
+def _goals(supervisor: Supervisor) -> pb.Goals | None:
+    found = goal_summary(supervisor)
+    if found is None:
+        return None
+    return pb.Goals(aims=found.aims, assumptions=found.assumptions, has_strategy=found.has_strategy, modes=found.modes)

@@ -132,6 +132,24 @@ static void find_enabled(robot_t *r)
 
 static uint64_t next_deadline(const robot_t *r);
 
+#if ROBOT_HAS_STRATEGY
+/* The request that the strategy chooses, or -1 to wait. */
+static int choose_strategically(robot_t *r)
+{
+    int mode = 0;
+    const int chosen = choose_by_strategy(&r->state, r->met, &mode);
+    const int approached = r->is_complete ? -1 : mode;
+    r->chosen = chosen < 0 ? -1 : (int)REQUESTS[chosen].communication;
+    if (!r->has_decided || approached != r->approached) {
+        r->has_decided = true;
+        r->approached = approached;
+        note(r, ROBOT_LOG_APPROACH, approached);
+    }
+    return chosen;
+}
+
+#endif
+
 /* One decision. */
 static bool decide(robot_t *r)
 {
@@ -147,7 +165,7 @@ static bool decide(robot_t *r)
     }
 #if ROBOT_HAS_STRATEGY
     if (r->settings.policy == ROBOT_POLICY_STRATEGY) {
-        const int chosen = choose_by_strategy(&r->state);
+        const int chosen = choose_strategically(r);
         for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
             candidates[request] = enabled[request] && request == chosen;
         }

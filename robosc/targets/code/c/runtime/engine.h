@@ -49,7 +49,15 @@ typedef enum {
     ROBOT_LOG_RESTART,    /* -1 */
     ROBOT_LOG_BLOCKED     /* something of the caller was held back: the robot_refusal_t */
 #else
+#if ROBOT_HAS_STRATEGY
+    ROBOT_LOG_RESTART,    /* -1 */
+    ROBOT_LOG_REACHED,    /* the aim that has become true, from 0 on */
+    ROBOT_LOG_APPROACH,   /* the aim that is approached now; -1: all of them are met */
+    ROBOT_LOG_OWED,       /* the assumption that has been owed for `assumption_timeout_us`, from 0 on */
+    ROBOT_LOG_MET         /* the assumption that is met, after that was reported */
+#else
     ROBOT_LOG_RESTART     /* -1 */
+#endif
 #endif
 } robot_log_t;
 #if ROBOT_IS_LAYER
@@ -96,6 +104,9 @@ typedef struct {
     uint64_t action_timeout_us;                           /* UINT64_MAX: none */
 #if ROBOT_IS_LAYER
     uint64_t command_timeout_us;                          /* 0: never; what acts is released if nothing came */
+#endif
+#if ROBOT_HAS_STRATEGY
+    uint64_t assumption_timeout_us;                       /* 0: never; an assumption owed for so long is reported */
 #endif
     uint64_t max_age_us[ROBOT_COMMUNICATION_COUNT + 1];   /* by outgoing message; 0: it is not watched */
     bool releases[ROBOT_TOPIC_COUNT + 1];                 /* by topic: whether its last message keeps acting */
@@ -150,6 +161,25 @@ typedef struct {
     uint32_t faults;
 } robot_counters_t;
 
+#if ROBOT_HAS_STRATEGY
+/* State of an aim or an assumption, as of the last stable state. */
+typedef struct {
+    const char *name;  /* such as "goal 1" */
+    const char *words; /* as a user writes it */
+    bool is_met;
+    bool is_unmet;     /* not met; neither is true before the start */
+    bool is_overdue;   /* an assumption that has been reported as owed for too long */
+    uint32_t count;    /* how often it has become met since the start */
+    uint64_t unmet_us; /* since when it is not met */
+} robot_standing_t;
+
+typedef struct {
+    bool is_reported;
+    uint32_t count;
+    uint64_t since_us;
+} robot_item_t;
+
+#endif
 typedef struct {
     int request; /* -1: nothing acts */
     uint64_t sent;
@@ -236,6 +266,15 @@ typedef struct {
 #else
     uint64_t arrived_us[ROBOT_TOPIC_COUNT + 1];
 #endif
+#if ROBOT_HAS_STRATEGY
+    robot_item_t items[ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT];
+    bool met[ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT];
+    bool has_observed;
+    bool is_complete;
+    bool has_decided;
+    int approached;
+    int chosen;
+#endif
     robot_acting_t acting[ROBOT_TOPIC_COUNT + 1];
     bool is_restless[ROBOT_TOPIC_COUNT + 1];
     robot_call_t calls[ROBOT_SERVICE_COUNT + 1];
@@ -281,6 +320,17 @@ robot_fault_t robot_fault(const robot_t *r);
 /* Return true if a controllable event is allowed now; false for an event of the environment. */
 bool robot_enabled(const robot_t *r, robot_event_t event);
 
+#if ROBOT_HAS_STRATEGY
+/* State of an aim of the strategy, or of an assumption. `number`: the aims from 0 on, then the assumptions. */
+robot_standing_t robot_standing(const robot_t *r, int number, uint64_t now_us);
+
+/* The aim that the last decision approached; -1: all were met, or another policy decides. */
+int robot_approached(const robot_t *r);
+
+/* The communication that the strategy chose at the last decision; -1: it waits, or another policy decides. */
+int robot_chosen(const robot_t *r);
+
+#endif
 /* Names as the model has them; NULL for a number that is none. */
 const char *robot_event_name(int event);
 const char *robot_communication_name(int communication);

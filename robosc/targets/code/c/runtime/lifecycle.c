@@ -27,6 +27,9 @@ static bool begin(robot_t *r)
 #endif
 #endif
     set_initial(&r->state);
+#if ROBOT_HAS_STRATEGY
+    forget_progress(r);
+#endif
     r->has_stable = false;
 #if !ROBOT_IS_LAYER
     r->is_enabled_known = false;
@@ -55,6 +58,9 @@ void robot_default_settings(robot_settings_t *settings)
     settings->action_timeout_us = FOREVER;
 #if ROBOT_IS_LAYER
     settings->command_timeout_us = UINT64_C(1000000);
+#endif
+#if ROBOT_HAS_STRATEGY
+    settings->assumption_timeout_us = UINT64_C(30000000);
 #endif
     set_model_settings(settings);
 }
@@ -142,6 +148,9 @@ bool robot_init(robot_t *r, const robot_settings_t *settings, const robot_callba
     r->next_goal_id = 1;
 #endif
     set_initial(&r->state);
+#if ROBOT_HAS_STRATEGY
+    forget_progress(r);
+#endif
     return true;
 }
 

@@ -81,7 +81,7 @@ static bool settle(robot_t *r, int issuing, bool *has_changed)
         r->stable = r->state;
         r->has_stable = true;
 #if ROBOT_HAS_STRATEGY
-        observe_for_strategy(&r->state);
+        observe_progress(r);
 #endif
 #if ROBOT_ACTION_COUNT > 0
         observe_goals(r);

@@ -38,6 +38,11 @@ static uint64_t next_deadline(const robot_t *r)
         }
     }
 #endif
+#if ROBOT_HAS_STRATEGY
+    if (progress_deadline(r) < next) {
+        next = progress_deadline(r);
+    }
+#endif
 #if ROBOT_IS_LAYER
 #if ROBOT_TOPIC_COUNT > 0
     for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
@@ -119,6 +124,9 @@ static bool check_time(robot_t *r)
     if (!expire(r)) {
         return false;
     }
+#if ROBOT_HAS_STRATEGY
+    expire_progress(r);
+#endif
 #if ROBOT_SENSOR_COUNT > 0
     for (int sensor = 0; sensor < ROBOT_SENSOR_COUNT; sensor++) {
         const uint64_t max_age_us = r->settings.max_age_us[SENSORS[sensor]];

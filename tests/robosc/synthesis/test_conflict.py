@@ -6,7 +6,7 @@ from itertools import chain, combinations
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc.explanation.conflict import minimal_conflict, minimal_removal
+from robosc.synthesis.conflict import minimal_conflict, minimal_removal
 from support.effort import examples
 
 SETS = st.lists(st.frozensets(st.integers(0, 6), min_size=1, max_size=4), min_size=1, max_size=5)

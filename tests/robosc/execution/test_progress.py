@@ -1,0 +1,211 @@
+"""Progress of a strategy, against a plain account of what happened, and on a robot whose door does not open."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+from unittest.mock import Mock
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from robosc.event_logs import check_log, read_log
+from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.runtime.clock import ManualClock
+from robosc.execution.runtime.event_log import MemoryLog, json_line
+from robosc.execution.runtime.progress import Progress, ProgressAccount
+from robosc.execution.runtime.protocol import Aim, Description
+from robosc.execution.runtime.recorder import Recorder
+from robosc.execution.runtime.settings import Settings, SettingsError
+from support.effort import examples
+from support.execution import Bench, bench
+from support.goal_porter import porter_supervisor
+
+KINDS = ("reached", "approach", "owed", "met")
+TIMEOUT_S = 3.0
+
+
+class Scripted:
+    """A system whose aims and assumptions are met as the test says."""
+
+    description = Description(
+        "Scripted", "controller", "", (), (), (), 0, True, (Aim("a", "A"), Aim("b", "B")), (Aim("c", "C"),)
+    )
+    mode = 0
+
+    def __init__(self) -> None:
+        self.met = (False, False, False)
+
+    def observe(self) -> tuple[bool, ...]:
+        return self.met
+
+    def choose(self) -> int | None:
+        return None
+
+
+Moment = tuple[int, tuple[bool, bool, bool]]
+
+
+def told(history: list[Moment], now_s: int) -> tuple[list[tuple[bool, int, float | None]], list[bool]]:
+    """Return each item's standing, and whether it has not been met for too long, from all that was seen."""
+    standings, late = [], []
+    for number in range(3):
+        seen = [(time_s, met[number]) for time_s, met in history]
+        count = sum(not before and after for (_, before), (_, after) in pairwise(seen))
+        unmet_s = None
+        if not seen[-1][1]:
+            since = len(seen) - 1
+            while since > 0 and not seen[since - 1][1]:
+                since -= 1
+            unmet_s = float(now_s - seen[since][0])
+        standings.append((seen[-1][1], count, unmet_s))
+        late.append(unmet_s is not None and unmet_s >= TIMEOUT_S)
+    return standings, late
+
+
+@settings(max_examples=examples(200))
+@given(st.lists(st.tuples(st.integers(0, 4), st.tuples(*[st.booleans()] * 3)), min_size=1, max_size=12))
+def test_the_account_tells_what_happened(steps: list[Any]) -> None:
+    system, clock, log = Scripted(), ManualClock(), MemoryLog()
+    recorder = Recorder(system, clock, log)  # type: ignore[arg-type]  # its state is not needed
+    account = ProgressAccount(system, recorder, (), TIMEOUT_S)  # type: ignore[arg-type]
+    history: list[Moment] = []
+    now_s, owed = 0, 0
+    for pause_s, met in steps:
+        for _ in range(pause_s):
+            now_s += 1
+            clock.advance(1.0)
+            if history and now_s >= account.due_s:
+                account.expire(now_s)
+            if history:
+                assert account.at(now_s).overdue == (("c",) if told(history, now_s)[1][2] else ())
+        recorder.began_s = float(now_s)
+        system.met = met
+        found_met = account.observe()
+        if found_met != account.met:
+            account.change(found_met)
+        history.append((now_s, met))
+        found = account.at(now_s)
+        standings, _ = told(history, now_s)
+        assert [item[2:] for item in (*found.aims, *found.assumptions)] == standings
+    counts = [count for _, count, _ in told(history, now_s)[0]]
+    assert [sum(line.get("aim") == name for line in log.entries) for name in "ab"] == counts[:2]
+    kinds = [line["kind"] for line in log.entries if "assumption" in line]
+    # Each is reported once, before it is said to be met again.
+    assert kinds == [("owed", "met")[place % 2] for place in range(len(kinds))]
+    owed = sum(kind == "owed" for kind in kinds)
+    assert owed - kinds.count("met") == len(account.at(now_s).overdue)
+
+
+def porter(**settings: Any) -> Bench:
+    return Bench(InterpretedSystem(porter_supervisor()), **settings)
+
+
+def lines(bench: Bench) -> list[dict[str, Any]]:
+    """Entries about the strategy, without their times."""
+    return [
+        {key: value for key, value in line.items() if key not in ("time", "what")}
+        for line in bench.log.entries
+        if line["kind"] in KINDS
+    ]
+
+
+def progress(bench: Bench) -> Progress:
+    found = bench.executor.progress
+    assert found is not None
+    return found
+
+
+def test_a_door_that_does_not_open_is_reported_once_and_again_when_it_opens() -> None:
+    robot = porter(assumption_timeout_s=2.0)
+    robot.tick()
+    robot.receive("/call")
+    robot.tick()
+    found = progress(robot)
+    assert (found.approached, found.chosen, found.is_followed) == ("goal 1", "open", True)
+    assert found.assumptions[0][:4] == ("assumption 1", "Door.opening leads to Door.ajar", False, 0)
+    robot.tick()
+    assert progress(robot).chosen is None
+    robot.tick(60)
+    found = progress(robot)
+    assert found.overdue == ("assumption 1",)
+    assert found.assumptions[0].unmet_s == pytest.approx(6.1)
+    assert found.aims[0].unmet_s == pytest.approx(6.2)
+    robot.receive("/door/opened")
+    robot.tick()
+    assert progress(robot).overdue == ()
+    assert progress(robot).aims[0][2:] == (True, 1, None)
+    assert lines(robot) == [
+        {"kind": "approach", "aim": None},
+        {"kind": "approach", "aim": "goal 1"},
+        {"kind": "owed", "assumption": "assumption 1", "owed_s": pytest.approx(2.0, abs=0.11)},
+        {"kind": "met", "assumption": "assumption 1", "owed_s": pytest.approx(6.1)},
+        {"kind": "reached", "aim": "goal 1", "count": 1},
+    ]
+
+
+def test_an_assumption_is_reported_between_decisions_and_never_where_the_setting_is_0() -> None:
+    for timeout_s, expected in ((2.0, ["owed"]), (0.0, [])):
+        robot = porter(assumption_timeout_s=timeout_s)
+        robot.receive("/call")
+        robot.tick()
+        robot.clock.advance(2.0)
+        robot.executor.watch()
+        robot.clock.advance(600.0)
+        robot.executor.watch()
+        assert [line["kind"] for line in lines(robot)][1:] == expected
+
+
+def test_its_log_is_read_and_agrees_with_the_supervisor(tmp_path: Path) -> None:
+    robot = porter(assumption_timeout_s=2.0)
+    robot.receive("/call")
+    robot.tick(40)
+    robot.receive("/door/opened")
+    robot.tick(2)
+    log = tmp_path / "log.jsonl"
+    log.write_text("".join(map(json_line, robot.log.entries)), encoding="utf-8")
+    assert {line["kind"] for line in robot.log.entries} >= set(KINDS)
+    found = check_log(read_log(log), porter_supervisor())
+    assert (found.violations, found.notes) == ((), ())
+
+
+def test_a_restart_begins_the_account_again() -> None:
+    robot = porter(assumption_timeout_s=2.0)
+    robot.receive("/call")
+    robot.tick(40)
+    robot.executor.stop("test")
+    robot.executor.restart()
+    found = progress(robot)
+    assert (found.approached, found.chosen, found.overdue) == (None, None, ())
+    assert [item.is_met for item in (*found.aims, *found.assumptions)] == [True] * 4
+    assert [item.times for item in (*found.aims, *found.assumptions)] == [0] * 4
+
+
+def test_under_another_policy_the_goals_are_told_and_nothing_is_approached() -> None:
+    robot = porter(policy="fair")
+    robot.receive("/call")
+    robot.tick()
+    found = progress(robot)
+    assert (found.is_followed, found.approached, found.chosen) == (False, None, None)
+    assert not found.aims[0].is_met
+
+
+def test_a_strategy_is_asked_once_in_each_stable_state(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot = porter()
+    choose = Mock(side_effect=robot.system.choose)  # type: ignore[attr-defined]
+    monkeypatch.setattr(robot.system, "choose", choose)
+    robot.tick(3)
+    assert choose.call_count == 1
+    robot.receive("/call")
+    assert robot.tick(3) == [("publish", "open", None)]
+    assert choose.call_count == 3
+
+
+def test_a_robot_without_goals_has_no_progress_and_no_timeout() -> None:
+    text = """robot Plain {
+        component Base { incoming message go with type: none behaviour { initial marked state here { } } }
+    }"""
+    assert bench(text).executor.progress is None
+    with pytest.raises(SettingsError, match="setting 'assumption_timeout_s' means nothing here"):
+        bench(text, assumption_timeout_s=5.0)
+    assert bench(text, assumption_timeout_s=30.0).executor.settings == Settings(policy="fair", release_identifiers=())

@@ -259,7 +259,7 @@ def _refuse_beside_counter_strategy(arguments: argparse.Namespace) -> None:
 
 
 def _refuse_for_automata(arguments: argparse.Namespace) -> None:
-    """Do nothing if all that is asked for means something for automata.
+    """Do nothing if all options have a meaning for automata.
 
     Raises:
         UsageError: Something does not.

@@ -161,7 +161,7 @@ class MessageBuilder:
         return [event for event in events if event in known], disabled, warnings
 
     def _availability(self, status: Status) -> RequestAvailability | str:
-        """The requests judged; or why they cannot be, which is empty where nobody knows the supervisor."""
+        """The requests judged; or why they cannot be, which is empty where the supervisor is unknown."""
         if self._requests is None:
             return ""
         state = status.components, status.communications

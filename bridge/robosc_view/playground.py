@@ -158,7 +158,7 @@ class Playground:
         self._beginning = 0
 
     async def _begin(self, made: SynthesizedModel, beginning: int = 0) -> None:
-        # In another thread, since that of large automata takes its time.
+        # The graph of large automata takes its time, in another thread.
         self._run, self._edges = await asyncio.to_thread(_run_of, made, beginning)
         self._made, self._beginning, self._is_begun = made, beginning, True
         # The steps that were reported, and the entries of each.

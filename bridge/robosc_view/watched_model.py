@@ -138,7 +138,7 @@ class WatchedModel:
 
 
 async def _ended(making: "asyncio.Task[SynthesizedModel] | asyncio.Task[None] | None") -> None:
-    """End a synthesis, or a watch, that nobody wants any more."""
+    """End a synthesis, or a watch, that has become useless."""
     if making is not None:
         making.cancel()
         await asyncio.gather(making, return_exceptions=True)

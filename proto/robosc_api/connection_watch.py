@@ -376,7 +376,7 @@ class CallsByConnection(Layer):
     calls notes them itself.
 
     Args:
-        arrivals: Layer that is told.
+        arrivals: Layer that is notified.
     """
 
     def __init__(self, arrivals: Arrivals) -> None:
@@ -606,7 +606,7 @@ def _descriptors() -> list[int]:
 
 @contextlib.contextmanager
 def _borrowed(descriptor: int) -> Iterator[socket.socket]:
-    """Yield a socket of a descriptor that somebody else closes."""
+    """Yield a socket of a descriptor that its owner closes."""
     line = socket.socket(socket.AF_INET, socket.SOCK_STREAM, 0, fileno=descriptor)
     try:
         yield line

@@ -162,7 +162,7 @@ def make_supervisor(
     if result.status is SynthesisStatus.EMPTY:
         reason = f"no supervisor exists: {result.reason}"
         explanation = None
-        # Whatever the limit of nodes, that there is no supervisor is known.
+        # The verdict, no supervisor, holds whatever the limit of nodes.
         with suppress(NodeLimitError):
             explanation = explanations.explain_empty(
                 explanations.ModelWords(model, places, system, deployment),

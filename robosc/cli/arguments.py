@@ -23,7 +23,7 @@ def given_path(text: str) -> Path:
     """A file or folder that an argument names.
 
     Raises:
-        argparse.ArgumentTypeError: It is empty, such as a variable that nobody has set; that is no name of this folder.
+        argparse.ArgumentTypeError: It is empty, such as a variable that is not set; that is no name of this folder.
     """
     if not text:
         raise argparse.ArgumentTypeError("the name of a file or folder is empty")

@@ -125,7 +125,7 @@ _count.__name__ = "number of events from 1 to 1000000"
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Simulate; 0 if all that was asked for has happened, 1 if not.
+    """Simulate; 0 if every given step was taken, 1 if not.
 
     Raises:
         UsageError: A file cannot be read or written.

@@ -151,7 +151,7 @@ def _verify_supervisor(arguments: argparse.Namespace) -> int:
         progress.clear()
     is_right = has_passed(found, is_strict=arguments.strict)
     if is_right and (arguments.property or arguments.properties):
-        # Of a supervisor that passed only the verdicts are asked for.
+        # The user wants only the verdicts for a supervisor that has passed.
         return properties.verify(arguments, supervisor)
     return report_file_verification(
         arguments, file_verification_json(found, supervisor, is_strict=arguments.strict), found.diagnostics, bundle

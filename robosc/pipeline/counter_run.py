@@ -88,7 +88,7 @@ class CounterRun(Run):
         self._random_data = RandomData(explanation.supervisor.model)
         self._answer()
 
-    # What is seen
+    # Views
 
     @property
     def explanation(self) -> GoalExplanation:

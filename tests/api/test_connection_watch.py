@@ -265,7 +265,7 @@ def test_calls_that_are_reset_at_once_are_cut_off() -> None:
 @needs_counts
 def test_each_request_of_a_stream_counts_and_not_its_beginning() -> None:
     async def counted() -> None:
-        arrivals, told = Arrivals(), asyncio.Queue[str]()
+        arrivals, words = Arrivals(), asyncio.Queue[str]()
 
         async def stream(requests: AsyncIterator[bytes], context: Any) -> AsyncIterator[bytes]:
             async for request in requests:
@@ -281,13 +281,13 @@ def test_each_request_of_a_stream_counts_and_not_its_beginning() -> None:
                 return "ipv4:10.0.0.1:1"
 
         async def requests() -> AsyncIterator[bytes]:
-            while request := await told.get():
+            while request := await words.get():
                 yield request.encode()
 
         responses = noted(requests(), Context())
         assert arrivals.take().asked == frozenset()
         for word in ("one", "two"):
-            told.put_nowait(word)
+            words.put_nowait(word)
             assert await anext(responses) == word.encode()
             assert arrivals.take().asked == {"ipv4:10.0.0.1:1"}
             assert arrivals.take().asked == frozenset()

@@ -169,7 +169,7 @@ def test_nothing_has_changed() -> None:
     tool = node_tool("vscode-tmgrammar-snap", EXTENSION_FOLDER)
     files = [str(file.relative_to(EXTENSION_FOLDER)) for file in SOURCES]
     assert len(files) > 5
-    # Without its snapshot, a source would get one.
+    # A source without its snapshot would get one.
     assert all((EXTENSION_FOLDER / f"{file}.snap").exists() for file in files)
     ran = subprocess.run(["node", tool, *files], cwd=EXTENSION_FOLDER, capture_output=True, text=True, timeout=LIMIT_S)
     assert ran.returncode == 0, ran.stdout + ran.stderr

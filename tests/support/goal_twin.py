@@ -412,7 +412,7 @@ def distances(game: Game, won: set[Position], goal: int) -> dict[Position, int]:
     while True:
         progress = {position for position in won if position in reached or turns(position) & found.keys()}
         near = set[Position]()
-        # Without an assumption there is one that never fails.
+        # The empty assumption is one that never fails.
         for failed in failing or [set[Position]()]:
             staying = set(won)
             while True:

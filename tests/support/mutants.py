@@ -1,4 +1,4 @@
-"""Supervisors that somebody tampered with: each mutant differs from a right one in one thing."""
+"""Supervisors that were tampered with: each mutant differs from a right one in one thing."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -146,7 +146,7 @@ export function startPlay(send, token) {
     const seed = walks;
     walks += 1;
     const steps = untilFinding ? 1000 : Math.min(Math.max(Math.trunc(Number(byId("play-steps").value)) || 1, 1), 5000);
-    // Of a large system it takes its time.
+    // The walk through a large system takes its time.
     if (want({ type: "walk", steps, seed, until_finding: untilFinding })) report("step", ["chance goes on…"]);
   };
   byId("play-walk").addEventListener("click", () => walk(false));
@@ -184,7 +184,7 @@ export function startPlay(send, token) {
       const before = new Map(events.map((item) => [item.event, item]));
       events = play.events.map((item) => new PlayEvent(item, want));
       for (const item of events) {
-        // What was entered stays, as far as there is a field for it.
+        // Entered values stay, as far as there is a field for them.
         const old = before.get(item.event)?.fields ?? [];
         for (const field of item.fields) {
           const was = old.find((other) => String(other.path) === String(field.path) && other.isChoice === field.isChoice);
@@ -238,7 +238,7 @@ export function startPlay(send, token) {
       }
       say(byId("play-count"), `${count(run.steps, "event", "events")}${run.is_marked ? " · marked" : ""}`);
     },
-    /** There is a definition: a page that was here before goes on with what it did. */
+    /** Goes on from the run of an earlier page once a definition has come. */
     defined(definition) {
       if (!definition.play || isResumed) return;
       isResumed = true;

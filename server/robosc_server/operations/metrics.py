@@ -282,7 +282,7 @@ class _LabelledCollector:
 
 
 class _OnLoop(Collector):
-    """Collector that asks a registry on the event loop, for the threads of the endpoint.
+    """Collector that reads a registry on the event loop, for the threads of the endpoint.
 
     Args:
         registry: Registry of the metrics, or a part of one.
@@ -365,9 +365,3 @@ def check_metrics_address(address: str, *, beyond_loopback: bool) -> None:
             f"{address} is reachable from other machines, and metrics need no token: set metrics_beyond_loopback to "
             "allow this, or use a loopback address"
         )
-
-
-def metric_names() -> frozenset[str]:
-    """Return the names of all metrics, for dashboards and alerts."""
-    found: Any = Metrics("")._registry.collect()
-    return frozenset(metric.name for metric in found)

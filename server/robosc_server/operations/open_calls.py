@@ -90,7 +90,7 @@ class _CallSlots:
 
     Args:
         limits: Limits on the calls.
-        arrivals: Layer that is told of each call.
+        arrivals: Layer that is notified of each call.
         are_checks: True if the calls are health checks.
 
     Attributes:

@@ -181,7 +181,7 @@ def _producer_versions() -> tuple[str, ...]:
 
     It is this distribution, the diagrams, and those distributions whose targets and engines it uses.
     """
-    # Without dd's extension the engine `auto` is another one.
+    # The engine `auto` is another one without dd's extension.
     diagrams = f"dd {version('dd')} {'with' if has_cudd() else 'without'} cudd"
     dists = [point.dist for group in _PLUGINS for point in entry_points(group=group)]
     others = {f"{dist.name} {dist.version}" for dist in dists if dist is not None and dist.name != "robosc"}
@@ -431,7 +431,7 @@ def _verify(message: Any, reader: _RequestReader) -> object:
     deployment, engine, _, *rest, made_states = reader.options(message.options, deployment=unsaid)
     return (
         bundle,
-        # Where one is given, none is made.
+        # A given supervisor needs no synthesis.
         (deployment, engine, rest, None if is_given else made_states),
         reader.content(message.supervisor) if is_given else None,
         [reader.text(text) for text in message.properties],

@@ -76,7 +76,7 @@ async def serve(sizes: Mapping[str, int], layers: int) -> None:
     port = server.add_insecure_port("127.0.0.1:0")
     await server.start()
     if layers:
-        # As the service does.
+        # The service does the same.
         gc.collect()
         gc.freeze()
         gc.set_threshold(20_000, *gc.get_threshold()[1:])

@@ -172,10 +172,10 @@ def _row(name: str, clients: int, measured: dict[str, Measured], used_s: dict[st
     echo = name if name.startswith("empty") else echo_name(name.partition(",")[0])
     found, empty = measured[name], measured[echo]
     times = [found.percentile_s(percent) for percent in (50, 99)]
-    told = ["" if time_s is None else f"{time_s * 1e3:.2f}" for time_s in times]
+    shown_ms = ["" if time_s is None else f"{time_s * 1e3:.2f}" for time_s in times]
     own_s, echo_s = (used_s[each] / max(1, len(measured[each].times_s)) for each in (name, echo))
     return [
-        *(name, str(clients), f"{found.calls_per_second:,.0f}", *told),
+        *(name, str(clients), f"{found.calls_per_second:,.0f}", *shown_ms),
         _share(found.calls_per_second, empty.calls_per_second),
         f"{own_s * 1e6:.0f}",
         _share(echo_s, own_s),
@@ -195,7 +195,7 @@ def _memory(address: str, pid: int) -> str:
         found = run_load(address, load, count=CALLS // 4)
         assert len(found.times_s) == CALLS // 4, found.errors
         rows.append([f"after {number * CALLS // 4:,} calls", _megabytes(_resident_bytes(pid))])
-    # What is kept of each request is bounded, too.
+    # The memory kept for each request is bounded, too.
     found = run_load(address, call_kinds()["Check"](8), count=_DISTINCT)
     assert len(found.times_s) == _DISTINCT, found.errors
     rows.append([f"after {_DISTINCT:,} different ones (Check)", _megabytes(_resident_bytes(pid))])
@@ -215,7 +215,7 @@ def _watchers(address: str, pid: int) -> str:
 
 async def _watched(address: str, pid: int, job_id: str) -> list[list[str]]:
     ended: list[float] = []
-    told: list[int] = [0] * WATCHERS
+    revisions: list[int] = [0] * WATCHERS
     messages = 0
     channels = [grpc.aio.insecure_channel(address, (("robosc.bench", number),)) for number in range(_CONNECTIONS)]
     request = jobs_pb2.WatchJobRequest(id=job_id)
@@ -224,13 +224,13 @@ async def _watched(address: str, pid: int, job_id: str) -> list[list[str]]:
         nonlocal messages
         stub = jobs_pb2_grpc.JobServiceStub(channels[place % _CONNECTIONS])  # type: ignore[no-untyped-call]
         async for response in stub.WatchJob(request):
-            told[place] = response.job.revision
+            revisions[place] = response.job.revision
             messages += 1
         ended.append(time.perf_counter())
 
     begun_s = time.perf_counter()
     tasks = [asyncio.create_task(watch(place)) for place in range(WATCHERS)]
-    while not all(told):
+    while not all(revisions):
         await asyncio.sleep(0.01)
     opened_s = time.perf_counter() - begun_s
     resident = _resident_bytes(pid)
@@ -245,10 +245,10 @@ async def _watched(address: str, pid: int, job_id: str) -> list[list[str]]:
     for channel in channels:
         await channel.close()
     return [
-        ["seconds until all were told the state", f"{opened_s:.2f}"],
+        ["seconds until all received the state", f"{opened_s:.2f}"],
         ["messages of progress a second to all", f"{reports / _WATCHED_S:,.0f}"],
         ["server's processor meanwhile", f"{used_s / _WATCHED_S:.1%}"],
-        ["seconds until all were told the end", f"{max(ended) - cancelled_s:.2f}"],
+        ["seconds until all received the end", f"{max(ended) - cancelled_s:.2f}"],
         ["", str(resident)],
     ]
 

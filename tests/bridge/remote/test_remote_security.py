@@ -100,7 +100,7 @@ def test_scopes_over_tls(tmp_path: Path, authority: Authority) -> None:
         assert outcomes(address, ca=ca) == unknown
         assert outcomes(address, ca=ca, token_file=wrong) == unknown
         assert len(daemon.orders) == before
-        # Without TLS, not even a stop is heard.
+        # Not even a stop is heard without TLS.
         assert outcomes(address) == dict.fromkeys(CALLS, "UNAVAILABLE")
 
 

@@ -49,8 +49,8 @@ async def page_of(file: Path) -> AsyncIterator[Any]:
 async def done(page: Any, kind: str, **request: Any) -> dict[str, Any]:
     """Ask for something, and return the run after it."""
     await page.send(type=kind, **request)
-    told: dict[str, Any] = await page.told("run")
-    return told
+    received: dict[str, Any] = await page.receive("run")
+    return received
 
 
 @pytest.fixture
@@ -62,9 +62,9 @@ def file(tmp_path: Path) -> Path:
 
 async def test_the_surroundings_answer_each_turn(file: Path) -> None:
     async with page_of(file) as page:
-        play = (await page.told("definition"))["play"]
+        play = (await page.receive("definition"))["play"]
         assert (play["goals"], play["forms"], play["link"]) == (["goal always eventually Door.ajar"], ["log"], None)
-        run = await page.told("run")
+        run = await page.receive("run")
         assert run["opposition"] == {"goals": [False], "denied": "goal 1", "assumptions": [0]}
         assert run["blocked"]["opened.response"] == ["the surroundings decide it"]
         run = await done(page, "event", line="open")
@@ -91,12 +91,12 @@ async def test_a_page_that_comes_back_repeats_its_turns(file: Path) -> None:
     make, is_shared, robot = command._source(given)
     async with served(make, is_shared=is_shared, robot=robot) as server:
         async with opened(server.url) as page:
-            await page.told("run")
+            await page.receive("run")
             await page.send(type="resume", page="tab")
             run = await done(page, "walk", steps=15, seed=1)
             events = [entry["event"] for entry in page.entries()]
         async with opened(server.url) as page:
-            await page.told("run")
+            await page.receive("run")
             await page.send(type="resume", page="tab")
             again = await page.until(lambda message: message["type"] == "run" and message["steps"])
             assert again["steps"] == run["steps"]
@@ -106,7 +106,7 @@ async def test_a_page_that_comes_back_repeats_its_turns(file: Path) -> None:
 async def test_a_changed_file_is_made_anew(file: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watched_model, "LOOK_S", 0.01)
     async with page_of(file) as page:
-        await page.told("run")
+        await page.receive("run")
         file.write_text(GATE.replace("goal always eventually Door.ajar", "goal once Door.ajar"), encoding="utf-8")
         found = await page.until(lambda message: message["type"] == "definition")
         assert found["play"]["goals"] == ["goal once Door.ajar"]
@@ -120,7 +120,7 @@ async def test_waiting_is_only_for_a_run_against_the_surroundings(file: Path) ->
     given = arguments("--model", str(file))
     make, is_shared, robot = command._source(given)
     async with served(make, is_shared=is_shared, robot=robot) as server, opened(server.url) as page:
-        assert (await page.told("run"))["opposition"] is None
+        assert (await page.receive("run"))["opposition"] is None
         run = await done(page, "wait")
         assert (run["kind"], run["lines"]) == ("wrong", ["waiting is for a run against the surroundings"])
 

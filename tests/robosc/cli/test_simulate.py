@@ -229,8 +229,8 @@ def test_a_controller_follows_its_strategy(capsys: pytest.CaptureFixture[str], m
     monkeypatch.setattr("sys.stdin", typed("arrived\ncall\nundo\ncall\narrived\nstrategy 1\nredo\nundo\nquit\n"))
     assert main(["simulate", "lift.rscd"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    told = [line.partition(" ")[2].strip() for line in lines if line.startswith(("goals ", "strategy "))]
-    assert told == [
+    goals = [line.partition(" ")[2].strip() for line in lines if line.startswith(("goals ", "strategy "))]
+    assert goals == [
         *("1 not yet", "call.request"),  # a message that means nothing
         *("1 not yet", "waits"),  # called
         *("1 not yet", "call.request"),  # taken back

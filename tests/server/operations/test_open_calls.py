@@ -1,4 +1,4 @@
-"""Tests of the limit on open calls, with real calls: silent ones, watches, answers that nobody reads."""
+"""Tests of the limit on open calls, with real calls: silent ones, watches, answers that are not read."""
 
 import gc
 from collections import Counter
@@ -118,7 +118,7 @@ def test_a_caller_has_its_places_and_no_more(small: str, all_are_free: Callable[
         hold(first, 4)
         hold(second, 3)
         assert eventually(lambda: first.ended + second.ended == 3)
-        assert any(each.was_told(b"limit of 4 open calls") for each in (first, second))
+        assert any(each.has_received(b"limit of 4 open calls") for each in (first, second))
         # Another one, by its address.
         assert is_answered(small)
     assert all_are_free()
@@ -226,7 +226,7 @@ def test_an_answer_that_nobody_reads_keeps_its_place(small: str) -> None:
         for number in range(5):
             deaf.call(2 * number + 1, GET_VERSION)
             deaf.message(2 * number + 1, b"")
-        assert eventually(lambda: deaf.was_told(b"limit of 4 open calls"))
+        assert eventually(lambda: deaf.has_received(b"limit of 4 open calls"))
 
 
 def test_a_token_says_how_many(tmp_path: Path) -> None:

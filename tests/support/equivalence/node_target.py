@@ -191,7 +191,7 @@ class NodeTarget:
             self._surroundings.close()
         stop = next((number for number, item in enumerate(self._log) if item["kind"] == "stop"), len(self._log))
         self._log = self._log[:stop]
-        # What brings the robot to rest: all-default messages, and cancels; a layer takes leave of its callers.
+        # Messages that bring the robot to rest: all-default messages, and cancels; a layer takes leave of its callers.
         leave = [item for item in self._issued if item[0] in ("answer", "ended")]
         self._issued = [item for item in self._issued if item not in leave and (item[2] or item[0] in ("call", "goal"))]
         return self._taken()

@@ -102,7 +102,7 @@ class Ros2Surroundings:
             type_ = load_server(_ServerType(is_action, str(info.package), str(info.interface)))  # type: ignore[arg-type]
             self._seen[item.name] = 0
             if is_action:
-                # What a layer hears of the end of a cancelled goal is a step of its own.
+                # The end of a cancelled goal is a step of its own for a layer.
                 self._actions[item.name] = HeldAction(host, type_, item.identifier, ends_on_cancel=not self._is_layer)
             else:
                 self._services[item.name] = HeldService(host, type_, item.identifier)
@@ -150,7 +150,7 @@ class Ros2Surroundings:
             case "feedback":
                 self._actions[name].feedback(**_fields(self._actions[name].action_class.Feedback, action.data))
             case "end" if action.how == "cancelled" and not self._is_layer:
-                # As soon as the cancel comes, the server ends the goal.
+                # The server ends the goal as soon as the cancel comes.
                 server = self._actions[name]
                 self._peer.spin_until(server.is_last_over, LIMIT_S, "the cancelled goal's end", self._node)
             case "end":

@@ -9,7 +9,7 @@ from support.goal_porter import porter_supervisor
 CALL, OPENED, CLOSED = "/call", "/door/opened", "/door/closed"
 
 ERRANDS = (
-    # Nobody calls.
+    # No call comes.
     *((OPENED, ""), (CLOSED, ""), (CLOSED, "")),
     # A call, and another one before the door is open; at last it is shut again.
     *((CALL, "open"), (CLOSED, ""), (CALL, ""), (OPENED, "enter"), (OPENED, "leave"), (CLOSED, "close")),

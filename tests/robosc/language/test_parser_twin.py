@@ -394,6 +394,30 @@ def test_words_as_names(word: str) -> None:
         assert trees[0] is None
 
 
+@pytest.mark.parametrize(
+    "text",
+    [
+        "mission m while not prefer { visit a }",
+        "mission m while not mission { visit a }",
+        "requirement m needs not mission goal { visit a }",
+        "requirement m needs not mission goal while leads to x",
+        "requirement m needs not mission m while not mission n { visit not }",
+        "requirement m needs not mission mission while { visit a }",
+        "requirement m needs not prefer { visit } over x",
+        "requirement m needs not prefer { } over x",
+        "requirement m needs not prefer { visit, x } over x",
+        "requirement m needs not prefer goal over leads to x",
+        "requirement m needs not prefer prefer over x",
+        "requirement m needs if not prefer then over else not mission",
+        "requirement m needs if not mission then while else not prefer",
+        "requirement m needs not mission constant while: T = not prefer constant over: T = not",
+        "requirement m needs not goal mission m { visit a }",
+    ],
+)
+def test_a_mission_or_preference_behind_not(text: str) -> None:
+    compare(f"robot R {{ {text} }}")
+
+
 def test_not_takes_no_meaning_from_a_text() -> None:
     """A text that the grammar without the operator reads is read like that, but for calls: `not` is no function.
 

@@ -112,6 +112,12 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
     if token == "if" and tokens.texts[at - 1] == "not":
         # Without its end it is no conditional, so that `not` is a name.
         return True
+    if tokens.texts[at - 2 : at] in (["not", "mission"], ["not", "prefer"]):
+        # Without its brace or its `over` it is no item, so that `not` is the operator.
+        return True
+    if tokens.texts[at - 1] == "not" and token in ("mission", "prefer"):
+        # An item, so that `not` is a name, behind which none may stand here.
+        return True
     # The next token shows that `3 needs x` wants a name, and `integer < x` something else than this word; and that an
     # item begins behind a name `not`.
     is_next = offset(text, *stops) == tokens.starts[at + 1]

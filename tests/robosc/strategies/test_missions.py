@@ -91,6 +91,11 @@ def test_visits_are_made_in_their_order_round_after_round() -> None:
     assert sent(bench, 5) == ["to_office", "to_kitchen", "to_office", "to_kitchen", "to_office"]
 
 
+def test_a_mission_may_have_many_visits() -> None:
+    bench = bench_of(robot(*("kitchen", "office", "dock", "office") * 3))
+    assert sent(bench, 14) == [*("to_kitchen", "to_office", "charge", "to_office") * 3, "to_kitchen", "to_office"]
+
+
 def test_a_message_chooses_when_a_mission_is_asked_for_and_it_begins_anew() -> None:
     bench = bench_of(robot("kitchen", "office", "dock", asked=True))
     assert sent(bench, 3) == []

@@ -31,7 +31,8 @@ VALUES = [
         "SystemSupervisor",
         "SystemSynthesis",
     ),
-    *("GoalApproach", "Goals", "Verification", "VerificationStatus", "WalkFinding", "WalkFindingKind"),
+    *("DetourProgress", "GoalApproach", "Goals", "MissionProgress"),
+    *("Verification", "VerificationStatus", "WalkFinding", "WalkFindingKind"),
 ]
 ERRORS = [
     *(

@@ -37,6 +37,11 @@ class Place:
         """The condition that it is true."""
         return VariableRead(MEMORY, self.name)
 
+    @property
+    def judged(self) -> Expression:
+        """A condition that reads it with all that decides about it."""
+        return Binary("and", self.read, self.update)
+
 
 @dataclass(frozen=True, slots=True)
 class Judgement:

@@ -14,7 +14,7 @@ algorithm for the evaluation of fixpoint expressions", Theoretical Computer Scie
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any, Protocol
 
 
@@ -42,11 +42,13 @@ class Approach:
     Attributes:
         positions: Positions from which the controller makes progress, whatever the surroundings do.
         nearer: Positions from which progress was known before.
+        progress: Positions in which the controller, at its turn, makes progress.
         waiting: For each assumption, the positions in which the controller stays while that assumption fails.
     """
 
     positions: Any
     nearer: Any
+    progress: Any
     waiting: tuple[Any, ...]
 
 
@@ -72,10 +74,13 @@ def solve(
     *,
     false: Any,
     check_stop: Callable[[], object] = lambda: None,
+    is_enough: Callable[[Any], bool] = lambda winning: True,
+    before: Solution | None = None,
 ) -> Solution:
     """Return the positions from which the controller wins, and its steps towards each goal.
 
-    Assumptions and goals are judged when the controller has its turn.
+    Assumptions and goals are judged when the controller has its turn. Where it does not win from enough positions, the
+    work ends early: then there are no steps, and maybe it wins from fewer positions yet.
 
     Args:
         arena: The game.
@@ -83,13 +88,21 @@ def solve(
         goals: Predicates that the controller is to make true again and again, at least one.
         false: The predicate that is true nowhere.
         check_stop: Function called before each step; it may end the work with an error.
+        is_enough: Function that returns False for positions that are too few to be of use.
+        before: Solution for the same goals under these assumptions and others, of which `waiting` has only these; or
+            None.
     """
     # The empty assumption is one that never fails.
     failing = [~item for item in assumptions] or [false]
     winning, rounds = arena.positions, 0
     approaches: list[tuple[Approach, ...]] = [()] * len(goals)
-    # The result is stable once each goal in a row has left it as it was.
-    unchanged, number = 0, 0
+    if before is not None:
+        winning = before.winning
+        # Steps are bounds for those of fewer assumptions, one by one.
+        approaches = list(before.approaches) if assumptions else approaches
+    # The result is stable once each goal in a row has left it as it was. The last goal is first: of visits one after
+    # the other the later ones decide where the earlier ones may lead.
+    unchanged, number = 0, len(goals) - 1
     while unchanged < len(goals):
         check_stop()
         reached = goals[number] & arena.turn(winning)
@@ -98,9 +111,9 @@ def solve(
         found = approaches[number][-1].positions if approaches[number] else false
         unchanged = unchanged + 1 if found == winning else 0
         winning = found
-        number = (number + 1) % len(goals)
         rounds += number == 0
-        if winning == false:
+        number = (number - 1) % len(goals)
+        if winning == false or not is_enough(winning):
             return Solution(winning, ((),) * len(goals), rounds)
     return Solution(winning, tuple(approaches), rounds)
 
@@ -115,6 +128,8 @@ class _Search:
         winning: Positions outside of which no position is looked for.
         false: The predicate that is true nowhere.
         check_stop: Function called before each step.
+        known: For some sets that are looked at again for other assumptions, the positions in them whose surroundings
+            lead into them, and those whose turn does.
     """
 
     arena: Arena
@@ -122,6 +137,7 @@ class _Search:
     winning: Any
     false: Any
     check_stop: Callable[[], object]
+    known: dict[Any, tuple[Any, Any]] = field(default_factory=dict)
 
     def approach(self, reached: Any, before: Sequence[Approach]) -> list[Approach]:
         """Return the steps towards a goal; the positions of the last one are all from which it is approached.
@@ -133,24 +149,30 @@ class _Search:
         found: list[Approach] = []
         nearer, last = self.false, None
         while True:
+            known = before[len(found)] if len(found) < len(before) else None
             progress = reached | self.arena.turn(nearer)
             # All of a step follows from where it makes progress.
             if progress == last:
                 return found
-            bounds = (
-                [item & self.winning for item in before[len(found)].waiting]
-                if len(found) < len(before)
-                else [self.winning] * len(self.failing)
-            )
-            waiting = tuple(
-                self._waiting(progress, item, bound) for item, bound in zip(self.failing, bounds, strict=True)
-            )
+            bounds = [self.winning] * len(self.failing)
+            if known is not None:
+                bounds = [item & self.winning for item in known.waiting]
+            if known is not None and known.progress == progress and list(known.waiting) == bounds:
+                # The goal has the same positions as before, so that its search ends where it ended before.
+                waiting = known.waiting
+            else:
+                # Sets of one step are alike, those of several are not; all may begin with all winning positions.
+                for item in [item for item in self.known if item != self.winning]:
+                    del self.known[item]
+                waiting = tuple(
+                    self._waiting(progress, item, bound) for item, bound in zip(self.failing, bounds, strict=True)
+                )
             positions = nearer
             for item in waiting:
                 positions = positions | item
             if positions == nearer:
                 return found
-            found.append(Approach(positions, nearer, waiting))
+            found.append(Approach(positions, nearer, progress, waiting))
             nearer, last = positions, progress
 
     def _waiting(self, progress: Any, failing: Any, bound: Any) -> Any:
@@ -164,11 +186,11 @@ class _Search:
         staying = bound
         while True:
             self.check_stop()
-            narrowed = staying & self.arena.surroundings(staying)
+            if staying not in self.known:
+                self.known[staying] = staying & self.arena.surroundings(staying), self.arena.turn(staying)
+            closed, turn = self.known[staying]
             # An assumption that never fails is nothing to stay for.
-            narrowed = narrowed & (
-                progress if failing == self.false else progress | (failing & self.arena.turn(staying))
-            )
+            narrowed = closed & (progress if failing == self.false else progress | (failing & turn))
             if narrowed == staying:
                 return staying
             staying = narrowed

@@ -6,14 +6,14 @@ goal: that the mission is not at it any more.
 """
 
 from collections.abc import Callable, Collection, Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from robosc.automata import ExecutableSystem
 from robosc.automata.goal_memory import holds
 from robosc.strategies.arena import ControllerArena
 from robosc.strategies.counter_strategy import CounterStage, CounterStrategy, oppose
-from robosc.strategies.gr1 import Solution, solve
+from robosc.strategies.gr1 import Approach, Solution, solve
 from robosc.strategies.preferences import preferred_order
 from robosc.supervisor import AddedCondition, Choice, DecisionDiagram, Strategy
 from robosc.synthesis.diagrams import extract
@@ -74,7 +74,9 @@ def synthesize_strategy(
         UnknownEngineError: There is no such engine.
         UnsupportedModelError: A condition would be too large.
     """
-    with workspace(executable.remembering_automata, engine, should_stop, on_progress) as place:
+    owed = executable.obligations
+    conditions = (*(item.condition for item in owed.aims), *(item.judged for item in owed.places))
+    with workspace(executable.remembering_automata, engine, should_stop, on_progress, conditions) as place:
         allowed = [number for number, item in enumerate(executable.model.assumptions) if item.is_allowed]
         return StrategySynthesis(executable, added, place).result(allowed)
 
@@ -110,7 +112,7 @@ class StrategySynthesis:
             unreached=unreached,
             is_hopeless=bool(unreached) and not self.can_be_reached(unreached),
             preventable=preventable,
-            unneeded=self._unneeded() if is_won else (),
+            unneeded=self._unneeded(solution) if is_won else (),
             positions=self._count(self.arena.positions),
             winning=self._count(solution.winning),
             rounds=solution.rounds,
@@ -175,12 +177,20 @@ class StrategySynthesis:
     def _solution(self, assumptions: Iterable[int], goals: Iterable[int]) -> Solution:
         return self._solved([self.assumptions[item] for item in assumptions], [self.goals[item] for item in goals])
 
-    def _solved(self, assumptions: Sequence[Any], goals: Sequence[Any]) -> Solution:
-        return solve(self.arena, assumptions, goals, false=self._manager.false, check_stop=self._monitor.check_stop)
+    def _solved(
+        self,
+        assumptions: Sequence[Any],
+        goals: Sequence[Any],
+        is_enough: Callable[[Any], bool] = lambda winning: True,
+        before: Solution | None = None,
+    ) -> Solution:
+        stop, false = self._monitor.check_stop, self._manager.false
+        return solve(self.arena, assumptions, goals, false=false, check_stop=stop, is_enough=is_enough, before=before)
 
     def is_won(self, assumptions: Iterable[int], goals: Iterable[int]) -> bool:
         """Return True if some goals can be reached under some assumptions."""
-        return self.arena.can_begin(self._solution(assumptions, goals).winning)
+        owed, wanted = [self.assumptions[item] for item in assumptions], [self.goals[item] for item in goals]
+        return self.arena.can_begin(self._solved(owed, wanted, self.arena.can_begin).winning)
 
     def _unreached(self) -> tuple[int, ...]:
         """Return a smallest set, by leaving out, of goals that cannot be reached together; later ones go first."""
@@ -211,15 +221,40 @@ class StrategySynthesis:
                 found = near
         return found
 
-    def _unneeded(self) -> tuple[int, ...]:
-        """Return assumptions that can be left out together; of two that can replace each other, the later one."""
-        goals = range(len(self.goals))
+    def _unneeded(self, solution: Solution) -> tuple[int, ...]:
+        """Return assumptions that can be left out together; of two that can replace each other, the later one.
+
+        Args:
+            solution: Solution under all of them.
+        """
         kept = list(range(len(self.assumptions)))
-        for item in reversed(range(len(self.assumptions))):
-            fewer = [number for number in kept if number != item]
-            if self.is_won(fewer, goals):
-                kept = fewer
+        for place in reversed(range(len(self.assumptions))):
+            fewer = [*kept[:place], *kept[place + 1 :]]
+            relying = [number for number, steps in enumerate(solution.approaches) if self._rely(steps, place)]
+            if not relying:
+                kept, solution = fewer, _without(solution, place)
+                continue
+            # The goal that is looked at first relies on it, so that it is soon known to be needed.
+            order = [*range(relying[-1] + 1, len(self.goals)), *range(relying[-1] + 1)]
+            bound = _without(solution, place)
+            bound = replace(bound, approaches=tuple(bound.approaches[number] for number in order))
+            owed, wanted = [self.assumptions[item] for item in fewer], [self.goals[number] for number in order]
+            found = self._solved(owed, wanted, self.arena.can_begin, bound)
+            if self.arena.can_begin(found.winning):
+                steps = dict(zip(order, found.approaches, strict=True))
+                kept, solution = fewer, replace(found, approaches=tuple(steps[number] for number in sorted(steps)))
         return tuple(item for item in range(len(self.assumptions)) if item not in kept)
+
+    def _rely(self, steps: Iterable[Approach], place: int) -> bool:
+        """Return True if some step towards a goal needs that the controller can wait for the assumption in a place."""
+        false = self._manager.false
+        for step in steps:
+            others = step.nearer
+            for item in (*step.waiting[:place], *step.waiting[place + 1 :]):
+                others = others | item
+            if step.waiting[place] & ~others != false:
+                return True
+        return False
 
     def preventable(self, allowed: Collection[int]) -> tuple[int, ...]:
         """Return assumptions that the robot can make false for ever, in a state that it can get to.
@@ -280,3 +315,12 @@ class StrategySynthesis:
                 choices.append(Choice(event, condition))
                 care = care & ~chosen[event]
         return tuple(choices)
+
+
+def _without(solution: Solution, place: int) -> Solution:
+    """Return a solution whose steps do not tell of the assumption in a place."""
+    approaches = (
+        tuple(replace(item, waiting=(*item.waiting[:place], *item.waiting[place + 1 :])) for item in steps)
+        for steps in solution.approaches
+    )
+    return replace(solution, approaches=tuple(approaches))

@@ -16,7 +16,7 @@ from typing import Any
 
 from robosc.automata.state import Subject, initial_values, subject_domain, subject_type, subjects
 from robosc.automata.structure import InputVariable, System
-from robosc.expressions import IntegerType, PathStep, Type, Value, domain
+from robosc.expressions import Expression, IntegerType, PathStep, Type, Value, domain
 from robosc.recursion import allow_depth
 from robosc.synthesis.blocks import Datum, blocks_of
 from robosc.synthesis.changes import computed_subjects
@@ -63,12 +63,18 @@ class Encoding:
         pause: Called again and again while expressions become predicates: it may end the work with an error.
     """
 
-    def __init__(self, system: System, manager: Manager, pause: Callable[[], None] = lambda: None) -> None:
+    def __init__(
+        self,
+        system: System,
+        manager: Manager,
+        pause: Callable[[], None] = lambda: None,
+        conditions: Iterable[Expression] = (),
+    ) -> None:
         self.system = system
         self.manager = manager
         self.subjects: dict[Subject, Bits] = {}
         found = blocks_of(system)
-        self.blocks = block_order(system, found.places)
+        self.blocks = block_order(system, found.places, conditions)
         for number, subject in enumerate(subject for block in self.blocks for subject in block):
             self.subjects[subject] = self._bits(f"s{number}", subject_domain(system, subject), self._type(subject))
         self.places = tuple(self.subjects[subject] for subject in subjects(system))

@@ -15,6 +15,7 @@ from robosc.automata.compile import subjects_read
 from robosc.automata.state import Subject
 from robosc.automata.structure import System
 from robosc.expressions import (
+    Expression,
     PathStep,
     Received,
     leaves,
@@ -28,15 +29,19 @@ _SLIDES = 4
 """Times that the window slides at most."""
 
 
-def block_order(system: System, blocks: Sequence[tuple[Subject, ...]]) -> tuple[tuple[Subject, ...], ...]:
+def block_order(
+    system: System, blocks: Sequence[tuple[Subject, ...]], conditions: Iterable[Expression] = ()
+) -> tuple[tuple[Subject, ...], ...]:
     """The blocks of places of a state, so that those that an event touches together stand near each other.
 
     Args:
         system: The system.
         blocks: Each place of its state once; the places of one block have one place in the order.
+        conditions: Conditions beside those of the system whose subjects are to stand near each other, too.
     """
     index = {subject: place for place, block in enumerate(blocks) for subject in block}
-    edges = [sorted({index[subject] for subject in edge}) for edge in hyperedges(system)]
+    together = (*hyperedges(system), *map(subjects_read, conditions))
+    edges = [sorted({index[subject] for subject in edge}) for edge in together]
     edges = [edge for edge in edges if len(edge) > 1]
     return tuple(blocks[place] for place in slide(force(len(blocks), edges), edges))
 

@@ -1,10 +1,11 @@
 """Basis of all work on predicates: an engine, a system encoded in it, and the monitor of the waiting caller."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
 from robosc.automata.structure import System
+from robosc.expressions import Expression
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import (
     EngineOptions,
@@ -48,6 +49,7 @@ def workspace(
     engine: str | EngineOptions,
     should_stop: Callable[[], bool],
     on_progress: Callable[[SynthesisProgress], None],
+    conditions: Iterable[Expression] = (),
 ) -> Iterator[Workspace]:
     """A workspace of its own for a system.
 
@@ -56,6 +58,7 @@ def workspace(
         engine: Name of the engine for decision diagrams, or more about it.
         should_stop: Asked again and again; once true, the work ends.
         on_progress: Called with the progress of the work.
+        conditions: Conditions on the system's states that the work is about, besides its own.
 
     Raises:
         NodeLimitError: Diagrams became larger than the options allow.
@@ -67,5 +70,5 @@ def workspace(
     manager = make_manager(name)
     monitor = ProgressMonitor(should_stop, on_progress, node_check(manager, options.maximum_nodes))
     with limited(manager, options.maximum_nodes):
-        encoding = Encoding(system, manager, monitor.check_stop)
+        encoding = Encoding(system, manager, monitor.check_stop, conditions)
         yield Workspace(name, encoding, monitor, options.is_reordering, options.condition_seconds)

@@ -15,8 +15,6 @@ VALUES = [
         "Condition",
         "Conditions",
         "CounterRun",
-        "DetourProgress",
-        "MissionProgress",
         "Deployment",
         "Diagnostic",
         "Explained",
@@ -34,16 +32,8 @@ VALUES = [
         "SystemSupervisor",
         "SystemSynthesis",
     ),
-    *(
-        "GoalApproach",
-        "GoalExplanation",
-        "GoalSummary",
-        "Goals",
-        "Verification",
-        "VerificationStatus",
-        "WalkFinding",
-        "WalkFindingKind",
-    ),
+    *("DetourProgress", "GoalApproach", "GoalExplanation", "GoalSummary", "Goals", "MissionProgress"),
+    *("Verification", "VerificationStatus", "WalkFinding", "WalkFindingKind"),
 ]
 ERRORS = [
     *(

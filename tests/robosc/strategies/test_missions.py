@@ -1,0 +1,293 @@
+"""Missions and preferences by hand: what strategies do for them, in words and in runs, and what is found about them."""
+
+import json
+from collections.abc import Sequence
+
+import msgspec
+import pytest
+
+import robosc
+from robosc.cli.simulate import mission_json
+from robosc.cli.simulation_steps import state_lines, step_lines
+from robosc.conditions.summary import strategy_lines, summary_json
+from robosc.controller_properties import check_strategy
+from robosc.errors import Diagnostic
+from robosc.execution.interpreter import InterpretedSystem
+from robosc.expressions import Expression
+from robosc.model.places import Places
+from robosc.model.structure import Deployment, Detour, Mission, Model, Preference
+from robosc.source import Location
+from robosc.strategies import goal_findings, layer_goal_findings
+from robosc.strategies.preferences import preferred_order
+from robosc.supervisor import Supervisor
+from support.execution import Bench
+from support.missions import strategic, strategy_result, with_conditions
+
+ROUNDS = """robot Courier {
+    component Base {
+        incoming message to_kitchen with identifier: "/to_kitchen", type: none
+        incoming message to_office with identifier: "/to_office", type: none
+        incoming message charge with identifier: "/charge", type: none
+        behaviour {
+            initial marked state dock { on request to to_kitchen goto kitchen on request to to_office goto office }
+            marked state kitchen { on request to to_office goto office on request to charge goto dock }
+            marked state office { on request to to_kitchen goto kitchen on request to charge goto dock }
+        }
+    }
+    component Caller {
+        outgoing message call with identifier: "/call", type: none
+        behaviour {
+            initial marked state quiet { on response from call goto waiting on request to to_office }
+            marked state waiting { on request to to_office goto quiet }
+        }
+    }
+    component Operator {
+        outgoing message begin with identifier: "/begin", type: none
+        outgoing message rest with identifier: "/rest", type: none
+        behaviour {
+            initial marked state resting { on response from begin goto working }
+            marked state working { on response from rest goto resting }
+        }
+    }
+}"""
+CONDITIONS = ("Base.kitchen", "Base.office", "Base.dock", "Caller.waiting", "Operator.working")
+
+
+def robot(*visits: str, asked: bool = False, detour: bool = False, prefer: tuple[str, str] | None = None) -> Model:
+    """Return the robot with a mission to places, in their order.
+
+    Args:
+        visits: The places.
+        asked: True if it is asked for only while the operator works.
+        detour: True if it has a detour to the office on each call.
+        prefer: Communication that is preferred, and the one that it is preferred to.
+    """
+
+    def made(conditions: Sequence[Expression]) -> tuple[Mission, ...]:
+        named = dict(zip(("kitchen", "office", "dock", "waiting", "working"), conditions, strict=True))
+        detours = (Detour(named["waiting"], (named["office"],)),) if detour else ()
+        return (Mission("rounds", tuple(named[item] for item in visits), named["working"] if asked else None, detours),)
+
+    preferences = () if prefer is None else (Preference((prefer[0],), (prefer[1],)),)
+    return with_conditions(ROUNDS, CONDITIONS, missions=made, preferences=lambda _: preferences)
+
+
+def sent(bench: Bench, periods: int) -> list[str]:
+    """Return the messages that are published in some periods."""
+    before = len(bench.middleware.sent)
+    for _ in range(periods):
+        bench.executor.tick()
+    return [name for kind, name, *_ in bench.middleware.sent[before:] if kind == "publish"]
+
+
+def bench_of(model: Model) -> Bench:
+    return Bench(InterpretedSystem(strategic(model)))
+
+
+def test_visits_are_made_in_their_order_round_after_round() -> None:
+    bench = bench_of(robot("kitchen", "office", "dock"))
+    assert sent(bench, 7) == ["to_kitchen", "to_office", "charge", "to_kitchen", "to_office", "charge", "to_kitchen"]
+    bench = bench_of(robot("office", "kitchen"))
+    assert sent(bench, 5) == ["to_office", "to_kitchen", "to_office", "to_kitchen", "to_office"]
+
+
+def test_a_mission_may_have_many_visits() -> None:
+    bench = bench_of(robot(*("kitchen", "office", "dock", "office") * 3))
+    assert sent(bench, 14) == [*("to_kitchen", "to_office", "charge", "to_office") * 3, "to_kitchen", "to_office"]
+
+
+def test_a_message_chooses_when_a_mission_is_asked_for_and_it_begins_anew() -> None:
+    bench = bench_of(robot("kitchen", "office", "dock", asked=True))
+    assert sent(bench, 3) == []
+    bench.executor.receive("/begin", None)
+    assert sent(bench, 2) == ["to_kitchen", "to_office"]
+    bench.executor.receive("/rest", None)
+    assert sent(bench, 3) == []
+    bench.executor.receive("/begin", None)
+    assert sent(bench, 2) == ["to_kitchen", "to_office"]
+
+
+def test_a_detour_comes_first_and_then_the_mission_goes_on_where_it_was() -> None:
+    bench = bench_of(robot("kitchen", "dock", detour=True))
+    assert sent(bench, 3) == ["to_kitchen", "charge", "to_kitchen"]
+    bench.executor.receive("/call", None)
+    assert sent(bench, 3) == ["to_office", "charge", "to_kitchen"]
+
+
+def test_of_requests_that_lead_nearer_the_preferred_one_is_chosen() -> None:
+    ways = """robot Ways {
+        component Base {
+            incoming message left with identifier: "/left", type: none
+            incoming message middle with identifier: "/middle", type: none
+            incoming message right with identifier: "/right", type: none
+            incoming message back with identifier: "/back", type: none
+            behaviour {
+                initial marked state out {
+                    on request to left goto home on request to middle on request to right goto home
+                }
+                marked state home { on request to back goto out }
+            }
+        }
+    }"""
+
+    def way(*preferences: Preference) -> list[str]:
+        made = with_conditions(
+            ways,
+            ("Base.home", "Base.out"),
+            missions=lambda found: (Mission("m", tuple(found)),),
+            preferences=lambda _: preferences,
+        )
+        return sent(bench_of(made), 2)
+
+    assert way() == ["left", "back"]
+    assert way(Preference(("right",), ("left",))) == ["right", "back"]
+    # A request that leads nowhere is not chosen, however much it is preferred.
+    assert way(Preference(("middle",), ("left", "right"))) == ["left", "back"]
+
+
+def test_preferences_refine_the_order_of_the_source() -> None:
+    requests = [f"{name}.request" for name in "abcd"]
+
+    def order(*preferences: tuple[str, str]) -> str:
+        items = [Preference(tuple(first), tuple(second)) for first, second in preferences]
+        return "".join(event[0] for event in preferred_order(requests, items))
+
+    assert order() == "abcd"
+    assert order(("c", "a")) == "bcad"
+    assert order(("d", "abc")) == "dabc"
+    assert order(("cd", "ab")) == "cdab"
+    assert order(("b", "a"), ("d", "b")) == "cdba"
+    with pytest.raises(ValueError, match=r"the preferences of a\.request, b\.request contradict each other"):
+        order(("b", "a"), ("a", "b"))
+
+
+@pytest.fixture(scope="module")
+def supervisor() -> Supervisor:
+    return strategic(robot("kitchen", "dock", asked=True, detour=True, prefer=("to_office", "to_kitchen")))
+
+
+def test_strategies_are_told_visit_by_visit(supervisor: Supervisor) -> None:
+    assert "a strategy for 3 visits" in repr(supervisor)
+    lines = strategy_lines(supervisor)
+    assert lines[0] == "the strategy approaches its visits in turn; it requests the first that applies"
+    assert [line for line in lines if line.startswith("  for ")] == [
+        "  for visit 1 of mission rounds, Base.kitchen",
+        "  for visit 2 of mission rounds, Base.dock",
+        "  for visit 1 of detour 1 of mission rounds, Base.office",
+    ]
+    found = json.loads(json.dumps(summary_json(supervisor)))["goals"]
+    assert [(item["name"], item["goal"]) for item in found][:2] == [
+        ("visit 1 of mission rounds", "Base.kitchen"),
+        ("visit 2 of mission rounds", "Base.dock"),
+    ]
+    # Each goal and each visit has a mode.
+    assert check_strategy(supervisor.executable, supervisor.added, supervisor.strategy).result == "passed"  # type: ignore[arg-type]
+
+
+def test_python_shows_visits(supervisor: Supervisor) -> None:
+    made = robosc.Supervisor.of(supervisor, None)
+    assert repr(made.goals) == "<3 visits>"
+    assert str(made.goals[1]).splitlines()[0] == "visit 2 of mission rounds, Base.dock:"
+    assert made.goals[1].is_visit and "visit 2 of mission rounds" in made.goals._repr_html_()
+
+
+def test_a_run_shows_how_far_missions_are(supervisor: Supervisor) -> None:
+    run = robosc.simulate(supervisor)
+    assert [line for line in state_lines(run) if line.startswith(("goals", "mission"))] == [
+        "mission   rounds: not asked for"
+    ]
+    run.step("begin.response")
+    assert (str(run.missions[0]), run.chosen) == ("rounds: at visit 1, Base.kitchen", "to_kitchen.request")
+    before = run.state
+    step = run.step("to_kitchen.request")
+    assert step.visits == ("visit 1 of mission rounds",)
+    assert step_lines(2, step, before)[-1] == "      reached: visit 1 of mission rounds"
+    run.step("call.response")
+    text = "rounds: at visit 2, Base.dock; detour 1 under way, at visit 1, Base.office"
+    assert f"mission   {text}" in state_lines(run)
+    assert mission_json(run.missions[0]) == {
+        "mission": "rounds",
+        "asked": True,
+        "visit": 2,
+        "condition": "Base.dock",
+        "round": False,
+        "detours": [{"detour": 1, "visit": 1, "condition": "Base.office"}],
+    }
+    # Meanwhile the mission's own visits still count.
+    assert run.step("charge.request").visits == ("visit 2 of mission rounds",)
+    assert run.step("to_office.request").visits == ("visit 1 of detour 1 of mission rounds",)
+    run.undo()
+    run.undo()
+    assert str(run.missions[0]) == text
+    run.restart()
+    assert (run.missions[0].is_asked, run.missions[0].visit) == (False, 1)
+
+
+def test_a_mission_whose_visits_are_all_true_is_at_rest() -> None:
+    run = robosc.simulate(strategic(robot("dock", detour=True)))
+    assert str(run.missions[0]) == "rounds: every visit is true" and run.chosen is None
+    assert run.step("begin.response").visits == ()
+    assert run.step("to_kitchen.request").visits == ()
+    assert run.step("charge.request").visits == ("visit 1 of mission rounds",)
+
+
+STUCK = ROUNDS.replace("on request to charge goto dock", "").replace("/charge", "/unused")
+
+
+def findings(model: Model, deployment: Deployment = Deployment.CONTROLLER) -> tuple[Diagnostic, ...]:
+    def place(line: int) -> Location:
+        return Location("robot.rscd", line, 1, 1)
+
+    visits = [
+        tuple(place(100 * number + visit) for visit in range(20)) for number, _ in enumerate(model.missions, start=1)
+    ]
+    places = Places(
+        place(1),
+        goals=[place(10 + number) for number, _ in enumerate(model.goals)],
+        missions=[place(50 + number) for number, _ in enumerate(model.missions)],
+        visits=visits,
+        preferences=[place(60 + number) for number, _ in enumerate(model.preferences)],
+    )
+    if deployment is Deployment.LAYER:
+        return layer_goal_findings(model, places, deployment)
+    aims = ExecutableSystem(model, deployment).obligations.aims
+    return goal_findings(aims, places, strategy_result(model))
+
+
+def line(found: Diagnostic) -> int:
+    assert found.location is not None
+    return found.location.line
+
+
+def test_a_visit_that_cannot_be_made_is_found_where_it_stands() -> None:
+    model = with_conditions(
+        STUCK, ("Base.kitchen", "Base.dock", "Base.office"), missions=lambda found: (Mission("m", tuple(found)),)
+    )
+    (found,) = findings(model)
+    assert (found.code, line(found)) == ("unreachable-goal", 101)
+    assert found.message.startswith(
+        "these visits together cannot be reached again and again, whatever the surroundings"
+    )
+    assert [(item.message, item.location.line) for item in found.related] == [("this visit belongs to them", 100)]
+    (found,) = findings(
+        with_conditions(STUCK, ("Base.dock and Base.office",), missions=lambda found: (Mission("m", tuple(found)),))
+    )
+    assert (line(found), found.message.split(",")[0]) == (100, "this visit cannot be reached again and again")
+    (found,) = findings(
+        with_conditions(
+            STUCK,
+            ("Base.kitchen", "Base.office", "Caller.waiting", "Operator.working"),
+            missions=lambda found: (Mission("m", tuple(found[:2]), None, (Detour(found[2], (found[3],)),)),),
+        )
+    )
+    assert found.message == "the surroundings can keep this visit from coming true, for ever"
+    assert line(found) == 102
+
+
+def test_in_a_layer_missions_have_no_effect() -> None:
+    model = robot("kitchen", "office", prefer=("charge", "to_office"))
+    (found,) = findings(model, Deployment.LAYER)
+    assert (found.code, line(found)) == ("goals-in-layer", 50)
+    assert found.message.startswith("missions have no effect in a supervision layer")
+    assert [(item.message, item.location.line) for item in found.related] == [("this preference neither", 60)]
+    assert findings(msgspec.structs.replace(model, missions=()), Deployment.LAYER) == ()

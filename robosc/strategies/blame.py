@@ -25,8 +25,11 @@ from robosc.synthesis.workspace import workspace
 EFFORT = 30
 """Steps that the search may take, as a multiple of those that the counter-strategy has taken."""
 
-LEAST_EFFORT = 20_000
+LEAST_EFFORT = 50_000
 """Least limit of these steps."""
+
+MAXIMUM_CANDIDATES = 10
+"""Assumptions that are tried together, the likeliest first: each doubles the memory of the game."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -221,7 +224,7 @@ class _Trials:
         weakest = [_answer(component, state, targets) for component, state, targets in states]
         exact = [_answer(component, state, [one]) for component, state, targets in states for one in targets]
         for candidates in (weakest, exact) if exact != weakest else (weakest,):
-            found = self._helpful_of(candidates) if candidates else ()
+            found = self._helpful_of(candidates[:MAXIMUM_CANDIDATES]) if candidates else ()
             if found:
                 return found
         return ()

@@ -108,6 +108,13 @@ def test_assumptions_come_true_in_turn_with_data_that_brings_them_about() -> Non
     )
 
 
+def test_assumptions_come_true_also_if_something_is_requested_at_each_turn() -> None:
+    run = run_of(MODEL)
+    for _ in range(12):
+        run.step("ring.request")
+    assert sum(run.came_true) >= 12 and min(run.came_true) >= 4
+
+
 def test_random_robots_are_denied_a_goal(record_property: Callable[[str, object], None]) -> None:
     met: Counter[str] = Counter()
     for seed in range(150):

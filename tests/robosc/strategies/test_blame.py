@@ -10,7 +10,7 @@ import pytest
 from robosc.automata import ExecutableSystem
 from robosc.certification import SynthesisOutcome, SynthesisProblem, make_supervisor, prepare
 from robosc.conditions.goals import assumption_text
-from robosc.errors import Diagnostic, SynthesisCancelled
+from robosc.errors import Diagnostic, Severity, SynthesisCancelled
 from robosc.model.structure import Deployment, Model
 from robosc.strategies import GoalBlame, StrategyResult, blame_goals, synthesize_strategy
 from robosc.strategies.blame import EFFORT, LEAST_EFFORT, without_needless
@@ -233,6 +233,43 @@ def test_a_state_that_is_reached_once_only_is_shown_as_the_nearest() -> None:
     assert made.goals.nearest.is_reached
     assert made.goals.nearest.events == ("open.request", "opened.response", "enter.request")
     assert str(made.goals.nearest).endswith("but not again and again together with the others")
+
+
+def test_more_assumptions_than_are_tried_together_are_not_suggested(monkeypatch: pytest.MonkeyPatch) -> None:
+    goals = "goal always eventually Base.inside goal always eventually Base.outside and Door.shut"
+    assert len(blame_of(goals).helpful) == 2
+    # What is left helps some goals at least.
+    monkeypatch.setattr("robosc.strategies.blame.MAXIMUM_CANDIDATES", 1)
+    assert len(blame_of(goals).helpful) == 1
+    monkeypatch.setattr("robosc.strategies.blame.MAXIMUM_CANDIDATES", 0)
+    assert blame_of(goals).helpful == ()
+    assert finding_of(goals).fix.startswith("Assume what the surroundings do once the robot has done its part")
+
+
+ASKING = """robot R {
+    interface some_type use SomeType from some_package
+    component Asker {
+        service ask with request: none, response: none links some_type
+        behaviour {
+            initial marked state idle { on response from ask goto answered }
+            marked state answered { on response from ask goto idle }
+        }
+    }
+    goal always eventually Asker.answered
+    goal always eventually Asker.idle
+}"""
+
+
+def test_an_assumption_that_the_robot_can_break_is_not_suggested() -> None:
+    made = make_supervisor(bundle_of(ASKING))
+    # It could be idle for ever by never asking.
+    assert made.goals is not None and made.goals.helpful == ()
+    assume = "assume Asker.idle leads to Asker.answered assume Asker.answered leads to Asker.idle }"
+    broken = make_supervisor(bundle_of(f"{ASKING.rstrip('}')}{assume}"))
+    assert [item.code for item in broken.diagnostics if item.severity is Severity.ERROR] == [
+        "preventable-assumption",
+        "preventable-assumption",
+    ]
 
 
 def test_a_search_that_is_given_up_says_so() -> None:

@@ -3,8 +3,8 @@
 Usage: run.py [NAME...]                       (all of them without an argument)
        run.py cif DIR [--against FILE]    (a folder of CIF models: see cif.py)
 
-Names: cold-start, conditions, editor, execution, gr1, language, synthesis; of the service: service-load, isolation,
-task-cpu; of the bridge: decoders, drive-bases, live-view, live-view-pixels, loop-period, maze, reaction,
+Names: cold-start, conditions, editor, execution, gr1, language, strategies, synthesis; of the service: service-load,
+isolation, task-cpu; of the bridge: decoders, drive-bases, live-view, live-view-pixels, loop-period, maze, reaction,
 endurance, shipped, twin.
 """
 
@@ -33,6 +33,7 @@ import editor
 import execution
 import gr1
 import language
+import strategies
 import synthesis
 from service import isolation, load, task_cpu
 
@@ -54,6 +55,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "reaction": reaction.table,
     "service-load": load.table,
     "shipped": shipped.table,
+    "strategies": strategies.table,
     "synthesis": synthesis.table,
     "task-cpu": task_cpu.table,
     "twin": twin.table,

@@ -3,9 +3,9 @@
 Usage: run.py [NAME...]                       (all of them without an argument)
        run.py cif DIR [--against FILE]    (a folder of CIF models: see cif.py)
 
-Names: cold-start, conditions, editor, execution, goals, gr1, language, synthesis; of the service: service-load,
-call-cpu, isolation, task-cpu; of the bridge: decoders, drive-bases, live-view, live-view-pixels, loop-period, maze,
-reaction, endurance, shipped, twin.
+Names: cold-start, conditions, editor, execution, goals, gr1, language, strategies, synthesis; of the service:
+service-load, call-cpu, isolation, task-cpu; of the bridge: decoders, drive-bases, live-view, live-view-pixels,
+loop-period, maze, reaction, endurance, shipped, twin.
 """
 
 import sys
@@ -34,6 +34,7 @@ import execution
 import goals
 import gr1
 import language
+import strategies
 import synthesis
 from service import call_cpu, isolation, load, task_cpu
 
@@ -57,6 +58,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "reaction": reaction.table,
     "service-load": load.table,
     "shipped": shipped.table,
+    "strategies": strategies.table,
     "synthesis": synthesis.table,
     "task-cpu": task_cpu.table,
     "twin": twin.table,

@@ -7,6 +7,7 @@ import msgspec
 import pytest
 
 import robosc
+from robosc.automata import ExecutableSystem
 from robosc.cli.simulate import mission_json
 from robosc.cli.simulation_steps import state_lines, step_lines
 from robosc.conditions.summary import strategy_lines, summary_json

@@ -19,8 +19,8 @@ from service.echo import LAYERS, echo_server
 from service.load import Server, answer_sizes, as_echo, call_kinds, processor_s, run_load
 from support.service import server_process
 
-CALLS = 500
-TURNS = 12
+CALLS = 300
+TURNS = 24
 CLIENTS = 8
 WARM_UP = 200
 

@@ -84,6 +84,8 @@ class ControllerArena:
         self._observed = {
             encoding.subjects[Subject(MEMORY, place.name)].names[0]: encoder.holds(place.update) for place in places
         }
+        # Variables of the memory after it was observed.
+        self._observing = {place: encoding.choice(2).names[0] for place in self._observed}
         self._arrived: tuple[Any, Any] | None = None
         reachable = self._reachable()
         self._silent = tuple(self._silent_steps(executable, cancels, encoder, reachable))
@@ -222,6 +224,45 @@ class ControllerArena:
                 inside = after | (inside if part.may_be_left_out else inside & ~part.steps.sources)
             found = found | (self.positions & inside)
         return found
+
+    def met(self) -> Any:
+        """Return the positions that moves of both sides can lead to, each with the memory that it can have there."""
+        found = self._arrived_at(self.start)
+        fresh = found
+        while fresh != self._manager.false:
+            self._monitor.check_stop()
+            following = self._manager.false
+            for event in self.requests:
+                following = following | self._steps[event].image(fresh & self._enabled(event))
+            for case in self._cases:
+                inside = fresh
+                for part in case:
+                    stays = inside if part.may_be_left_out else inside & ~part.steps.sources
+                    inside = stays | part.steps.image(inside)
+                following = following | inside
+            fresh = self._arrived_at(following) & ~found
+            found = found | fresh
+        return found
+
+    def _arrived_at(self, states: Any) -> Any:
+        """Return the stable states in which silent steps from states end, with the memory as it is observed there."""
+        found, left = states & self.positions, states & ~self.positions
+        seen = left
+        while left != self._manager.false:
+            self._monitor.check_stop()
+            after = self._manager.false
+            for first, steps in self._silent:
+                after = after | steps.image(left & first)
+            found = found | (after & self.positions)
+            left = after & ~self.positions & ~seen
+            seen = seen | left
+        if not self._observed:
+            return found
+        for place, update in self._observed.items():
+            now = self._manager.var(self._observing[place])
+            found = found & ((now & update) | (~now & ~update))
+        found = self._manager.exist(self._observed, found)
+        return self._manager.let({now: self._manager.var(place) for place, now in self._observing.items()}, found)
 
     def can_begin(self, predicate: Any) -> bool:
         """Return True if the first position of the executor is in a predicate, wherever the system begins."""

@@ -37,6 +37,9 @@ def compare(seed: int, engine: str, met: Counter[str]) -> None:
             state = place.encoding.state(values_of(position, model, owed))
             assert state & ~synthesis.arena.positions == false, seed
             assert (state & winning != false) == (position in won), seed
+        if game.first != LOST:
+            reached = (place.encoding.state(values_of(position, model, owed)) for position in game.choices)
+            assert synthesis.arena.met() == place.encoding.any_of(reached), seed
         every = range(len(model.assumptions))
         result = synthesis.result(allowed=every)
         strategy = result.strategy

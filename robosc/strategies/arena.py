@@ -1,21 +1,24 @@
 """The game of a controller against its surroundings, on decision diagrams.
 
 A position is a stable state of the controlled system, with the memory as it was observed there. The surroundings move
-by batches (semantics 3.1): any of a batch's events may happen, in source order, with any data, and no silent step in
-between. After a batch and after each request silent steps run to their end in the executor's order: own cancels,
+by batches (semantics 3.1): events of one message, in source order, with any data that it can hold, and no silent step
+in between. After a batch and after each request silent steps run to their end in the executor's order: own cancels,
 resets, taus (semantics 3.3). At its turn the controller issues one enabled request, or none.
 
-What the events of one batch carry is taken to be independent here, so the surroundings can do no less than they really
-can.
+The events of one batch carry what one message can hold (`robosc.controller_properties.messages`). Where that would make
+too many cases, their data is taken to be independent, so the surroundings can do no less than they really can.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from typing import Any
 
 from robosc.automata import ExecutableSystem
 from robosc.automata.goal_memory import MEMORY, Cancel, Obligations
 from robosc.automata.state import Subject
+from robosc.controller_properties.messages import PossibleData, choices_together
 from robosc.expressions import Expression
+from robosc.model.structure import EventKind
 from robosc.supervisor import AddedCondition
 from robosc.synthesis.diagrams import predicate_of
 from robosc.synthesis.encoding import Encoding
@@ -23,6 +26,22 @@ from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import FixedPoint, Problem, safe_states
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.transitions import Steps, transition_of
+
+MAXIMUM_CASES = 256
+"""Cases of a message's data beyond which the data of its events counts as independent."""
+
+
+@dataclass(frozen=True, slots=True)
+class _Part:
+    """An event of a batch, as one message can bring it about.
+
+    Attributes:
+        steps: The event with the data that it can carry.
+        may_be_left_out: True if it may as well not happen.
+    """
+
+    steps: Steps
+    may_be_left_out: bool
 
 
 class ControllerArena:
@@ -65,6 +84,8 @@ class ControllerArena:
             encoding.subjects[Subject(MEMORY, place.name)].names[0]: encoder.holds(place.update)
             for place in owed.places
         }
+        # Variables of the memory after it was observed.
+        self._observing = {place: encoding.choice(2).names[0] for place in self._observed}
         self._arrived: tuple[Any, Any] | None = None
         reachable = self._reachable()
         self._silent = tuple(self._silent_steps(executable, owed.cancels, encoder, reachable))
@@ -75,12 +96,50 @@ class ControllerArena:
         for place in owed.places:
             before, after = encoder.holds(place.read), encoder.holds(place.update)
             self.observed = self.observed & ((before & after) | (~before & ~after))
-        self._batches = tuple(
-            tuple(self._steps[event] for event in batch if self._steps[event].plant & reachable != self._manager.false)
+        self._cases = tuple(
+            tuple(part for part in case if part.steps.plant & reachable != self._manager.false)
             for batch in executable.batches
+            for case in self._cases_of(executable, batch)
         )
+        """Moves of the surroundings: for each, the events of one message, with data that it can hold."""
         self.requests = tuple(event for event in executable.requests if event in self._steps)
         """Events of requests, in source order."""
+
+    def _cases_of(self, executable: ExecutableSystem, batch: tuple[str, ...]) -> list[tuple[_Part, ...]]:
+        """Return the cases of a batch, without those that others contain."""
+        messages = {item.event(EventKind.RESPONSE): item for item in executable.model.communications}
+        choices = None
+        if len(batch) > 1:
+            choices = choices_together(executable.model, self._encoding.system, [messages[event] for event in batch])
+        if choices is None or len(choices) > MAXIMUM_CASES:
+            return [tuple(_Part(self._steps[event], may_be_left_out=True) for event in batch)]
+        # Under the setting `on_unknown: keep` an event does not happen whose enum is unknown.
+        return [
+            tuple(
+                _Part(self._carrying(event, [item for item in options if not (keeps and item.is_unknown)]), left_out)
+                for event, options in zip(batch, choice, strict=True)
+                for left_out in [keeps and any(item.may_be_left_out for item in options)]
+            )
+            for choice in choices
+            for keeps in (False, True)
+            if not keeps or any(item.may_be_left_out for options in choice for item in options)
+        ]
+
+    def _carrying(self, event: str, options: Sequence[PossibleData]) -> Steps:
+        """The steps of an event with some data."""
+        inputs = self._encoding.inputs_of(event)
+        data = self._manager.false
+        for option in options:
+            found = self._manager.true
+            for path, value in option.data:
+                bits = inputs[path]
+                if bits.known is not None:
+                    known = self._manager.var(bits.known)
+                    found = found & (~known if value is None else known)
+                if value is not None:
+                    found = found & self._encoding.equals(bits, value)
+            data = data | found
+        return self._steps[event].carrying(data)
 
     def _reachable(self) -> Any:
         """Return the states that the controlled system can reach, with any memory."""
@@ -136,11 +195,13 @@ class ControllerArena:
         """Return the positions from which every batch leads into a predicate."""
         arriving = self.arriving(predicate)
         found = self.positions
-        for batch in self._batches:
+        for case in self._cases:
             inside = arriving
-            for steps in reversed(batch):
+            for part in reversed(case):
                 self._monitor.check_stop()
-                inside = inside & steps.only(inside)
+                after = part.steps.only(inside)
+                # An event that cannot happen here changes nothing.
+                inside = after & (inside if part.may_be_left_out else part.steps.sources | inside)
             found = found & inside
         return found
 
@@ -163,11 +224,12 @@ class ControllerArena:
         """Return the positions from which a move of either side can lead into a predicate."""
         arriving = self.arriving(predicate)
         found = self.turn(predicate)
-        for batch in self._batches:
+        for case in self._cases:
             inside = arriving
-            for steps in reversed(batch):
+            for part in reversed(case):
                 self._monitor.check_stop()
-                inside = inside | steps.some(inside)
+                after = part.steps.some(inside)
+                inside = after | (inside if part.may_be_left_out else inside & ~part.steps.sources)
             found = found | (self.positions & inside)
         return found
 
@@ -184,6 +246,45 @@ class ControllerArena:
             self._monitor.check_stop()
             found = found | (steps.plant & steps.some(predicate))
         return found
+
+    def met(self) -> Any:
+        """Return the positions that moves of both sides can lead to, each with the memory that it can have there."""
+        found = self._arrived_at(self.start)
+        fresh = found
+        while fresh != self._manager.false:
+            self._monitor.check_stop()
+            following = self._manager.false
+            for event in self.requests:
+                following = following | self._steps[event].image(fresh & self._enabled(event))
+            for case in self._cases:
+                inside = fresh
+                for part in case:
+                    stays = inside if part.may_be_left_out else inside & ~part.steps.sources
+                    inside = stays | part.steps.image(inside)
+                following = following | inside
+            fresh = self._arrived_at(following) & ~found
+            found = found | fresh
+        return found
+
+    def _arrived_at(self, states: Any) -> Any:
+        """Return the stable states in which silent steps from states end, with the memory as it is observed there."""
+        found, left = states & self.positions, states & ~self.positions
+        seen = left
+        while left != self._manager.false:
+            self._monitor.check_stop()
+            after = self._manager.false
+            for first, steps in self._silent:
+                after = after | steps.image(left & first)
+            found = found | (after & self.positions)
+            left = after & ~self.positions & ~seen
+            seen = seen | left
+        if not self._observed:
+            return found
+        for place, update in self._observed.items():
+            now = self._manager.var(self._observing[place])
+            found = found & ((now & update) | (~now & ~update))
+        found = self._manager.exist(self._observed, found)
+        return self._manager.let({now: self._manager.var(place) for place, now in self._observing.items()}, found)
 
     def can_begin(self, predicate: Any) -> bool:
         """Return True if the first position of the executor is in a predicate, wherever the system begins."""

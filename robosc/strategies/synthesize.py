@@ -292,9 +292,10 @@ class StrategySynthesis:
 
     def _strategy(self, solution: Solution) -> Strategy:
         simplifier = Simplifier(self._encoding, self._seconds)
-        return Strategy(tuple(self._mode(solution, number, simplifier) for number in range(len(self.goals))))
+        met = self.arena.met()
+        return Strategy(tuple(self._mode(solution, number, simplifier, met) for number in range(len(self.goals))))
 
-    def _mode(self, solution: Solution, number: int, simplifier: Simplifier) -> tuple[Choice, ...]:
+    def _mode(self, solution: Solution, number: int, simplifier: Simplifier, met: Any) -> tuple[Choice, ...]:
         """Return the requests that approach a goal, in order, each with the condition for choosing it."""
         chosen: dict[str, Any] = {}
         decided = self.goals[number]
@@ -305,7 +306,7 @@ class StrategySynthesis:
                 if found != self._manager.false:
                     chosen[event] = chosen.get(event, self._manager.false) | found
                     decided = decided | found
-        care = solution.winning & self.arena.observed & ~self.goals[number]
+        care = solution.winning & met & ~self.goals[number]
         choices: list[Choice] = []
         for event in self._requests:
             if event in chosen and chosen[event] & care != self._manager.false:

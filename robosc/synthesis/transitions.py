@@ -298,6 +298,15 @@ class Steps:
         other.names = self.names | (frozenset(self._state_names) & read)
         return other
 
+    def carrying(self, data: Any) -> Self:
+        """The same event with some of its data alone, a predicate over received data; `plant` stays that of all."""
+        other = copy(self)
+        # It is made on first use.
+        other.__dict__.pop("_relation", None)
+        other._in_range = self._in_range & data
+        other.sources = self._without_hidden(other._in_range)
+        return other
+
     def moving(self) -> Any:
         """Return the states in which the event can lead to another state than the one it happens in."""
         manager = self._manager

@@ -151,8 +151,6 @@ class Game:
 def game_of(executable: ExecutableSystem, added: Iterable[AddedCondition], limit: int) -> Game | None:
     """Return the game of a controller, or None if it has more positions than a limit."""
     controller = Controller(executable, added)
-    # The strategy does not know which data the events of one message carry together.
-    controller._choices.clear()
     places = {subject: place for place, subject in enumerate(subjects(controller.system))}
 
     def test(condition: Expression) -> Callable[[Any], bool]:

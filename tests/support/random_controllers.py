@@ -52,7 +52,7 @@ from support.failing import made, model_files
 
 NONE, BOOLEAN, SAMPLE = NoneType(), BooleanType(), ObjectType("Sample")
 
-_OBJECT = ObjectDefinition("Sample", (Property("n", IntegerType()), Property("m", IntegerType())))
+OBJECT = ObjectDefinition("Sample", (Property("n", IntegerType()), Property("m", IntegerType())))
 
 
 def _enum(name: str, part: str) -> EnumDefinition:
@@ -142,7 +142,7 @@ def _model(dice: Random, is_plain: bool) -> Model:
         components=tuple(_component(dice, part) for part in parts),
         communications=tuple(communications),
         enums=ENUMS,
-        objects=(_OBJECT,),
+        objects=(OBJECT,),
         requirements=tuple(requirements),
         provides=(),
         invariants=(),

@@ -8,13 +8,25 @@ from random import Random
 
 import msgspec
 
-from robosc.expressions import BooleanType, Expression, NoneType, Received, StateTest, Unary, VariableRead
+from robosc.expressions import (
+    Binary,
+    BooleanType,
+    EnumType,
+    EnumValue,
+    Expression,
+    NoneType,
+    Received,
+    StateTest,
+    Unary,
+    VariableRead,
+)
 from robosc.model.structure import (
     Assumption,
     Behaviour,
     Communication,
     CommunicationKind,
     Component,
+    EnumDefinition,
     Goal,
     GoalForm,
     Interface,
@@ -26,6 +38,7 @@ from robosc.model.structure import (
     Update,
     Variable,
 )
+from support.random_controllers import OBJECT, ONE_FIELD, TYPES
 
 NONE = NoneType()
 
@@ -42,6 +55,7 @@ class _Robot:
         self.communications: list[Communication] = []
         self.machines: list[str] = []
         self.owed: list[Assumption] = []
+        self.enums: tuple[EnumDefinition, ...] = ()
 
     def communication(self, name: str, owner: str, kind: CommunicationKind) -> Communication:
         """A communication of a component, which is added."""
@@ -120,6 +134,19 @@ class _Robot:
         variables = (Variable("is_clear", BooleanType(), self.dice.random() < 0.5, True),)
         self.components.append(Component(name, Behaviour(variables, (State("on", True, True),), (update,))))
 
+    def gauges(self) -> None:
+        """Add two components that read the same field of one message."""
+        self.enums = self.dice.choice(ONE_FIELD)
+        for letter, type_, definition in zip("ab", TYPES, self.enums, strict=True):
+            name = f"Gauge_{letter}"
+            made = self.communication(f"level_{letter}", name, _KIND.OUTGOING_MESSAGE)
+            self.communications[-1] = msgspec.structs.replace(
+                made, identifier="/level", response=type_, interface=Interface("Sample", "errand_msgs")
+            )
+            update = Transition(None, f"level_{letter}.response", None, (Update("level", Received()),), None)
+            variables = (Variable("level", type_, definition.default, True),)
+            self.components.append(Component(name, Behaviour(variables, (State("on", True, True),), (update,))))
+
     def condition(self) -> Expression:
         """A condition over one of the components that there are so far."""
         if not self.components:
@@ -127,8 +154,10 @@ class _Robot:
         component = self.dice.choice(self.components)
         assert component.behaviour is not None
         found: Expression = StateTest(component.name, self.dice.choice(component.behaviour.states).name)
-        if component.behaviour.variables:
-            found = VariableRead(component.name, component.behaviour.variables[0].name)
+        for variable in component.behaviour.variables:
+            found = VariableRead(component.name, variable.name)
+            if isinstance(variable.type, EnumType):
+                found = Binary("=", found, EnumValue(variable.type.name, self.dice.choice(variable.type.values)))
         return Unary("not", found) if self.dice.random() < 0.3 else found
 
     def goal(self) -> Goal:
@@ -157,6 +186,8 @@ def random_errands(seed: int) -> Model:
         robot.caller(number)
     if dice.random() < 0.3:
         robot.sensor()
+    if dice.random() < 0.3:
+        robot.gauges()
     events = [item.name for item in robot.communications if item.kind is not _KIND.OUTGOING_MESSAGE]
     requirements = tuple(
         Requirement((dice.choice(events),), dice.choice(list(RequirementForm)), robot.condition())
@@ -166,8 +197,8 @@ def random_errands(seed: int) -> Model:
         name="Errands",
         components=tuple(robot.components),
         communications=tuple(robot.communications),
-        enums=(),
-        objects=(),
+        enums=robot.enums,
+        objects=(OBJECT,) if robot.enums else (),
         requirements=requirements,
         provides=(),
         invariants=(),

@@ -130,12 +130,12 @@ def test_goals_and_what_is_chosen_for_them_are_told(tmp_path: Path) -> None:
         str(made.goals)
         == """\
 once Base.inside:
-  call.request where Lift.away and assumption 1 is not owed
+  call.request where Lift.away
   enter.request where Lift.here
   nothing otherwise"""
     )
     assert (repr(made.goals), repr(goal)) == ("<1 goal>", "<once Base.inside: requests call.request, enter.request>")
-    assert repr(goal.choices[0]) == "<call.request where Lift.away and assumption 1 is not owed>"
+    assert repr(goal.choices[0]) == "<call.request where Lift.away>"
     assert "enter.request" in made.goals._repr_html_() and made.goals._repr_html_() in made._repr_html_()
     assert re.search(r">goals</td><td[^>]*>passed<", made._repr_html_())
     assert "for goal 1, once Base.inside" in str(made)

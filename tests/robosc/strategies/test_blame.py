@@ -238,7 +238,7 @@ def test_a_state_that_is_reached_once_only_is_shown_as_the_nearest() -> None:
 def test_more_assumptions_than_are_tried_together_are_not_suggested(monkeypatch: pytest.MonkeyPatch) -> None:
     goals = "goal always eventually Base.inside goal always eventually Base.outside and Door.shut"
     assert len(blame_of(goals).helpful) == 2
-    # What is left helps some goals at least.
+    # The assumptions that are left help some goals at least.
     monkeypatch.setattr("robosc.strategies.blame.MAXIMUM_CANDIDATES", 1)
     assert len(blame_of(goals).helpful) == 1
     monkeypatch.setattr("robosc.strategies.blame.MAXIMUM_CANDIDATES", 0)

@@ -1,0 +1,56 @@
+"""Messages that several components read: what they carry together, a strategy counts on."""
+
+import pytest
+
+from robosc.certification import make_supervisor
+from robosc.strategies import arena
+from support.models import bundle_of
+
+PATROL = """robot Patrol {
+    interface battery use BatteryState from sensor_msgs
+    datatype object Charge { percentage: double }
+    datatype enum Level from Charge to { value.percentage < 0.2 -> low default -> good }
+    datatype enum Reserve from Charge to { value.percentage < 0.3 -> small default -> large }
+    component Battery {
+        outgoing message level with identifier: "/battery", type: Level links battery
+        behaviour {
+            variable level: Level = good
+            on response from level do level := value
+            initial marked state ready { }
+        }
+    }
+    component Planner {
+        outgoing message reserve with identifier: "/battery", type: Reserve links battery
+        behaviour {
+            variable reserve: Reserve = large
+            on response from reserve do reserve := value
+            initial marked state ready { }
+        }
+    }
+    component Base {
+        incoming message dock with identifier: "/dock", type: none
+        incoming message leave with identifier: "/leave", type: none
+        behaviour {
+            initial marked state away { on request to dock goto docked }
+            marked state docked { on request to leave goto away }
+        }
+    }
+    // No dock is taken from others without need.
+    requirement dock needs Planner.reserve = small
+    goal Battery.level = low leads to Base.docked or Battery.level = good
+    goal always eventually Base.away or Battery.level = low
+}"""
+
+
+def codes() -> list[str]:
+    made = make_supervisor(bundle_of(PATROL))
+    return [item.code for item in made.diagnostics if item.code == "unreachable-goal"]
+
+
+def test_a_low_battery_is_one_with_a_small_reserve() -> None:
+    assert codes() == []
+
+
+def test_too_many_cases_count_as_independent(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(arena, "MAXIMUM_CASES", 1)
+    assert codes() == ["unreachable-goal"]

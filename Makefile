@@ -46,6 +46,7 @@ docs: $(CHECKERS)/.ready ## build the site of the documentation, out/site; every
 
 pictures: $(READY) ## make the pictures of the README and of docs/ anew; needs Chromium
 	$(BIN)/python deploy/draw_scan_to_wheel.py
+	PYTHONPATH=tests:examples/robosc_examples $(BIN)/python deploy/draw_courier.py
 	PYTHONPATH=tests $(BIN)/python deploy/make_pictures.py
 
 images: $(WHEELS)/.ready ## fetch what the images are made of, and build them without an engine, for their tests

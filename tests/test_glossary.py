@@ -15,7 +15,7 @@ GLOSSARY = (DOCS / "glossary.md").read_text(encoding="utf-8")
 PAGES = (
     *("tutorial", "concepts", "comparison", "language", "layer", "commands", "explaining", "verification"),
     *("on-your-robot", "troubleshooting", "generating", "c99", "cpp", "ros1", "python", "certificates", "event-logs"),
-    *("python-api", "experiments", "strategies"),
+    *("python-api", "experiments", "strategies", "courier"),
 )
 
 

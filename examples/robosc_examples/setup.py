@@ -11,6 +11,7 @@ NODES = (
     "calibrator",
     "careless_line_follower",
     "drive_to_pose",
+    "household",
     "line_detector",
     "person_detector",
     "pusher",

@@ -226,7 +226,14 @@ def make_supervisor(
             return SynthesisOutcome(
                 OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, reason, goals=goals
             )
-        check = check_strategy(problem.system, result.added, strategy, semantics=semantics, should_stop=should_stop)
+        check = check_strategy(
+            problem.system,
+            result.added,
+            strategy,
+            limit=Limits.of(verify_limit).positions,
+            semantics=semantics,
+            should_stop=should_stop,
+        )
         if check.missed is not None:
             raise InternalError(f"the strategy misses a goal after {', '.join(check.missed.trace)}")
         outcome: CheckResult = "passed" if check.result == "passed" else "not checked"

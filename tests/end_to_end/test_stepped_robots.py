@@ -3,6 +3,7 @@
 Each does what it is for, for a while; then its log is checked against its supervisor, and its motion against the scene.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -95,6 +96,13 @@ def navigate(twin: SteppedTwin) -> Judge:
     return lambda motion: ("touched something",) if motion.samples[-1].collisions else ()
 
 
+def make_a_round(twin: SteppedTwin) -> Judge:
+    """Make a round: the courier comes to each room, through the door of one of them."""
+    for x_m, y_m in ((1.5, 2.0), (3.5, 0.0), (1.5, -2.0)):
+        twin.until(lambda: math.dist(twin.place, (x_m, y_m)) < 0.2, f"the room at {x_m}, {y_m}", 150.0)  # noqa: B023
+    return lambda motion: ("touched something",) if motion.samples[-1].collisions else ()
+
+
 @dataclass(frozen=True)
 class Play:
     """Activity of a robot.
@@ -118,6 +126,7 @@ PLAYS = {
         lambda: load_scene("line-oval"), follow_the_line_without_care, Deployment.LAYER
     ),
     "person_follower/person_follower": Play(lambda: hall(1.9), follow_the_person),
+    "courier/courier": Play(lambda: load_scene("rooms"), make_a_round),
     "navigation/navigation": Play(lambda: hall(1.0), navigate),
 }
 NOT_CARRIED = {"object_finder/object_finder", "ball_pusher/ball_pusher"}

@@ -15,6 +15,7 @@ from typing import Any, Self
 
 from robosc.event_logs import check_log, read_log
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.interpreter.missions import MissionPlace
 from robosc.execution.runtime.clock import ManualClock
 from robosc.execution.runtime.event_log import open_event_log
 from robosc.execution.runtime.executor import Executor
@@ -23,6 +24,7 @@ from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import Deployment
 from robosc_bridge.skills.line import LineDetector
 from robosc_bridge.skills.settings import LineSettings
+from robosc_examples.house import TOLD, House
 from robosc_examples.motion import Turn, clamped, steered, turning_speed, wrapped
 from robosc_examples.persons import Scan, find_person
 from robosc_simulated import (
@@ -64,12 +66,14 @@ class SteppedTwin:
         deployment: Deployment of its supervisor.
         seed: Seed of what the scene leaves to chance.
         profile: Distance of wheels and sensors from ideal.
+        house: Door, tray and battery around it; None: the usual ones.
 
     Attributes:
         world: World that it is in.
         executor: Executor or layer that decides.
         held_back: Number of velocities of the existing controller that were not let through.
         called: Services that were called.
+        house: Door, tray and battery around the courier; nobody tells them anything where there is no courier.
     """
 
     def __init__(
@@ -80,7 +84,9 @@ class SteppedTwin:
         deployment: Deployment = Deployment.CONTROLLER,
         seed: int = 0,
         profile: Profile = IDEAL,
+        house: House | None = None,
     ) -> None:
+        self.house = house or House()
         self.held_back = 0
         self.called: list[str] = []
         self.supervisor = example_supervisor(model, deployment)
@@ -98,7 +104,7 @@ class SteppedTwin:
         motion = self._stack.enter_context((folder / "motion.jsonl").open("w", encoding="ascii"))
         recorder = MotionRecorder(self.world, motion)
         self._stack.callback(recorder.close)
-        system = InterpretedSystem(self.supervisor)
+        self._system = system = InterpretedSystem(self.supervisor)
         self._identifiers = {info.name: info.identifier for info in system.description.communications}
         self._heard = set(self._identifiers.values())
         settings = Settings(period_s=PERIOD_S)
@@ -134,9 +140,24 @@ class SteppedTwin:
         """Position of its middle, in metres."""
         return self.world.pose[:2]
 
-    def receive(self, identifier: str) -> None:
-        """A message without data comes, such as that of a button."""
-        self.executor.receive(identifier, None)
+    def receive(self, identifier: str, data: object = None) -> None:
+        """A message comes, without data such as that of a button."""
+        self.executor.receive(identifier, data)
+
+    @property
+    def now_s(self) -> float:
+        """Time of the world, in seconds."""
+        return self._time.world_s()
+
+    @property
+    def missions(self) -> tuple[MissionPlace, ...]:
+        """Places of the missions since the last decision."""
+        return self._system.missions()
+
+    @property
+    def state(self) -> dict[str, dict[str, Any]]:
+        """Locations and variables of the components, by their names."""
+        return self._system.state()
 
     def until(self, condition: Callable[[], bool], what: str, limit_s: float = 60.0) -> None:
         """Let time pass until something holds.
@@ -190,6 +211,8 @@ class SteppedTwin:
             self._scan()
         if self._steps % round(PERIOD_S / _STEP_S) == 0:
             self._look()
+            self._keep_house()
+            self._measure()
             self._go_to_goal()
             self.executor.tick()
             assert not self.executor.is_faulty, self.executor.reasons
@@ -217,6 +240,25 @@ class SteppedTwin:
             self.executor.receive("/line/lost", None)
         else:
             self.executor.receive("/line/correction", seen.correction_rad_s)
+
+    def _keep_house(self) -> None:
+        if "/door/opened" not in self._heard:
+            return
+        for identifier in self.house.advance(self._time.world_s(), *self.place):
+            self.executor.receive(identifier, None)
+        if self.house.is_door_open == _is_there(self.world, "door"):
+            self.world.put_obstacle("door", not self.house.is_door_open)
+        self.executor.receive("/battery_state", {"voltage": self.house.battery_v})
+
+    def _measure(self) -> None:
+        """Report the pose, as a robot does that is localised."""
+        if "/odom" not in self._heard:
+            return
+        x_m, y_m, heading_rad = self.world.pose
+        orientation = {"z": math.sin(heading_rad / 2), "w": math.cos(heading_rad / 2)}
+        speed = {"linear": {"x": self.world.speed_m_s}, "angular": {"z": self.world.yaw_rate_rad_s}}
+        pose = {"position": {"x": x_m, "y": y_m}, "orientation": orientation}
+        self.executor.receive("/odom", {"pose": {"pose": pose}, "twist": {"twist": speed}})
 
     def _rotate(self) -> None:
         if self._turn is None:
@@ -267,6 +309,8 @@ class SteppedTwin:
                 self._turn = Turn(math.radians(message), self.world.pose[2])
             case "/rotate_right":
                 self._turn = Turn(-math.radians(message), self.world.pose[2])
+            case other if other in TOLD:
+                self.house.tell(other)
             case other:
                 raise AssertionError(f"nobody hears {other}")
 
@@ -317,6 +361,10 @@ class _Careless(BothSides):
 
     def blocked(self, identifier: str) -> None:
         self._twin.held_back += 1
+
+
+def _is_there(world: World, name: str) -> bool:
+    return any(obstacle.is_there for obstacle in world.obstacles if obstacle.name == name)
 
 
 _GOAL_Y = ("pose", "pose", "position", "y")

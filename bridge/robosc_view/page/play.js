@@ -131,6 +131,7 @@ export function startPlay(send, token) {
   };
 
   for (const type of ["undo", "redo"]) byId(`play-${type}`).addEventListener("click", () => want({ type }));
+  byId("play-wait").addEventListener("click", () => want({ type: "wait" }));
   const beginning = byId("play-beginning");
   byId("play-restart").addEventListener("click", () =>
     want(beginning.hidden ? { type: "restart" } : { type: "restart", beginning: beginning.selectedIndex }));
@@ -201,6 +202,11 @@ export function startPlay(send, token) {
       narrow();
       beginning.replaceChildren(...play.beginnings.map((label) => make("option", {}, label)));
       show(beginning, play.beginnings.length > 0);
+      // Against the surroundings a person has the part of the controller only.
+      const isOpposed = play.goals.length > 0;
+      for (const id of ["play-wait", "play-opposition"]) show(byId(id), isOpposed);
+      for (const id of ["play-finding", "play-world", "play-world-title"]) show(byId(id), !isOpposed);
+      byId("play-goals").replaceChildren(...play.goals.map((text) => make("li", {}, quoted(text), ": ", make("strong", { class: "play-goal" }))));
       begun = null;
       for (const form of ["log", "test"]) show(byId(`play-${form}`), play.forms.includes(form));
       show(byId("play-link"), play.link !== null);
@@ -222,6 +228,13 @@ export function startPlay(send, token) {
         const button = byId(`play-${type}`);
         button.disabled = run[type] === "";
         mark(button, "title", run[type]);
+      }
+      if (run.opposition) {
+        const { goals, denied, assumptions } = run.opposition;
+        const kept = assumptions.map((times, i) => `assumption ${i + 1} came true ${count(times, "time", "times")}`);
+        const what = denied === null ? "Silent steps do not end." : `The surroundings deny ${denied}, whatever you do.`;
+        say(byId("play-denied"), kept.length > 0 ? `${what} They keep to what is assumed: ${kept.join(", ")}.` : what);
+        byId("play-goals").querySelectorAll(".play-goal").forEach((place, i) => say(place, goals[i] ? "true" : "not yet"));
       }
       say(byId("play-count"), `${count(run.steps, "event", "events")}${run.is_marked ? " · marked" : ""}`);
     },

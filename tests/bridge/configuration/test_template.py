@@ -28,6 +28,7 @@ OPEN = {
     "line_follower_layer": set[str](),
     "maze_solver": set[str](),
     "narrow_maze": set[str](),
+    "courier": {"/door/open", "/door/close", "/door/opened", "/tray/unlock", "/tray/lock", "/tray/closed", "/order"},
     "ball_pusher": {"/ball", "/goal", "/scored", "/kick_off", "/push", "/pushed", "circle"},
     "navigation": {"/calibrate", "/person/distance", "/navigate_to_pose"},
     "object_finder": {"/camera/detection", "/search", "/announce"},

@@ -190,5 +190,5 @@ def test_the_messages_of_a_program_are_no_flood(daemon: FakeDaemon, monkeypatch:
             program.send(give=pb.Message(identifier="/order", data=value_of({"x" * 30_000: 1})))
             assert "a name of more than" in program.receive().refused.why
             made[0].look()
-        assert not made[0].closed
+        assert not made[0].closed.total()
         program.end()

@@ -7,14 +7,21 @@ import pytest
 
 from robosc.model.structure import Deployment
 from robosc_bridge.daemon.programs.items import (
+    Attached,
     CallMade,
     CancelMade,
     FeedbackGiven,
     GoalAccepted,
     GoalEnded,
     GoalMade,
+    MessageReceived,
+    MessageSent,
+    Program,
     Replied,
+    ToProgram,
 )
+from robosc_examples.house import House
+from robosc_examples.house import Settings as HouseSettings
 from robosc_examples.persons import Person
 from robosc_experiments.maze import CHANNELS, MODEL
 from robosc_experiments.serial import Setting, configuration
@@ -40,6 +47,17 @@ channels: {/person: {channel: grpc}, /scan: {channel: scanner}, /button: {channe
 GOALS = """remote: {grpc_address: "127.0.0.1:0"}
 channels: {/calibrate: {channel: grpc}, /person/distance: {channel: grpc}, /navigate_to_pose: {channel: grpc},
   /button: {channel: button, name: button_1}}
+"""
+FACTOR = 4.0
+"""Speed of the world of a courier, whose rounds are long, as a multiple of the bridge's clock."""
+
+HOUSE = """remote: {grpc_address: "127.0.0.1:0"}
+skills: {rotate: {speed_rad_s: 0.6}}
+channels: {/odom: {channel: odometry}, /cmd_vel: {channel: drive}, /battery_state: {channel: battery},
+  /rotate_left: {channel: rotate, direction: left}, /rotate_right: {channel: rotate, direction: right},
+  /rotate_done: {channel: rotated}, /order: {channel: grpc}, /door/open: {channel: grpc}, /door/close: {channel: grpc},
+  /door/opened: {channel: grpc}, /tray/unlock: {channel: grpc}, /tray/lock: {channel: grpc},
+  /tray/closed: {channel: grpc}}
 """
 
 
@@ -184,3 +202,73 @@ def test_a_goal_is_given_up_for_a_person_and_taken_up_again(profile: str, seed: 
         goal = server.await_one(run, GoalMade)
         server.say(GoalEnded(server.program, goal.number, "succeeded", {"error_code": 0}))
         assert run.is_standing
+
+
+class Keeper:
+    """Program that is door, tray and battery of the courier, and the persons who order it.
+
+    Args:
+        run: Scenario that it belongs to.
+        settings: Settings of door, tray and battery.
+    """
+
+    def __init__(self, run: ScenarioRun, settings: HouseSettings) -> None:
+        self.house = House(settings)
+        self.told: list[str] = []
+        self._run = run
+        self._new: list[ToProgram] = []
+        self._program = Program("keeper", self._new.append, frozenset())
+        run.machine.operations.post(Attached(self._program))
+        run.host.thread(self._work, "keeper").start()
+
+    def say(self, identifier: str, data: object = None) -> None:
+        """Send the courier a message."""
+        self._run.machine.operations.post(MessageReceived(self._program, identifier, data))
+
+    def _work(self) -> None:
+        robot = self._run.robot
+        while self._run.thread.is_alive():
+            while self._new:
+                item = self._new.pop(0)
+                if isinstance(item, MessageSent):
+                    self.told.append(item.identifier)
+                    self.house.tell(item.identifier)
+            x_m, y_m, _ = robot.world.pose
+            reported = self.house.advance(robot.world.time.world_s(), x_m, y_m)
+            robot.world.put_obstacle("door", not self.house.is_door_open)
+            assert robot.opencr is not None
+            robot.opencr.set_battery(self.house.battery_v)
+            for identifier in reported:
+                self.say(identifier)
+            self._run.host.sleep(0.05)
+
+
+def test_a_courier_makes_its_rounds_answers_and_charges() -> None:
+    with scenario_run("courier/courier", load_scene("rooms"), HOUSE, profile="typical", seed=1, factor=FACTOR) as run:
+        keeper = Keeper(run, HouseSettings(opens_after_s=10.0, drain_v_s=0.006))
+
+        def is_near(x_m: float, y_m: float) -> bool:
+            return math.dist(run.robot.world.pose[:2], (x_m, y_m)) < 0.25
+
+        run.until(lambda: is_near(1.5, 2.0), "the kitchen", 60.0)
+        keeper.say("/order", "office")
+        run.until(lambda: "/tray/unlock" in keeper.told, "the tray to be unlocked", 300.0)
+        assert is_near(3.5, 0.0)
+        assert run.is_standing
+        run.until(lambda: "/tray/lock" in keeper.told, "the tray to be locked")
+        run.until(lambda: keeper.house.battery_v < 11.4, "a low battery", 300.0)
+        assert "/door/open" in keeper.told
+        run.until(lambda: is_near(0.0, 0.0) and run.is_standing, "the dock", 300.0)
+        run.until(lambda: keeper.house.battery_v > 12.3, "a full battery", 60.0)
+        run.until(lambda: not is_near(0.0, 0.0), "the robot to go on")
+
+
+def test_a_courier_waits_safely_before_a_door_that_never_opens() -> None:
+    with scenario_run("courier/courier", load_scene("rooms"), HOUSE, factor=FACTOR) as run:
+        keeper = Keeper(run, HouseSettings(opens_after_s=math.inf, drain_v_s=0.0))
+        run.until(lambda: "/door/open" in keeper.told, "the door to be told", 300.0)
+        run.live(3.0)
+        run.stand("the robot to wait")
+        place = run.robot.world.pose
+        run.live(20.0)
+        assert run.robot.world.pose == place

@@ -72,7 +72,7 @@ def test_an_empty_file_is_open_space(tmp_path: Path) -> None:
 
 
 def test_the_scenes_of_the_package() -> None:
-    assert scene_names() == ("line-curves", "line-oval", "maze-random", "maze-rooms", "maze-spiral", "room")
+    assert scene_names() == ("line-curves", "line-oval", "maze-random", "maze-rooms", "maze-spiral", "room", "rooms")
     for name in scene_names():
         scene = load_scene(name)
         assert scene.name == name

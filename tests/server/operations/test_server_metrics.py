@@ -10,6 +10,7 @@ import grpc
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
+from robosc_api.connection_watch import CloseReason
 from robosc_api.security import SecurityError
 from robosc_server.jobs import JOB_METHODS, JOB_SERVICE_NAME
 from robosc_server.operations import metrics as metrics_module
@@ -60,6 +61,7 @@ def test_prometheus_can_read_them() -> None:
         conditions=lambda: {"store": False},
         restarts=lambda: 7,
         expiries=lambda: {"0f5c1d2e": -1.5},
+        closed=lambda: {CloseReason.BYTES_TOGETHER: 4},
     )
     metrics.cache_hit("memory")
     metrics.cache_miss()
@@ -79,6 +81,7 @@ def test_prometheus_can_read_them() -> None:
             ("robosc_server_jobs", {"state": "queued"}, 5),
             ("robosc_server_condition", {"name": "store"}, 0),
             ("robosc_server_worker_restarts_total", {}, 7),
+            ("robosc_server_connections_closed_total", {"reason": "bytes_together"}, 4),
             ("robosc_server_token_seconds_to_expiry", {"token": "0f5c1d2e"}, -1.5),
             ("robosc_server_result_lookups_total", {"found": "memory"}, 1),
             ("robosc_server_result_lookups_total", {"found": "store"}, 0),

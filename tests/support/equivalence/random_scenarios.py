@@ -212,8 +212,8 @@ def _replies(model: Model, target: PythonTarget, dice: Random, drawn: Dice, outc
     return found
 
 
-def node_settings(model: Model, policy: str = "fair") -> dict[str, Any]:
-    """Settings under which a node decides whenever something comes, and never else."""
+def node_settings(model: Model, policy: str | None = "fair") -> dict[str, Any]:
+    """Settings under which a node decides whenever something comes, and never else; None: under its own policy."""
     sensors = {item.identifier for item in model.communications if item.max_age is not None}
     return {
         "every": "event",

@@ -14,10 +14,12 @@ from typing import Any
 from robosc.automata.plants import communication_plant
 from robosc.event_logs import LoggedRun
 from robosc.event_logs.entries import is_ended
+from robosc.execution.runtime.progress import Progress
 from robosc.model.structure import CommunicationKind, Model
 from robosc.supervisor import Supervisor
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.definition import robot_of
+from robosc_view.logged_progress import LoggedProgress
 from robosc_view.messages import TransitionTracker
 from robosc_view.motion import MotionTrace
 from robosc_view.reports import EventBatch, LogSpan, SourceKind, Status
@@ -77,6 +79,7 @@ class Recording:
         # A clock that was set back would hide what came after it.
         self.times_s = list(accumulate((entry.time_s for entry in run.entries), max))
         self._frames = _frames(run, supervisor.model)
+        self._progress = LoggedProgress(supervisor, self.documents, self.times_s)
         self.motion = motion
         if motion is not None:
             scene = {**(scene or {"walls": [], "line": []}), "way": motion.way()}
@@ -101,6 +104,10 @@ class Recording:
     def frame(self, number: int) -> Frame:
         """Return the state after a number of entries."""
         return self._frames[number]
+
+    def progress(self, number: int, time_s: float) -> Progress | None:
+        """Return what the log tells of the strategy after a number of entries; None: it tells nothing of one."""
+        return self._progress.at(number, time_s)
 
     def last(self, number: int) -> Mapping[str, int]:
         """Return the last transition of each component that has taken one, after a number of entries."""
@@ -319,5 +326,6 @@ class Replay:
             components=frame.components,
             communications=frame.communications,
             last=self._recording.last(count),
+            progress=self._recording.progress(count, self._player.time_s),
             drive=None if motion is None else motion.drive(self._player.time_s),
         )

@@ -88,7 +88,7 @@ class CounterRun(Run):
         self._random_data = RandomData(explanation.supervisor.model)
         self._answer()
 
-    # Observations
+    # Views
 
     @property
     def explanation(self) -> GoalExplanation:

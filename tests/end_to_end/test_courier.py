@@ -46,7 +46,7 @@ def test_an_order_is_answered_before_the_rounds_go_on(tmp_path: Path, room: str)
     with courier(tmp_path, drain_v_s=0.0) as twin:
         assert visits(twin, 1) == ["kitchen"]
         twin.receive("/order", room)
-        twin.receive("/order", "office")  # Orders are refused while one waits.
+        twin.receive("/order", "office")  # An order does not count while another one waits.
         twin.until(lambda: at(twin) != "hall", "the next room", LIMIT_S)
         assert at(twin) == room
         twin.until(lambda: twin.state["Tray"]["state"] == "offered", "the tray", LIMIT_S)

@@ -7,6 +7,7 @@ from robosc.language.tokens import tokenize
 from robosc.language.words import RESERVED_WORDS
 
 WORDS = (*sorted(RESERVED_WORDS), "constant", "always", "never", "then", "else", "in", "qos", "depth", "max_age")
+GOALS = ("goal", "assume", "eventually", "leads", "once", "mission", "while", "visit", "anywhere", "prefer", "over")
 PIECES = (
     *("{", "}", "(", ")", "[", "]", '"', "'", "/*", "*/", "//", "->", "..", ":=", "=>", "!=", "<=", "-", "!", ",", ":"),
     *("min(", "any(x in value: ", "if ", "array(", "integer(", "{a: ", "value", "value.x[0..3]", "^", "\\", ";", "&&"),
@@ -69,7 +70,7 @@ def _swap_tokens(text: str, others: Sequence[str], dice: Random) -> str:
 
 def _insert(text: str, others: Sequence[str], dice: Random) -> str:
     starts, at = _tokens(text, dice)
-    return f"{text[: starts[at]]} {dice.choice((*WORDS, *PIECES))} {text[starts[at] :]}"
+    return f"{text[: starts[at]]} {dice.choice((*WORDS, *GOALS, *PIECES))} {text[starts[at] :]}"
 
 
 def _insert_anywhere(text: str, others: Sequence[str], dice: Random) -> str:
@@ -80,7 +81,7 @@ def _insert_anywhere(text: str, others: Sequence[str], dice: Random) -> str:
 def _replace_token(text: str, others: Sequence[str], dice: Random) -> str:
     tokens = tokenize(text)
     at = dice.randrange(len(tokens.texts))
-    donor = tokenize(dice.choice(others)).texts if others and dice.random() < 0.5 else [*WORDS, *PIECES]
+    donor = tokenize(dice.choice(others)).texts if others and dice.random() < 0.5 else [*WORDS, *GOALS, *PIECES]
     start = tokens.starts[at]
     return text[:start] + dice.choice(donor) + text[start + len(tokens.texts[at]) :]
 

@@ -310,7 +310,7 @@ class SteppedTwin:
             case "/rotate_right":
                 self._turn = Turn(-math.radians(message), self.world.pose[2])
             case other if other in TOLD:
-                self.house.tell(other)
+                self.house.receive(other)
             case other:
                 raise AssertionError(f"nobody hears {other}")
 

@@ -2,7 +2,7 @@
 
 import { announce } from "./announce.js";
 import { byId, make, mark, quoted, say, show } from "./dom.js";
-import { received } from "./received.js";
+import { isReplay, received } from "./received.js";
 
 const LONG_S = 60;
 
@@ -31,6 +31,12 @@ function duration(seconds) {
 }
 
 const counted = (times) => (times === 1 ? "reached once" : `reached ${times} times`);
+
+function wordOf(aim, isNow, since) {
+  if (aim.is_met) return "true";
+  if (isNow) return `now${since}`;
+  return aim.unmet_s === null ? "" : `not yet${since}`;
+}
 
 /** @returns {{build: () => void, paint: () => void}} Functions that main.js calls. */
 export function startGoals() {
@@ -65,6 +71,8 @@ export function startGoals() {
   };
 
   const choice = ({ aims, is_followed, approached, chosen }) => {
+    // A log tells what is approached, and requests as events of their own.
+    if (isReplay()) return approached === null ? "" : `The strategy approaches ${approached}.`;
     if (!is_followed) return "Another policy than the strategy decides.";
     if (approached === null) return aims.every((aim) => aim.is_met) ? "All goals are true: nothing is requested." : "";
     return chosen === null ? `The strategy waits, for ${approached}.` : `The strategy requests ${chosen}, for ${approached}.`;
@@ -92,16 +100,17 @@ export function startGoals() {
         const state = aim.is_met ? "met" : isNow ? "now" : "unmet";
         const sign = { met: "✓", now: "▶", unmet: "○" }[state];
         const since = aim.unmet_s === null ? "" : `, for ${duration(aim.unmet_s)}`;
-        items.get(aim.name).paint(state, sign, aim.is_met ? "true" : `${isNow ? "now" : "not yet"}${since}`, counted(aim.times));
+        items.get(aim.name).paint(state, sign, wordOf(aim, isNow, since), counted(aim.times));
       }
       for (const item of progress.assumptions) {
         const isLate = progress.overdue.includes(item.name);
-        const state = isLate ? "overdue" : item.is_met ? "met" : "owed";
+        const state = isLate ? "overdue" : item.is_met ? "met" : item.unmet_s === null ? "unknown" : "owed";
         const word = item.unmet_s === null ? (item.is_met ? "met" : "") : `has been owed for ${duration(item.unmet_s)}`;
-        items.get(item.name).paint(state, { met: "✓", owed: "…", overdue: "▲" }[state], word, "");
+        items.get(item.name).paint(state, { met: "✓", owed: "…", overdue: "▲", unknown: "" }[state], word, "");
       }
+      const isKnown = progress.aims.every((aim) => aim.is_met || aim.unmet_s !== null);
       const met = progress.aims.filter((aim) => aim.is_met).length;
-      say(byId("goals-count"), `${met} of ${progress.aims.length} true`);
+      say(byId("goals-count"), isKnown ? `${met} of ${progress.aims.length} true` : "");
       say(byId("goals-choice"), choice(progress));
       tell(progress);
     },

@@ -49,8 +49,8 @@ async def page_of(file: Path) -> AsyncIterator[Any]:
 async def done(page: Any, kind: str, **request: Any) -> dict[str, Any]:
     """Ask for something, and return the run after it."""
     await page.send(type=kind, **request)
-    run: dict[str, Any] = await page.receive("run")
-    return run
+    received: dict[str, Any] = await page.receive("run")
+    return received
 
 
 @pytest.fixture

@@ -12,13 +12,17 @@ import pytest
 from hypothesis import given, settings
 
 from robosc.event_logs import LoggedRun, read_log
+from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.event_log import json_line, plain
+from robosc.execution.runtime.progress import Progress
 from robosc_view import ViewError
 from robosc_view.broadcaster import Viewer
 from robosc_view.messages import events_text
 from robosc_view.replay import HISTORY, MAXIMUM_STOPS, Player, Recording, Replay
 from robosc_view.sources import Pause, Play, Seek
 from support.effort import examples
+from support.execution import Bench
+from support.goal_porter import porter_supervisor
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
 from support.pages_open import opened
 from support.view_servers import served
@@ -212,6 +216,53 @@ def test_faults_stops_and_restarts_are_reported(tmp_path: Path) -> None:
     assert [frame.stops for frame in frames] == [(), (), *[("seen0 on /seen0 is stale",)] * 2, (), (), ()]
     assert [frame.components["Motor1"]["state"] for frame in frames] == ["still", *["moving"] * 4, "still", "still"]
     assert [frame.communications["hold2"] for frame in frames] == [*["idle"] * 6, "waiting"]
+
+
+def test_goals_are_told_as_far_as_the_log_does(tmp_path: Path) -> None:
+    bench = Bench(InterpretedSystem(porter_supervisor()), assumption_timeout_s=2.0)
+    bench.receive("/call")
+    bench.tick(60)
+    late = len(bench.log.entries)
+    bench.receive("/door/opened")
+    bench.tick(2)
+    found = bench.executor.progress
+    assert found is not None and found.aims[0].times == 1
+    path = tmp_path / "log.jsonl"
+    path.write_text("".join(map(json_line, bench.log.entries)))
+    recording = Recording(read_log(path), porter_supervisor())
+
+    def told(count: int, time_s: float) -> Progress:
+        progress = recording.progress(count, time_s)
+        assert progress is not None
+        return progress
+
+    first = told(0, recording.begin_s)
+    assert (first.approached, first.overdue, [item.times for item in first.aims]) == (None, (), [0, 0])
+    owing = told(late, recording.times_s[late - 1] + 3.0)
+    assert (owing.approached, owing.overdue) == ("goal 1", ("assumption 1",))
+    assert owing.assumptions[0].unmet_s == pytest.approx(5.0, abs=0.11)
+    last = told(len(recording.documents), recording.end_s)
+    assert (last.approached, last.overdue) == (found.approached, ())
+    assert [item.times for item in last.aims] == [item.times for item in found.aims]
+
+
+def test_a_log_that_tells_nonsense_of_goals_is_shown_all_the_same(tmp_path: Path) -> None:
+    nonsense: tuple[dict[str, Any], ...] = (
+        {"kind": "reached", "aim": "goal 9", "count": 1},
+        {"kind": "reached", "aim": "goal 1", "count": "many"},
+        {"kind": "approach", "aim": ["goal 1"]},
+        {"kind": "owed", "assumption": "assumption 1", "owed_s": "long"},
+        {"kind": "met", "assumption": {}},
+        {"kind": "restart"},
+    )
+    recording = Recording(_run(tmp_path / "log.jsonl", *nonsense), porter_supervisor())
+    assert recording.progress(6, recording.end_s) is None
+    told = Recording(
+        _run(tmp_path / "b.jsonl", {"kind": "approach", "aim": "goal 2"}, {"kind": "restart"}), porter_supervisor()
+    )
+    found = [told.progress(count, told.end_s) for count in range(3)]
+    assert [item and item.approached for item in found] == [None, "goal 2", None]
+    assert Recording(_run(tmp_path / "c.jsonl", {"kind": "restart"}), SUPERVISOR).progress(1, 0.0) is None
 
 
 def test_what_is_back_ends_its_own_stop_alone(tmp_path: Path) -> None:

@@ -103,7 +103,7 @@ def test_a_strategy_is_checked_and_it_is_said_where_it_is_not(
     assert lines[-1] == "note: the certificate says 'passed' for what was not checked here: goals"
     status, document = _json(capsys, right, model, "--limit", "100")
     assert (status, document["status"], document["checks"]["goals"]) == (1, "not checked", "not checked")
-    # A strategy without requests keeps callers waiting.
+    # A strategy that requests nothing keeps callers waiting.
     supervisor = decode(Path(right).read_bytes())
     assert supervisor.strategy is not None
     Path(idle).write_bytes(encode(change(supervisor, strategy=change(supervisor.strategy, modes=((), ())))))

@@ -112,6 +112,12 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
     if token == "if" and tokens.texts[at - 1] == "not":
         # A conditional without its end is none, so that `not` is a name.
         return True
+    if tokens.texts[at - 2 : at] in (["not", "mission"], ["not", "prefer"]):
+        # Without its brace or its `over` it is no item, so that `not` is the operator.
+        return True
+    if tokens.texts[at - 1] == "not" and token in ("mission", "prefer"):
+        # An item, so that `not` is a name, behind which none may stand here.
+        return True
     # The next token shows that `3 needs x` wants a name, and `integer < x` something else than this word; and that an
     # item begins behind a name `not`.
     is_next = offset(text, *stops) == tokens.starts[at + 1]
@@ -392,6 +398,30 @@ def test_words_as_names(word: str) -> None:
         assert None not in trees
     else:
         assert trees[0] is None
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "mission m while not prefer { visit a }",
+        "mission m while not mission { visit a }",
+        "requirement m needs not mission goal { visit a }",
+        "requirement m needs not mission goal while leads to x",
+        "requirement m needs not mission m while not mission n { visit not }",
+        "requirement m needs not mission mission while { visit a }",
+        "requirement m needs not prefer { visit } over x",
+        "requirement m needs not prefer { } over x",
+        "requirement m needs not prefer { visit, x } over x",
+        "requirement m needs not prefer goal over leads to x",
+        "requirement m needs not prefer prefer over x",
+        "requirement m needs if not prefer then over else not mission",
+        "requirement m needs if not mission then while else not prefer",
+        "requirement m needs not mission constant while: T = not prefer constant over: T = not",
+        "requirement m needs not goal mission m { visit a }",
+    ],
+)
+def test_a_mission_or_preference_behind_not(text: str) -> None:
+    compare(f"robot R {{ {text} }}")
 
 
 def test_not_takes_no_meaning_from_a_text() -> None:

@@ -13,6 +13,7 @@ from robosc.errors import Severity
 from support.models import checked, marked_place
 
 MESSAGE = "incoming message go with type: none outgoing message seen with type: boolean"
+GO = "incoming message go with type: none incoming message stay with type: none"
 STATES = "initial marked state a { } marked state b { }"
 
 
@@ -499,6 +500,36 @@ EXTENSION_RULES: list[tuple[str, str, str, str]] = [
         "error",
         f"library L {{ {component(STATES)} §assume allow always eventually C.a }}",
         robot(component(STATES), "assume allow always eventually C.a"),
+    ),
+    (
+        "goal-in-library",
+        "error",
+        f"library L {{ {component(STATES)} §mission m {{ visit C.a }} }}",
+        robot(component(STATES), "mission m { visit C.a }"),
+    ),
+    (
+        "duplicate-mission",
+        "error",
+        robot(component(STATES), "mission m { visit C.a } mission §M { visit C.b }"),
+        robot(component(STATES), "mission m { visit C.a } mission n { visit C.b }"),
+    ),
+    (
+        "preference-on-outgoing",
+        "error",
+        robot(component(STATES, f"{GO} outgoing message sent with type: none"), "goal once C.a prefer go over §sent"),
+        robot(component(STATES, GO), "goal once C.a prefer go over stay"),
+    ),
+    (
+        "contradictory-preferences",
+        "error",
+        robot(component(STATES, GO), "goal once C.a prefer go over stay §prefer stay over go"),
+        robot(component(STATES, GO), "goal once C.a prefer go over stay prefer go over {stay}"),
+    ),
+    (
+        "unused-preference",
+        "warning",
+        robot(component(STATES, GO), "§prefer go over stay"),
+        robot(component(STATES, GO), "prefer go over stay mission m { visit C.a }"),
     ),
     (
         "option-not-allowed",

@@ -81,9 +81,9 @@ def test_a_low_battery_leads_to_the_dock_until_it_is_full(tmp_path: Path) -> Non
 def test_a_late_door_delays_it(tmp_path: Path, opens_after_s: float) -> None:
     with courier(tmp_path, drain_v_s=0.0, opens_after_s=opens_after_s) as twin:
         twin.until(lambda: twin.state["Door"]["state"] == "opening", "the door to be told", 2 * LIMIT_S)
-        told_s = twin.now_s
+        ordered_s = twin.now_s
         twin.until(lambda: twin.place[1] < -1.0, "the robot to go through the door", LIMIT_S)
-        assert twin.now_s > told_s + opens_after_s
+        assert twin.now_s > ordered_s + opens_after_s
         motion, wrong = twin.finish()
     assert wrong == ()
     assert motion.samples[-1].collisions == 0

@@ -13,7 +13,7 @@ COLCON := .venv-colcon
 CHECKERS := .venv-checkers
 WHEELS := out/wheels
 
-# Without bytecode on disk, every program that the tests start would compile all that it imports.
+# Programs that the tests start would compile all imports each time without bytecode on disk.
 unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: demo test acceptance smoke soak mutants faults mistakes fuzz lint format bindings lock benchmark environment colcon checkers docs pictures images dist extension vscode clean help

@@ -1,7 +1,7 @@
-"""What holds for the tests of all tiers: `tests`, `acceptance` and `soak`.
+"""Rules for the tests of all tiers: `tests`, `acceptance` and `soak`.
 
-Programs that they start can be interrupted, random examples are those of the chosen effort, and figures are told at the
-end of the run.
+Programs that they start can be interrupted, random examples are those of the chosen effort, and figures are shown at
+the end of the run.
 """
 
 import asyncio
@@ -19,7 +19,7 @@ from support import failing
 from support.effort import WRONG, load_profile
 
 # Our programs have gRPC's own log off, which is read at its import: in this process, which runs what they run, it would
-# stand among what they tell. Programs that are started hide it themselves.
+# stand among their output. Programs that are started hide it themselves.
 _verbosity = os.environ.get("GRPC_VERBOSITY")
 os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 importlib.import_module("grpc")
@@ -78,12 +78,12 @@ def pytest_pyfunc_call(pyfuncitem: pytest.Function) -> None:
 def pytest_runtest_makereport(
     item: pytest.Item, call: pytest.CallInfo[None]
 ) -> Generator[None, pytest.TestReport, pytest.TestReport]:
-    """Write down and tell the random models of a test that failed."""
+    """Write down and show the random models of a test that failed."""
     report = yield
     if call.when == "call" and report.failed:
-        told = failing.written(item.name, item.config.rootpath / "out" / "failing")
-        if told:
-            report.sections.append(("random models of this test", told))
+        models = failing.written(item.name, item.config.rootpath / "out" / "failing")
+        if models:
+            report.sections.append(("random models of this test", models))
     return report
 
 

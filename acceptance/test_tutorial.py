@@ -23,7 +23,7 @@ NEEDS_ROS = "deploy/demo/line_follower.py"
 
 
 class Reader:
-    """Reader that plays chapters in order, each once; whoever asks for one gets those before it.
+    """Reader that plays chapters in order, each once; a reader of one gets those before it.
 
     Args:
         shell: Shell in which commands are typed.

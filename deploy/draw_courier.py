@@ -97,7 +97,7 @@ def driven(folder: Path) -> tuple[Scene, list[Point], list[Note]]:
             if step % _EVERY == 0:
                 points.append(Point(twin.now_s, *twin.place, CHARGE if is_low else ORDER if is_waiting else ROUNDS))
             if twin.now_s >= ORDERED_S > twin.now_s - 0.05:
-                twin.tell("/order", ORDERED)
+                twin.receive("/order", ORDERED)
                 note(f"somebody calls it to the {ORDERED}")
             for component, location, text in (
                 ("Door", "opening", "tells the door to open"),

@@ -25,7 +25,7 @@ BUILD = ("editables", "hatchling", "pip", "setuptools", "uv", "wheel")
 """Packages that install the locks and build wheels: ours, and those of packages that have none."""
 
 _HEADER = """\
-# What {what}: the lines of requirements.lock that it takes, written by deploy/lock_images.py (make lock).
+# Packages that {what}: the lines of requirements.lock that it takes, written by deploy/lock_images.py (make lock).
 """
 
 
@@ -36,7 +36,7 @@ def main(extras: Sequence[str] = ()) -> int:
         sys.stdout.write(lock_of(entries, closure(requirements(extras)), f"the extras {', '.join(extras)} need"))
         return 0
     for name, needed in wanted().items():
-        what = "builds the wheels of the images" if name == "build" else f"the image of the {name} holds"
+        what = "build the wheels of the images" if name == "build" else f"the image of the {name} holds"
         (FOLDER / f"requirements-{name}.txt").write_text(lock_of(entries, needed, what), "utf-8")
     return 0
 

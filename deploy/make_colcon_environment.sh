@@ -26,7 +26,7 @@ grep -rIlE "$built" "$venv/share" "$venv/lib/cmake" --include='*.cmake' | while 
     sed -i -E "s#$built/include/python3\.[0-9]+#$include#g; s#$built/lib/python3\.[0-9]+/site-packages#$packages#g" "$file"
 done
 
-# What must be set wherever colcon runs. Outside of bin, whose own colcon it calls.
+# The script sets the variables that colcon needs. It is not in bin, whose own colcon it calls.
 cat >"$venv/colcon" <<END
 #!/bin/sh
 # colcon with this environment's ROS 2 as the underlay; no other workspace may be sourced.

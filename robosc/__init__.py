@@ -21,6 +21,7 @@ from robosc.named_on_use import named_on_use
 
 if TYPE_CHECKING:
     from robosc.certification import Progress
+    from robosc.certification.goals import GoalExplanation
     from robosc.diagnostics import UnknownCodeError
     from robosc.errors import (
         Diagnostic,
@@ -40,6 +41,7 @@ if TYPE_CHECKING:
     from robosc.model.structure import Deployment
     from robosc.pipeline.checking import check
     from robosc.pipeline.conditions import Condition, Conditions
+    from robosc.pipeline.counter_run import CounterRun, NoCounterStrategyError
     from robosc.pipeline.explaining import explain
     from robosc.pipeline.exploring import Exploration, explore
     from robosc.pipeline.files import FileAccessError
@@ -78,6 +80,7 @@ _HOMES = {
     "ChoiceError": "pipeline.system_runs",
     "Condition": "pipeline.conditions",
     "Conditions": "pipeline.conditions",
+    "CounterRun": "pipeline.counter_run",
     "DataError": "pipeline.received_data",
     "Deployment": "model.structure",
     "DetourProgress": "pipeline.missions",
@@ -90,8 +93,9 @@ _HOMES = {
     "Findings": "pipeline.findings",
     "GenerateOptions": "targets",
     "Generation": "pipeline.results",
-    "GoalSummary": "pipeline.results",
     "GoalApproach": "pipeline.goals",
+    "GoalExplanation": "certification.goals",
+    "GoalSummary": "pipeline.results",
     "Goals": "pipeline.goals",
     "InternalError": "errors",
     "InvalidSupervisorError": "errors",
@@ -100,6 +104,7 @@ _HOMES = {
     "LoadedAutomata": "pipeline.loading",
     "LoadedModel": "pipeline.loading",
     "MissionProgress": "pipeline.missions",
+    "NoCounterStrategyError": "pipeline.counter_run",
     "NoStrategyError": "pipeline.manual_run",
     "NoSupervisor": "pipeline.results",
     "NodeLimitError": "errors",
@@ -145,6 +150,7 @@ __all__ = [
     "ChoiceError",
     "Condition",
     "Conditions",
+    "CounterRun",
     "DataError",
     "Deployment",
     "DetourProgress",
@@ -158,6 +164,7 @@ __all__ = [
     "GenerateOptions",
     "Generation",
     "GoalApproach",
+    "GoalExplanation",
     "GoalSummary",
     "Goals",
     "InternalError",
@@ -167,6 +174,7 @@ __all__ = [
     "LoadedAutomata",
     "LoadedModel",
     "MissionProgress",
+    "NoCounterStrategyError",
     "NoStrategyError",
     "NoSupervisor",
     "NodeLimitError",

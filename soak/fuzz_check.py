@@ -1,16 +1,21 @@
 """Feeds damaged models to the parser, the checks, the formatter and synthesis for as long as you like.
 
     python soak/fuzz_check.py --minutes 30 --seed 1
+    python soak/fuzz_check.py --minutes 30 --seed 1 --goals
 
 A child process with 500 MB of address space takes one input after the other; it is killed and replaced when an input
 takes longer than two seconds, and an input that it raises or dies on is a failure. Failures are saved with their
 reason; `--replay FILE` runs one again. A loop with a mutator that knows the language's tokens beats a
 coverage-guided fuzzer of bytes here: most of what that would try ends at the first token.
 
+With `--goals` every model has random goals and assumptions, too, and only some are damaged; what comes out with a
+strategy is written to a file, read and verified, told in words, executed for a while and generated in Python and C.
+
 Exit status: 0 no failures, 1 failures, 2 wrong use.
 """
 
 import argparse
+import contextlib
 import json
 import multiprocessing
 import resource
@@ -25,7 +30,16 @@ from random import Random
 ROOT = Path(__file__).parents[1]
 sys.path[:0] = [str(ROOT), str(ROOT / "tests")]
 
-from support.mutate import mutated  # noqa: E402  # found through the path above
+import msgspec  # noqa: E402
+
+from robosc.model.check import check  # noqa: E402  # found through the path above
+from robosc.model.structure import Model  # noqa: E402
+from robosc.source import Bundle, SourceFile  # noqa: E402
+from robosc.supervisor import Supervisor  # noqa: E402
+from support.model_text import model_text  # noqa: E402
+from support.mutate import mutated  # noqa: E402
+from support.random_errands import random_errands  # noqa: E402
+from support.random_goals import with_random_goals  # noqa: E402
 
 LIMIT_S = 2.0
 START_LIMIT_S = 60.0
@@ -42,6 +56,7 @@ def main(argv: Sequence[str] | None = None) -> int:
         "--seed", type=int, default=0, help="seed of what is tried: the same tries the same (default: 0)"
     )
     parser.add_argument("--failures", type=Path, default=Path("out/fuzz"), metavar="DIR", help="folder for failures")
+    parser.add_argument("--goals", action="store_true", help="give every model random goals and assumptions")
     parser.add_argument("--replay", type=Path, metavar="FILE", help="run one saved input and print what happens")
     arguments = parser.parse_args(argv)
     if arguments.minutes <= 0:
@@ -54,14 +69,21 @@ def main(argv: Sequence[str] | None = None) -> int:
         fault, seconds = Child().run(text)
         print(f"{fault or 'no failure'} ({seconds:.2f} s)")
         return 1 if fault else 0
-    return Fuzzer(arguments.seed, arguments.failures).run(arguments.minutes * 60)
+    return Fuzzer(arguments.seed, arguments.failures, goals=arguments.goals).run(arguments.minutes * 60)
 
 
 class Fuzzer:
-    """Tries inputs and counts what becomes of them."""
+    """Tries inputs and counts what becomes of them.
 
-    def __init__(self, seed: int, folder: Path) -> None:
+    Args:
+        seed: Seed of what is tried.
+        folder: Folder for failures.
+        goals: True if every model gets random goals.
+    """
+
+    def __init__(self, seed: int, folder: Path, *, goals: bool = False) -> None:
         self._seeds = seeds()
+        self._robots = [model for text in self._seeds if (model := robot_of(text)) is not None] if goals else []
         self._dice = Random(seed)
         self._folder = folder
         self._counts: Counter[str] = Counter()
@@ -73,7 +95,7 @@ class Fuzzer:
         child = Child()
         begin = reported = time.monotonic()
         while (now := time.monotonic()) - begin < seconds:
-            text = mutated(self._dice.choice(self._seeds), self._seeds, self._dice)
+            text = self._next()
             fault, took = child.run(text)
             self._counts["inputs"] += 1
             self._counts[child.outcome] += 1
@@ -90,11 +112,26 @@ class Fuzzer:
         print(f"done: {self._line()}, {self._counts['inputs'] / seconds:.0f} inputs a second")
         return 1 if self._counts["failures"] else 0
 
+    def _next(self) -> str:
+        dice = self._dice
+        if not self._robots:
+            return mutated(dice.choice(self._seeds), self._seeds, dice)
+        if dice.random() < 0.5:
+            model = random_errands(dice.randrange(2**32))
+        else:
+            model = with_random_goals(dice.choice(self._robots), dice)
+        if dice.random() < 0.7:
+            assumptions = tuple(msgspec.structs.replace(item, is_allowed=True) for item in model.assumptions)
+            model = msgspec.structs.replace(model, assumptions=assumptions)
+        text = model_text(model)
+        return mutated(text, self._seeds, dice) if dice.random() < 0.4 else text
+
     def _line(self) -> str:
         counts = self._counts
         return (
             f"{counts['inputs']} inputs ({counts['sound']} sound, {counts['refused']} refused, "
-            f"{counts['synthesized']} synthesized), {counts['failures']} failures, slowest {self._slowest:.2f} s, "
+            f"{counts['synthesized']} synthesized, {counts['strategic']} with a strategy), "
+            f"{counts['failures']} failures, slowest {self._slowest:.2f} s, "
             f"most memory {self._most_memory / 1024:.0f} MB"
         )
 
@@ -118,11 +155,18 @@ def seeds() -> list[str]:
     return [text for text in models if text.strip()]
 
 
+def robot_of(text: str) -> Model | None:
+    """The robot of a text with a behaviour in it, or None if it is none or has errors."""
+    model = check(Bundle(SourceFile("model.rscd", text))).model
+    return model if model is not None and any(item.behaviour for item in model.components) else None
+
+
 class Child:
     """A process that takes inputs.
 
     Attributes:
-        outcome: Outcome of the last input: `sound`, `refused`, `synthesized` or `failed`.
+        outcome: Outcome of the last input: `sound`, `refused`, `synthesized`, `strategic` (also a strategy) or
+            `failed`.
         memory: The most memory that the process had so far, in KiB.
     """
 
@@ -165,9 +209,8 @@ def serve(pipe: Connection) -> None:
     """Take inputs until the other side is gone."""
     import traceback
 
-    from robosc.certification import make_supervisor  # noqa: F401
-    from robosc.formatting import format_text  # noqa: F401  # so that only inputs are timed
-
+    # All that an input may need is loaded, so that only inputs are timed.
+    assert try_one(model_text(random_errands(0))) == "strategic"
     resource.setrlimit(resource.RLIMIT_AS, (MEMORY_BYTES, MEMORY_BYTES))
     pipe.send("ready")
     while True:
@@ -195,8 +238,6 @@ def try_one(text: str) -> str:
     from robosc.formatting import format_text
     from robosc.language import parse
     from robosc.language.tokens import tokenize
-    from robosc.model.check import check
-    from robosc.source import Bundle, SourceFile
 
     bundle = Bundle(SourceFile("model.rscd", text))
     parsed = parse(bundle.main)
@@ -227,13 +268,44 @@ def try_one(text: str) -> str:
     begin = time.monotonic()
     try:
         # Synthesis may take long by its nature: what is asked here is that it can be stopped and raises nothing else.
-        make_supervisor(bundle, should_stop=lambda: time.monotonic() - begin > LIMIT_S / 4)
+        made = make_supervisor(bundle, should_stop=lambda: time.monotonic() - begin > LIMIT_S / 4)
     except UnsupportedModelError:
         return "sound"
     except Exception as error:
         if type(error).__name__ != "SynthesisCancelled":
             raise
-    return "synthesized"
+        return "synthesized"
+    if made.supervisor is None or made.supervisor.strategy is None:
+        return "synthesized"
+    use_strategy(bundle, made.supervisor)
+    return "strategic"
+
+
+def use_strategy(bundle: Bundle, supervisor: Supervisor) -> None:
+    """Put a supervisor with a strategy through all that can be done with it.
+
+    Raises:
+        AssertionError: Something is wrong with it.
+    """
+    from robosc.certification.supervisor_file import verify_supervisor_file
+    from robosc.errors import UnsupportedModelError
+    from robosc.pipeline.goals import goals_of
+    from robosc.pipeline.simulation import simulate
+    from robosc.supervisor import decode, encode
+    from robosc.targets import generate
+    from robosc.verification import Limits
+
+    read = decode(encode(supervisor))
+    assert read == supervisor, "another supervisor comes out of a file"
+    found = verify_supervisor_file(read, bundle, Limits.of(2_000))
+    assert not found.faults, found.faults
+    assert all(item.rows() for item in goals_of(supervisor))
+    simulate(supervisor).walk(30, 0, strategy=True)
+    for target in ("python", "c99"):
+        with contextlib.suppress(UnsupportedModelError):
+            for name, content in generate(supervisor, target).items():
+                if name.endswith(".py"):
+                    compile(content, name, "exec")
 
 
 if __name__ == "__main__":

@@ -69,7 +69,7 @@ def main(argv: Sequence[str] | None = None) -> int:
     """Run as the arguments say."""
     parser = make_parser()
     arguments = parser.parse_args(argv)
-    # As Ctrl-C: all parts are ended.
+    # SIGTERM ends all parts, as Ctrl-C does.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
     if min(arguments.jobs, arguments.workers, *(arguments.throughput or [1])) < 1:
         parser.error("--jobs, --workers and --throughput take numbers above 0")

@@ -25,7 +25,7 @@ def test_the_model_is_sound_and_its_messages_are_told_apart() -> None:
     b.request("/cmd_vel", fast)
     assert b.receive("/bump") == [("default", "/cmd_vel"), ("pass", "/bump", None)]
     assert b.request("/cmd_vel", fast) == [("blocked", "/cmd_vel")]
-    # What is missing is unknown, so it is not `walk`.
+    # The missing field is unknown, so it is not `walk`.
     assert b.request("/cmd_vel", {})[0][:2] == ("publish", "halt")
 
 

@@ -74,5 +74,5 @@ def test_the_findings_that_it_speaks_of_come_as_it_says() -> None:
     without = "".join(line for line in PORTER.splitlines(keepends=True) if "assume" not in line)
     assert errors(without) == ["unreachable-goal"]
     assert errors(PORTER.replace(DOOR, "    assume always eventually Door.ajar\n")) == ["preventable-assumption"]
-    told = set(re.findall(r"^\| \[`([a-z-]+)`\]", PAGE, flags=re.MULTILINE))
-    assert told == {code for code in codes() if re.search("goal|assumption", code)} - {"goal-in-library"}
+    listed = set(re.findall(r"^\| \[`([a-z-]+)`\]", PAGE, flags=re.MULTILINE))
+    assert listed == {code for code in codes() if re.search("goal|assumption", code)} - {"goal-in-library"}

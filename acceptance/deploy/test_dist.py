@@ -18,7 +18,7 @@ pytestmark = pytest.mark.skipif(not (DIST / "SHA256SUMS").is_file(), reason="the
 
 
 def offline() -> list[str]:
-    """The words before a command that take its network away; none where the kernel allows nobody to."""
+    """The words before a command that take its network away; none where the kernel does not allow that."""
     words = ["unshare", "--map-root-user", "--net"]
     is_there = shutil.which("unshare") is not None
     return (
@@ -70,7 +70,7 @@ def test_the_checksums_are_those_of_the_files() -> None:
     assert {str(path.relative_to(DIST)): hashlib.sha256(path.read_bytes()).hexdigest() for path in files} == sums
     assert {"udev/60-robosc.rules", "systemd/robosc-server.service", "constraints.txt"} <= sums.keys()
     wheels = sorted(path.name for path in DIST.glob("robosc-*.whl"))
-    # With the kernel, and for every system.
+    # One wheel has the kernel, the other is for every system.
     assert [name.split("-", 2)[2].split("_")[0] for name in wheels] == ["cp312-abi3-linux", "py3-none-any.whl"]
     assert [sums[name] for name in wheels] == [sums[f"wheels/{name}"] for name in wheels]
 

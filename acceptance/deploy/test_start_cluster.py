@@ -71,7 +71,7 @@ def parts_of_kubernetes() -> tuple[Part, Part]:
 
 
 def free_port() -> str:
-    """A port that nobody listens at."""
+    """A port without a listener."""
     with socket.create_server(("127.0.0.1", 0)) as probe:
         return str(probe.getsockname()[1])
 

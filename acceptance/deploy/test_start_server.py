@@ -79,7 +79,7 @@ def secrets(tmp_path: Path) -> Secrets:
 
 
 def check(network: Network, secrets: Secrets) -> None:
-    """Check a model over gRPC, as somebody elsewhere does."""
+    """Check a model over gRPC, as a caller elsewhere does."""
     command = [*network.entry, sys.executable, "-c", CHECK, ADDRESS, str(secrets.ca), str(secrets.token)]
     done = subprocess.run(command, capture_output=True, text=True, timeout=60)
     assert done.returncode == 0, done.stderr

@@ -176,7 +176,7 @@ def test_a_definition_is_gone_to(emacs: Emacs) -> None:
     emacs.go("on response from power goto |on_")
     emacs.type("\x1b.")  # M-.
     assert eventually(lambda: emacs.ask(where) == ["walker.rscd", "on_ { on response from power goto off }"])
-    # In a file that is not open.
+    # The definition is in a file that is not open.
     emacs.go("Base.|calm")
     emacs.type("\x1b.")
     assert eventually(lambda: emacs.ask(where)[0] == "parts.rscd" and emacs.ask(where)[1].startswith("calm {"))

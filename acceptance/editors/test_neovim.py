@@ -143,7 +143,7 @@ def test_a_definition_is_gone_to(nvim: Neovim) -> None:
     nvim.go("on response from power goto |on_")
     nvim.type("<C-]>")
     assert eventually(lambda: nvim.lua(where) == ["walker.rscd", "on_ { on response from power goto off }"])
-    # In a file that is not open.
+    # The definition is in a file that is not open.
     nvim.go("Base.|calm")
     nvim.type("<C-]>")
     assert eventually(lambda: nvim.lua(where)[0] == "parts.rscd" and nvim.lua(where)[1].startswith("calm {"))
@@ -197,7 +197,7 @@ def test_files_of_two_folders_have_one_server(nvim: Neovim, home: Home) -> None:
     nvim.type(f":edit {str(other).replace(' ', chr(92) + ' ')}<CR>")
     assert finds(nvim, "unknown-name", "parts")
     assert nvim.lua(CLIENTS) == first and len(home.servers) == 1
-    # It works in the other folder, too: what nobody has opened there is named by it.
+    # It works in the other folder, too: files that are not open there are named by it.
     home.write("elsewhere/parts.rscd", LIBRARY)
     home.write("elsewhere/third.rscd", "robot Third { component Base from parts import Base }")
     nvim.type(":edit %:h/parts.rscd<CR>")

@@ -128,7 +128,7 @@ def test_words_are_coloured(editor: VsCode, model: Path) -> None:
 
 
 def test_findings_follow_what_is_typed(editor: VsCode) -> None:
-    # In a browser an editor saves by itself, a second after an edit.
+    # The editor in a browser saves by itself, a second after an edit.
     editor.do("set", name="files.autoSave", value="off")
     file = editor.folder / "lit.rscd"
     file.write_text(ROBOT)

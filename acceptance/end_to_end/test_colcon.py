@@ -31,7 +31,7 @@ GOAL = (2.0, 0.5)
 def workspace(tmp_path_factory: pytest.TempPathFactory) -> Workspace:
     """The workspace as the README says: the example packages and the generated one below src."""
     own = tmp_path_factory.getbasetemp()
-    # All workers of a run share one, which whoever comes first builds.
+    # All workers of a run share one, which the first one builds.
     shared = own.parent if "PYTEST_XDIST_WORKER" in os.environ else own
     folder, built = shared / "colcon_workspace", shared / "colcon_workspace.built"
     made = Workspace(folder)

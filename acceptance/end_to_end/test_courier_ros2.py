@@ -52,7 +52,7 @@ def test_it_answers_an_order_goes_through_the_door_and_charges(at: Stage, tmp_pa
         return math.dist((place.x, place.y), (x_m, y_m)) < 0.3
 
     until(at, lambda: not is_near(0.0, 0.0), "the courier to begin its rounds")
-    # Where somebody waits already, an order changes nothing.
+    # Repeated orders change nothing while somebody waits.
     until(
         at, lambda: bool(unlocked), "the tray to be unlocked", lambda: at.peer.publish(String(data="office"), "/order")
     )

@@ -41,6 +41,6 @@ def test_ctrl_c_or_a_closed_terminal_stops_everything(
     demo: Demonstration, output_folder: Path, number: signal.Signals
 ) -> None:
     demo.until("of the world")
-    # Who is impatient must not keep it from stopping its processes.
+    # Impatient users must not keep it from stopping its processes.
     demo.is_interrupted_by(number, number)
     assert not output_folder.exists()

@@ -65,7 +65,7 @@ class Robot:
     def __init__(self, peer: Peer, prefix: str = "") -> None:
         self.peer = peer
         self.prefix = prefix
-        peer.tell("subscribe", f"{prefix}/cmd_vel", "geometry_msgs/Twist")
+        peer.order("subscribe", f"{prefix}/cmd_vel", "geometry_msgs/Twist")
 
     @property
     def commands(self) -> list[Any]:
@@ -220,8 +220,8 @@ def test_a_wrong_parameter_is_one_clear_error(
 def test_state_prefix_stale_sensors_and_other_scans(start: Start, peer: Peer) -> None:
     node = start("period:=0.02", "topic_prefix:=/robot1", "publish_state:=true", "resample_scans:=true", "perod:=1")
     robot = Robot(peer, "/robot1")
-    peer.tell("subscribe", "/robot1/state", "std_msgs/String")
-    peer.tell("subscribe", "/diagnostics", "diagnostic_msgs/DiagnosticArray")
+    peer.order("subscribe", "/robot1/state", "std_msgs/String")
+    peer.order("subscribe", "/diagnostics", "diagnostic_msgs/DiagnosticArray")
 
     def see() -> None:
         robot.line()

@@ -69,7 +69,7 @@ class Carrier:
     def calibrate(self) -> None:
         """Answer the calibration as it should be."""
         wait_until(lambda: bool(self.peer.of("called", "/calibrate")), "a call")
-        self.peer.tell("answer", "/calibrate", data={"success": True, "message": "fine"})
+        self.peer.order("answer", "/calibrate", data={"success": True, "message": "fine"})
         self.until("calibrate.response")
 
     def drive(self) -> None:
@@ -90,8 +90,8 @@ def carrier(workspace: Path, tmp_path: Path) -> Iterator[Carrier]:
 @pytest.fixture
 def ready(carrier: Carrier) -> Carrier:
     """A node with both servers, calibrated."""
-    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
-    carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase")
+    carrier.peer.order("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.order("action", "/move_base", "move_base_msgs/MoveBase")
     carrier.start()
     carrier.calibrate()
     return carrier
@@ -104,7 +104,7 @@ def test_what_is_sent_is_as_the_model_says_and_stamped(ready: Carrier, superviso
         ("/said", "std_msgs/String"),
         ("/count", "std_msgs/Int16"),
     ):
-        peer.tell("subscribe", topic, type_)
+        peer.order("subscribe", topic, type_)
     ready.until("level.response", repeat=lambda: peer.publish("/level", "std_msgs/Float32", data=0.25))
     wait_until(lambda: any(m["twist"]["angular"]["z"] == 0.25 for m in peer.messages("/creep")), "the charge")
     wait_until(lambda: bool(peer.messages("/said") and peer.messages("/count")), "texts and numbers")
@@ -121,16 +121,16 @@ def test_what_is_sent_is_as_the_model_says_and_stamped(ready: Carrier, superviso
     assert goal["header"]["stamp"] > 1e9
     assert goal["pose"]["position"] == {"x": 2.0, "y": 0.5, "z": 0.0}
     assert goal["pose"]["orientation"] == {"x": 0.0, "y": 0.0, "z": 0.0, "w": 1.0}
-    peer.tell("accept", "/move_base")
+    peer.order("accept", "/move_base")
     pose = {"base_position": {"pose": {"position": {"x": 1.5}}}}
-    peer.tell("feedback", "/move_base", data=pose)
+    peer.order("feedback", "/move_base", data=pose)
     ready.until("carry.feedback")
     assert ready.events("carry.feedback")[-1]["state"]["Base"]["variables"]["progress"] == "far"
-    peer.tell("succeed", "/move_base", data={})
+    peer.order("succeed", "/move_base", data={})
     ready.until("carry.response")
     ready.node.signal(signal.SIGINT)
     assert ready.node.wait() == 0
-    # Whatever came in whatever order: what followed from it is what the reference executor does.
+    # The effects of all data, in any order, are those in the reference executor.
     entries = ready.entries
     kinds = {entry["event"] for entry in entries if entry["kind"] == "event"}
     assert {"calibrate.response", "carry.feedback", "carry.response", "creep.request", "said.request"} <= kinds
@@ -153,25 +153,25 @@ def _assert_states_follow(supervisor: Supervisor, entries: list[Entry]) -> None:
 
 
 def test_missing_servers_are_errors_and_never_block(carrier: Carrier) -> None:
-    carrier.peer.tell("subscribe", "/creep", "geometry_msgs/TwistStamped")
+    carrier.peer.order("subscribe", "/creep", "geometry_msgs/TwistStamped")
     carrier.start("server_wait:=0.2")
     carrier.until("calibrate.error", 3)
     # The wheels go on turning between the failing calls.
     wait_until(lambda: len(carrier.peer.messages("/creep")) > 5, "commands")
     assert "starting without a server of /calibrate, /move_base" in carrier.node.stdout + carrier.node.stderr
-    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.order("service", "/calibrate", "std_srvs/Trigger")
     carrier.calibrate()
     carrier.until("word.response", repeat=lambda: carrier.say("go"))
     carrier.until("carry.error", 2)
 
 
 def test_a_service_that_does_not_answer_times_out_and_its_late_answer_changes_nothing(carrier: Carrier) -> None:
-    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
-    carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase")
+    carrier.peer.order("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.order("action", "/move_base", "move_base_msgs/MoveBase")
     carrier.start("service_timeout:=0.3")
     carrier.until("calibrate.error", 2)
     wait_until(lambda: len(carrier.peer.of("called", "/calibrate")) >= 2, "another call")
-    carrier.peer.tell("answer", "/calibrate", data="fail")
+    carrier.peer.order("answer", "/calibrate", data="fail")
     carrier.until("calibrate.error", 3)
     # It ends at once, although calls wait for their replies.
     carrier.node.signal(signal.SIGTERM)
@@ -181,18 +181,18 @@ def test_a_service_that_does_not_answer_times_out_and_its_late_answer_changes_no
 def test_goals_end_in_every_way(ready: Carrier) -> None:
     peer = ready.peer
     ready.drive()
-    peer.tell("reject", "/move_base")
+    peer.order("reject", "/move_base")
     ready.until("carry.error", 1)
     wait_until(lambda: len(peer.of("goal", "/move_base")) >= 2, "another goal")
-    peer.tell("accept", "/move_base")
-    peer.tell("abort", "/move_base")
+    peer.order("accept", "/move_base")
+    peer.order("abort", "/move_base")
     ready.until("carry.error", 2)
     wait_until(lambda: len(peer.of("goal", "/move_base")) >= 3, "another goal")
-    peer.tell("accept", "/move_base")
-    # Something stands in the way: the goal is cancelled.
+    peer.order("accept", "/move_base")
+    # An obstacle is in the way: the goal is cancelled.
     ready.until("carry.cancel", repeat=lambda: ready.scan(0.2))
     wait_until(lambda: bool(peer.of("cancel", "/move_base")), "the cancel")
-    peer.tell("canceled", "/move_base")
+    peer.order("canceled", "/move_base")
     ready.until("scan.response", 1)
     goals = len(peer.of("goal", "/move_base"))
     ready.until("scan.response", len(ready.events("scan.response")) + 1, repeat=lambda: ready.scan(5.0))
@@ -201,10 +201,10 @@ def test_goals_end_in_every_way(ready: Carrier) -> None:
 
 def test_a_goal_is_cancelled_when_the_node_is_stopped(ready: Carrier) -> None:
     ready.drive()
-    ready.peer.tell("accept", "/move_base")
-    ready.peer.tell("feedback", "/move_base", data={})
+    ready.peer.order("accept", "/move_base")
+    ready.peer.order("feedback", "/move_base", data={})
     ready.until("carry.feedback")
-    ready.peer.tell("subscribe", "/creep", "geometry_msgs/TwistStamped")
+    ready.peer.order("subscribe", "/creep", "geometry_msgs/TwistStamped")
     ready.node.signal(signal.SIGINT)
     wait_until(lambda: bool(ready.peer.of("cancel", "/move_base")), "the cancel")
     assert ready.node.wait() == 0
@@ -214,15 +214,15 @@ def test_a_goal_is_cancelled_when_the_node_is_stopped(ready: Carrier) -> None:
 def test_a_server_that_vanishes_is_an_error(workspace: Path, tmp_path: Path) -> None:
     with Master(tmp_path / "ros1") as master, Peer(master, tmp_path) as peer, Peer(master, tmp_path, "mover") as mover:
         carrier = Carrier(workspace, master, peer, tmp_path)
-        peer.tell("service", "/calibrate", "std_srvs/Trigger")
-        mover.tell("action", "/move_base", "move_base_msgs/MoveBase")
+        peer.order("service", "/calibrate", "std_srvs/Trigger")
+        mover.order("action", "/move_base", "move_base_msgs/MoveBase")
         carrier.start()
         with carrier.node:
             carrier.calibrate()
             carrier.until("word.response", repeat=lambda: carrier.say("go"))
             wait_until(lambda: bool(mover.of("goal", "/move_base")), "a goal")
-            mover.tell("accept", "/move_base")
-            mover.tell("feedback", "/move_base", data={})
+            mover.order("accept", "/move_base")
+            mover.order("feedback", "/move_base", data={})
             carrier.until("carry.feedback")
             mover.kill()
             carrier.until("carry.error")
@@ -231,13 +231,13 @@ def test_a_server_that_vanishes_is_an_error(workspace: Path, tmp_path: Path) -> 
 
 
 def test_a_cancel_that_is_ignored_is_a_fault(carrier: Carrier) -> None:
-    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
-    carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase", data="cancel")
+    carrier.peer.order("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.order("action", "/move_base", "move_base_msgs/MoveBase", data="cancel")
     carrier.start()
     carrier.calibrate()
     carrier.drive()
-    carrier.peer.tell("accept", "/move_base")
-    carrier.peer.tell("feedback", "/move_base", data={})
+    carrier.peer.order("accept", "/move_base")
+    carrier.peer.order("feedback", "/move_base", data={})
     carrier.until("carry.feedback")
     carrier.until("carry.cancel", repeat=lambda: carrier.scan(0.2))
     assert carrier.node.wait() == 1
@@ -246,8 +246,8 @@ def test_a_cancel_that_is_ignored_is_a_fault(carrier: Carrier) -> None:
 
 
 def test_a_goal_that_nothing_is_heard_of_is_an_error(carrier: Carrier) -> None:
-    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
-    carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase", data="goal")
+    carrier.peer.order("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.order("action", "/move_base", "move_base_msgs/MoveBase", data="goal")
     carrier.start()
     carrier.calibrate()
     carrier.until("carry.request", repeat=lambda: carrier.say("go"))
@@ -256,8 +256,8 @@ def test_a_goal_that_nothing_is_heard_of_is_an_error(carrier: Carrier) -> None:
 
 
 def test_calls_that_never_end_do_not_keep_others_from_being_made(carrier: Carrier) -> None:
-    carrier.peer.tell("service", "/calibrate", "std_srvs/Trigger")
-    carrier.peer.tell("action", "/move_base", "move_base_msgs/MoveBase")
+    carrier.peer.order("service", "/calibrate", "std_srvs/Trigger")
+    carrier.peer.order("action", "/move_base", "move_base_msgs/MoveBase")
     carrier.start("service_timeout:=0.01")
     # More than may wait, and more than threads of one service may be.
     wait_until(lambda: len(carrier.peer.of("called", "/calibrate")) > 40, "another call")

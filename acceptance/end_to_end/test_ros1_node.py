@@ -114,7 +114,7 @@ class Robot:
         assert self.node.wait() == status, self.node.stderr
         wait_until(lambda: self.commands[-1] == ZERO, "the zero")
         count = len(self.commands)
-        # Nothing is on its way any more: the connection is closed.
+        # No message is on its way any more: the connection is closed.
         wait_until(lambda: not self.peer.ends(f"{self.prefix}/cmd_vel"), "the end of the connection")
         assert self.commands[count:] == []
 

@@ -205,7 +205,7 @@ def test_a_service_that_is_lost_is_an_error_before_the_timeout(courier: Courier)
     courier.order("power", lambda: bool(host.requests["/power"]))
     host.die()
     courier.has("Power", "failures", "1")
-    # The master still knows it: nobody took it back.
+    # The master still knows it: it was not taken back.
     courier.order("power", lambda: courier.value("Power", "failures") not in ("0", "1"))
     first, *others = courier.reasons_of("power.error")
     assert "the call of /power failed" in first
@@ -286,7 +286,7 @@ def test_the_supervisor_cancels_a_goal_that_is_no_longer_allowed(courier: Courie
     courier.allow(False)
     courier.reaches("Counter", "cancelled")
     courier.until(lambda: host.cancels["/count"] == 1, "the cancel")
-    # While the old goal may be running, there is no new one.
+    # The old goal may be running, so there is no new one.
     courier.allow(True)
     courier.order("count", lambda: courier.state("Counter") == "wanted")
     count = len(courier.peer.values("/state"))

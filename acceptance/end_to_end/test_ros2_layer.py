@@ -208,7 +208,7 @@ def test_layer_and_controller_end_together(porter: Porter) -> None:
     assert len(both) == 2
     porter.end()
     assert porter.speed == 0.0
-    # Nobody drives any more: the controller has ended, too.
+    # The robot is at rest: the controller has ended, too.
     assert all(map(has_ended, both))
 
 

@@ -260,7 +260,7 @@ def test_the_supervisor_cancels_a_goal_that_is_no_longer_allowed(courier: Courie
     courier.allow(False)
     courier.reaches("Counter", "cancelled")
     courier.until(lambda: server.cancels == 1, "the cancel")
-    # While the old goal may be running, there is no new one.
+    # The old goal may be running, so there is no new one.
     courier.allow(True)
     courier.order("count", lambda: courier.state("Counter") == "wanted")
     courier.peer.spin_for(0.3)

@@ -20,7 +20,7 @@ from support.equivalence.python_targets import generated_python, observe
 from support.equivalence.random_scenarios import random_scenario
 from support.equivalence.targets import compare
 from support.generated import loaded_file
-from support.hostile import hostile_text, payloads, quoted
+from support.hostile import hostile_supervisor, payloads, quoted
 from support.models import model_of
 from support.random_supervisors import CERTIFICATE
 from support.spin import IS_INSTALLED as HAS_SPIN
@@ -32,11 +32,6 @@ SEEDS = range(8)
 MAXIMUM_IDENTIFIER = 255
 
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
-
-
-def hostile(seed: int, canary: Path, *, is_on_ros: bool = True) -> Supervisor:
-    text = hostile_text(seed, canary, is_on_ros=is_on_ros)
-    return Supervisor(model_of(text), Deployment.CONTROLLER, (), CERTIFICATE)
 
 
 def check_files(files: GeneratedFiles, folder: Path) -> None:
@@ -74,7 +69,7 @@ def test_every_file_is_well_formed_and_nothing_is_executed(target: str, tmp_path
     for seed in SEEDS:
         folder = tmp_path / str(seed)
         folder.mkdir()
-        files = generate(hostile(seed, canary), target)
+        files = generate(hostile_supervisor(seed, canary), target)
         check_files(files, folder)
         if seed < 2:
             run_own_tests(files, folder)
@@ -86,7 +81,7 @@ def test_every_file_is_well_formed_and_nothing_is_executed(target: str, tmp_path
 def test_the_files_of_c_are_built_as_their_reader_builds_them(tmp_path: Path) -> None:
     canary = tmp_path / "canary"
     for seed in (0, 1):
-        write_files(generate(hostile(seed, canary), "c99"), tmp_path / str(seed))
+        write_files(generate(hostile_supervisor(seed, canary), "c99"), tmp_path / str(seed))
         for command in (["cmake", "-S", ".", "-B", "build"], ["cmake", "--build", "build"]):
             done = subprocess.run(command, cwd=tmp_path / str(seed), capture_output=True, text=True, check=False)
             assert done.returncode == 0, done.stdout + done.stderr

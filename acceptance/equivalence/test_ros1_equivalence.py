@@ -7,17 +7,13 @@ import pytest
 
 from robosc.certification import make_supervisor
 from robosc.language import load_bundle
-from robosc.model.structure import Deployment
-from robosc.supervisor import Supervisor
 from support.equivalence.python_targets import observe
 from support.equivalence.random_scenarios import ODD_MESSAGES, for_node, node_scenario
 from support.equivalence.recorded import read_recorded
 from support.equivalence.ros1_target import ros1_target
 from support.equivalence.targets import compare
 from support.generated import example_supervisor
-from support.hostile import hostile_text
-from support.models import model_of
-from support.random_supervisors import CERTIFICATE
+from support.hostile import hostile_supervisor
 from support.ros1 import missing
 
 pytestmark = [
@@ -51,8 +47,7 @@ def test_services_and_actions(tmp_path: Path) -> None:
 
 def test_a_hostile_robot(tmp_path: Path) -> None:
     canary = tmp_path / "canary"
-    model = model_of(hostile_text(1, canary, is_on_ros=True))
-    supervisor = Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE)
+    supervisor = hostile_supervisor(1, canary)
     scenario = node_scenario(supervisor, 1, 60)
     compare(ros1_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
     assert not canary.exists()

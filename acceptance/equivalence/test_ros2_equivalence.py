@@ -18,7 +18,7 @@ from support.equivalence.ros2_target import Ros2Surroundings, ros2_target
 from support.equivalence.scenario import Action, Scenario
 from support.equivalence.targets import compare
 from support.generated import example_supervisor
-from support.hostile import hostile_text
+from support.hostile import hostile_supervisor
 from support.models import model_of
 from support.random_controllers import random_controller
 from support.random_supervisors import CERTIFICATE
@@ -99,8 +99,7 @@ def test_services_and_actions(tmp_path: Path) -> None:
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_hostile_robot(seed: int, tmp_path: Path) -> None:
     canary = tmp_path / "canary"
-    model = model_of(hostile_text(seed, canary, is_on_ros=True))
-    supervisor = Supervisor(model, Deployment.CONTROLLER, (), CERTIFICATE)
+    supervisor = hostile_supervisor(seed, canary)
     scenario = node_scenario(supervisor, seed, 60)
     compare(ros2_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
     assert not canary.exists()

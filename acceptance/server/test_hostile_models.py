@@ -48,7 +48,7 @@ class Server:
         return refused.value.code().name, reason_of(refused.value)
 
     def answers_another(self) -> None:
-        """Have a task of the other caller done, which nobody has asked for before."""
+        """Have a new task of the other caller done."""
         self._answered += 1
         request = small_request(TaskKind.SYNTHESIZE, _SMALL.format(self._answered))
         *_, last = self.synthesis.Synthesize(request, timeout=PATIENCE_S, **self.other)
@@ -98,7 +98,7 @@ def is_refused_while_others_are_answered(served: Server, text: str, ending: tupl
         assert refusal.result() == ending
         assert meanwhile
         served.answers_another()
-        # What a process had of memory is given back before it is gone.
+        # Memory of a process is given back before the process is gone.
         assert eventually(lambda: served.busy_workers() == [])
 
 
@@ -124,7 +124,7 @@ def test_who_takes_all_workers_keeps_nobody_waiting(tmp_path: Path) -> None:
         assert eventually(lambda: len(served.busy_workers()) == len(endless))
         for _ in range(3):
             served.answers_another()
-        # They are at it still: nobody was answered in their place.
+        # They are at it still: no other was answered in their place.
         assert len(served.busy_workers()) == len(endless)
         for call in endless:
             call.cancel()

@@ -1,4 +1,4 @@
-"""Calls by somebody who was given an address and nothing else, as with grpcurl."""
+"""Calls by a user who was given an address and nothing else, as with grpcurl."""
 
 import base64
 import hashlib
@@ -48,7 +48,7 @@ def test_a_supervisor_as_on_the_command_line(
     file = tmp_path_factory.mktemp("out") / "out.rsup"
     assert robosc(["synth", str(MODEL), "-o", str(file)]) == 0
     *reports, last = client.call(SYNTHESIS, "Synthesize", of_model(options={"deployment": "DEPLOYMENT_CONTROLLER"}))
-    # How many there are depends on how long it took.
+    # Their number depends on the time of the synthesis.
     assert all(report["progress"]["stage"] for report in reports)
     result = last["result"]
     assert result["status"] == "SYNTHESIS_STATUS_SUPERVISOR"

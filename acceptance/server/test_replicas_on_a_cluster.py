@@ -184,7 +184,7 @@ def test_a_server_is_killed_and_the_others_finish_its_jobs(site: Site, ours: Cli
         watched = [threads.submit(theirs.wait, job.id) for job in (long, *waiting)]
         process.kill()
         process.wait()
-        # Nobody works for it any more, and others take its jobs once they take it for dead.
+        # Its workers have ended, and others take its jobs once they take it for dead.
         assert eventually(lambda: not any(map(is_running, pids)))
         states = [theirs.get_job(job.id).state for job in (long, endless, *waiting)]
         assert states == [JobState.RUNNING] * 2 + [JobState.QUEUED] * len(waiting)

@@ -61,7 +61,7 @@ EXCHANGE_S = 0.02
 """Time between exchanges with the drive base: what OpenCR refreshes its registers at."""
 
 MOTOR_MARGIN_V = 0.5
-"""Voltage above the lowest supply of its motors at which somebody is warned, where the battery is not known."""
+"""Voltage above the lowest supply of its motors at which the bridge warns where the battery is not known."""
 
 RESTART_S = 3.0
 """After so long without a full revolution a LiDAR's motor is restarted, as its official driver does."""
@@ -89,7 +89,7 @@ _THREAD_LIMIT_S = 10.0
 
 
 class AssemblyError(BridgeError):
-    """A configuration asks for a part that cannot be made; the message names it."""
+    """A configuration has a part that cannot be made; the message names it."""
 
 
 def safety_limits(configuration: Configuration) -> SafetyLimits:
@@ -340,7 +340,7 @@ def _require_endpoints(configuration: Configuration, mapping: ChannelMapping) ->
         except (SecurityError, ValueError) as error:
             raise AssemblyError(f"view: {error}") from error
         if page.scene is not None:
-            # Where nobody wants one, nothing of the simulator is loaded.
+            # The simulator is imported only for a map that is wanted.
             from robosc_view.scene_map import scene_map
 
             try:

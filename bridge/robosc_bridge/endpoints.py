@@ -73,7 +73,7 @@ def is_remote(configuration: Configuration) -> bool:
 
 
 def is_startable(configuration: Configuration) -> bool:
-    """Return True if somebody can start the robot through an endpoint, and start it again."""
+    """Return True if an operator can start the robot through an endpoint, and start it again."""
     return is_remote(configuration) or configuration.view.address is not None
 
 
@@ -94,14 +94,14 @@ def make_endpoints(configuration: Configuration, operations: Operations, limits:
 
         endpoints.append(GroundLink(operations, ground))
     if configuration.remote.metrics_address is not None:
-        # Its modules are loaded only where somebody asks for them.
+        # Its modules are loaded only for a configured endpoint.
         from robosc_bridge.daemon.metrics import MetricsEndpoint
 
         is_open = configuration.remote.insecure_beyond_loopback
         endpoints.append(MetricsEndpoint(operations.feed, configuration.remote.metrics_address, is_open=is_open))
     page = view_settings(configuration)
     if page is not None:
-        # The page's modules are loaded only where somebody asks for the page.
+        # The page's modules are loaded only for a configured page.
         from robosc_view import ViewEndpoint
 
         endpoints.append(ViewEndpoint(operations, page))

@@ -76,5 +76,5 @@ def _seconds(text: str) -> float:
     return number
 
 
-# How argparse calls it in "invalid ... value".
+# Argparse prints the name in "invalid ... value".
 _seconds.__name__ = "number"

@@ -207,7 +207,7 @@ def _check(arguments: argparse.Namespace) -> int:
     loaded = load(arguments.config)
     deployment = arguments.deployment or Deployment.CONTROLLER
     mapping = map_channels(_model(arguments.model, deployment), loaded.configuration, loaded.document)
-    # What `run` asks, too, by `assemble`.
+    # The command `run` makes these checks, too, by `assemble`.
     check_settings(loaded.configuration, mapping, deployment)
     trusted_keys(loaded.configuration.supervisor.trusted_keys)
     sys.stdout.write(f"{arguments.config}: {len(mapping.communications)} communications are mapped\n")

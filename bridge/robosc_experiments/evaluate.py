@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 CONNECTIONS = ("serial", "ros2", "ros1")
 
 _FASTEST = 100.0
-# As a scene file has it; what that is read with takes too long to import for a command line.
+# The limit of scene files; their reader takes too long to import for a command line.
 _MOST_SEED = 2**31 - 1
 _MODULES = "robosc_experiments"
 
@@ -149,7 +149,7 @@ def _seed(text: str) -> int:
     return value
 
 
-# What argparse calls them.
+# Argparse prints these names.
 _seed.__name__ = f"whole number from 0 to {_MOST_SEED},"
 _speed.__name__ = f"number above 0, up to {_FASTEST:g},"
 
@@ -315,7 +315,7 @@ def reported(outcome: "Outcome", folder: Path) -> "ReportedRun":
         check = check_log(log, decode(outcome.supervisor.read_bytes()))
         sequence, page = outcome.folder / "sequence.png", outcome.folder / "sequence.html"
         for path in (sequence, page):
-            # As in the paper: what says nothing new would hide the rest.
+            # The paper leaves out repeated data, too, which would hide the rest.
             draw_sequence(log, path, only_changes=True, title=f"{outcome.name} over {outcome.connection}")
         map_ = _map(outcome)
     except (LogError, PlotError, InvalidSupervisorError, MotionError) as error:

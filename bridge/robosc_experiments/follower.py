@@ -26,7 +26,7 @@ CORRECTION, COMMAND = "/line/correction", "/cmd_vel"
 
 
 class Follower:
-    """Follower that asks for velocities along the last correction that it heard.
+    """Follower that requests velocities along the last correction that it heard.
 
     Args:
         speed_m_s: Speed forward, in m/s.
@@ -93,7 +93,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
         def end(number: int, frame: object) -> None:
             follower.end()
-            # In a thread of its own: gRPC's locks may be held by whom the signal has interrupted.
+            # The thread is a new one: the one that the signal has interrupted may hold gRPC's locks.
             threading.Thread(target=call.cancel, daemon=True).start()
 
         signal.signal(signal.SIGTERM, end)

@@ -157,7 +157,7 @@ class Program:
         self.stop()
 
     def _started(self, pipe: int | None) -> "subprocess.Popen[str]":
-        # What interrupts meanwhile does so when it is noted that the process is there.
+        # Interrupts wait until the process is noted.
         with self.log.open("w", encoding="utf-8") as log, _interrupts.held():
             try:
                 self._process = subprocess.Popen(  # noqa: S603 (our own programs)
@@ -280,12 +280,12 @@ class Program:
                 with suppress(subprocess.TimeoutExpired):
                     process.wait(STOP_LIMIT_S)
         finally:
-            # Also where somebody does not wait for it any longer.
+            # The same holds where its end is not awaited any longer.
             with suppress(ProcessLookupError):
                 os.killpg(process.pid, signal.SIGKILL)
             process.wait()
         if process.stdin is not None:
-            # What it has not read is nobody's any more.
+            # Input that it has not read is lost.
             with suppress(OSError):
                 process.stdin.close()
 

@@ -82,7 +82,7 @@ class Ros1(ros.Middleware):
                     if time.monotonic() > end_s:
                         raise ScenarioError(f"the master of ROS 1 does not answer:\n{master.output()}")
                     time.sleep(_POLL_S)
-                # Somebody else may have taken the port.
+                # Another program may have taken the port.
                 if master.status is None:
                     yield variables
                     return

@@ -34,7 +34,7 @@ class SimulatedCamera:
         path: Path of the socket.
         is_covered: True if something covers it: its pictures are black.
         is_frozen: True if it has stopped sending pictures.
-        sent: Pictures that have gone to somebody.
+        sent: Pictures that have gone to a client.
 
     Raises:
         OSError: There is something at `link` already, or no socket can be there.
@@ -51,7 +51,7 @@ class SimulatedCamera:
         self._period_s = 1.0 / mount.rate_hz
         self._due_s = self._time.now_s()
         self._lock = threading.RLock()
-        # What is still to be sent to each.
+        # Bytes that are still to be sent to each client.
         self._clients: dict[socket.socket, bytes] = {}
         self._listener: socket.socket | None = None
         self._folder: tempfile.TemporaryDirectory[str] | None = None
@@ -112,7 +112,7 @@ class SimulatedCamera:
             self._folder.cleanup()
 
     def _listen(self) -> None:
-        # What the system says of an address in use names no path.
+        # The system's message about an address in use names no path.
         if Path(self.path).exists(follow_symlinks=False):
             raise FileExistsError(f"there is something at {self.path} already")
         listener = socket.socket(socket.AF_UNIX, socket.SOCK_STREAM)
@@ -138,7 +138,7 @@ class SimulatedCamera:
                 poll.register(self._woken, select.POLLIN)
                 if self._listener is not None:
                     poll.register(self._listener, select.POLLIN)
-                # Without anybody who sees it, no picture is due.
+                # No picture is due without a client.
                 waits = self._time.is_manual or not self._clients
                 left_s = max(self._due_s - self._time.now_s(), 0.0)
             if self._woken in dict(poll.poll(None if waits else left_s * 1000)):

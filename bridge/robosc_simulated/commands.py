@@ -41,9 +41,9 @@ camera cover|uncover|freeze|go              the camera
 {world}"""
 
 
-# As much as a port takes at once.
+# A port takes at most so much at once.
 _MOST_GARBAGE = 4096
-# Of a remote control, in m/s or rad/s.
+# The fastest velocity of a remote control, in m/s or rad/s.
 _FASTEST = 100.0
 
 

@@ -92,7 +92,7 @@ class DatagramLine(Closing):
         try:
             data, self._host = self._socket.recvfrom(_DATAGRAM)
         except OSError:
-            # Nobody listens where it has sent to.
+            # The address that it has sent to has no listener.
             return
         if not self.faults.is_deaf:
             with self._time.lock:

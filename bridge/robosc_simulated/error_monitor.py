@@ -10,7 +10,7 @@ from typing import Self
 class ErrorMonitor:
     """Record of what goes wrong; use it as a context manager around all that has threads.
 
-    A thread that ends by an error that nobody expected would leave its device mute: as the last line of defence, the
+    A thread that ends by an unexpected error would leave its device mute: as the last line of defence, the
     error is reported, with its trace, and the program is to end.
 
     Attributes:

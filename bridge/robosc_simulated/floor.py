@@ -23,7 +23,7 @@ _MOST_CELLS = 25_000_000
 _LONGEST_M = 1000.0
 # Drawn at once; a piece is never parted.
 _COLUMNS_AT_ONCE = 500_000
-# Of a spline: short beside a line's width, few enough for any number of points.
+# Steps of a spline are short beside a line's width, and few for any number of points.
 _STEP_M = 0.01
 _STEP_SHARE = 0.05
 _MOST_STEPS = 50
@@ -140,7 +140,7 @@ def _interval(
     lengths = np.hypot(x2 - x1, y2 - y1)
     is_point = lengths == 0.0
     scale = np.where(is_point, 1.0, lengths)
-    # Of the upper tangent; the lower one's is opposite.
+    # Normal of the upper tangent; the lower one's is opposite.
     across, up = (y1 - y2) / scale * reach, np.where(is_point, 1.0, (x2 - x1) / scale) * reach
     slopes = np.divide(y2 - y1, x2 - x1, out=np.zeros_like(x1), where=x2 > x1)
     discs = [np.sqrt(np.maximum(reach**2 - (columns - middle) ** 2, 0.0)) for middle in (x1, x2)]

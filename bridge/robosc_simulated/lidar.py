@@ -80,7 +80,7 @@ class Lidar(ABC):
         self._starts_mid_frame = starts_mid_frame
         self._is_cut = False
         self._profile = world.profile
-        # When its motor began to rotate, and when it stalls next, until when.
+        # Time at which its motor began to rotate, and begin and end of its next stall.
         self._spun_s = -math.inf
         self._stalls_s = math.inf
         self._stalled_until_s = -math.inf
@@ -370,7 +370,7 @@ class Lds03(Lidar):
         count = self._samples()
         step = self._degrees_per_sample
         first, last = (_angle(self._degrees + place * step) for place in (0, count - 1))
-        # Where a host places them.
+        # Hosts place the samples at these angles.
         degrees = [(first + place * (last - first) / max(count - 1, 1)) / 64 for place in range(count)]
         kind = (round(self.revolutions_per_s * 10) << 1 | 1) & 0xFF if self._begins_revolution else 0
         self._degrees += count * step

@@ -18,7 +18,7 @@ from robosc_simulated.terminal_end import TerminalEnd
 from robosc_simulated.timebase import Timebase
 from robosc_simulated.virtual_host import VirtualHost
 
-# As much as the line discipline holds: what is beyond it waits deeper in the kernel, where no host can flush it, and
+# Size of the line discipline's buffer: bytes beyond it wait deeper in the kernel, where no host can flush them, and
 # would be old news for the next one that opens the port.
 _BUFFER = 4095
 # Bits of a byte on the wire, with a start and a stop bit.
@@ -157,7 +157,7 @@ class SimulatedLine(Closing):
         self._end = clock.new_end(link) if isinstance(clock, VirtualHost) else TerminalEnd(link)
         self.path = self._end.path
         self._wire: deque[tuple[float, bytes]] = deque()
-        # When the last byte has passed; when the adapter passes on what it has gathered, and how much that is.
+        # Time at which the last byte has passed; time at which the adapter passes on its batch, and the size of that.
         self._free_s = -math.inf
         self._batch_end_s = -math.inf
         self._gathered = 0
@@ -180,7 +180,7 @@ class SimulatedLine(Closing):
             return self.received >= received and not self._wire
 
     def disconnect(self) -> None:
-        """Pull the plug: the port is gone, and whoever has it open sees a hang-up."""
+        """Pull the plug: the port is gone, and a program that has it open sees a hang-up."""
         with self._time.lock:
             if not self._end.is_connected:
                 return
@@ -260,7 +260,7 @@ class SimulatedLine(Closing):
     def _look_at_the_host(self) -> None:
         """Report whether the host is behind.
 
-        Nobody waits for a host that has no use for this line, and reads nothing of it.
+        The world does not wait for a host that has no use for this line, and reads nothing of it.
         """
         unread = self._end.unread()
         self._is_used = self._is_used or unread < self._waiting
@@ -305,7 +305,7 @@ class SimulatedLine(Closing):
         if self._gathered < _USB_PACKET:
             self._wire.append((end_s, data))
             return
-        # What was gathered goes with what has made the packet full.
+        # The batch goes with the bytes that have made the packet full.
         self._wire = deque((min(at_s, due_s) if at_s == end_s else at_s, held) for at_s, held in self._wire)
         self._gathered %= _USB_PACKET
         full = len(data) - self._gathered

@@ -109,7 +109,7 @@ def outlined(samples: Sequence[Sample], radius_m: float) -> list[Sample]:
     Args:
         samples: Samples of the way; at least one.
         radius_m: Radius of the robot: two drawn robots are at least five radii apart along the way, and farther on a
-            long way, so that they can be told apart. The last one may be closer.
+            long way, so that they can be distinguished. The last one may be closer.
     """
     way_m, ways_m = 0.0, [0.0]
     for before, after in itertools.pairwise(samples):

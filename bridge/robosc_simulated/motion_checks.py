@@ -1,4 +1,4 @@
-"""Checks of whether a robot has moved as its scenario asks: its record against its scene, in sentences.
+"""Checks of whether a robot has moved as its scenario demands: its record against its scene, in sentences.
 
 The judges trust nothing but the scene and where the robot was: whether it has touched something is measured again
 from

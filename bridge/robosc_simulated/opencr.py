@@ -23,7 +23,7 @@ from robosc_simulated.world import World
 
 DEVICE_ID = 200
 CYCLE_S = 0.020
-# Where the world passes faster, so does what the board does to its motors, as far as a process can serve it.
+# The board's cycle is as much faster as the world is, as far as a process can serve it.
 _SHORTEST_CYCLE_S = 0.004
 HEARTBEAT_S = 0.500
 _RAW_PER_M_S = 1263.632956882
@@ -231,7 +231,7 @@ class OpenCr:
             self.panel.battery_v = voltage_v
             self._supply()
 
-    # As a device on a line.
+    # Methods of a device on a line.
 
     def plug_in(self) -> None:
         """Plug it in: it has its battery, and notices only missing bytes."""
@@ -384,7 +384,7 @@ class OpenCr:
         return tuple(servo for servo in self._servos if self._has_motors and servo.answers)
 
     def _is_missing_servo(self) -> bool:
-        """Return True if a servo that it asks does not answer."""
+        """Return True if a servo of its bus does not answer."""
         return self._has_motors and not all(servo.answers for servo in self._servos)
 
     def _cycle(self, began_s: float, now_s: float) -> None:
@@ -405,7 +405,7 @@ class OpenCr:
                 servo.instruction_received()
                 servo.catch_up()
                 raw = int(_within(wheel_m_s * _RAW_PER_M_S, _RAW_LIMIT))
-                # As in a SYNC WRITE: nobody hears of what the servo refuses.
+                # A refusal of the servo is not reported, as in a SYNC WRITE.
                 servo.write(104, raw.to_bytes(4, "little", signed=True))
         self._obey_buttons(now_s)
         if self._is_missing_servo():

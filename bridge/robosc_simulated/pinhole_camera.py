@@ -88,7 +88,7 @@ class PinholeCamera:
         shades = np.where(stands, np.uint8(scene.wall_shade), np.uint8(DISTANCE))
         is_floor, floor = self._has_floor, self._floor
         if stands.any():
-            # What is hidden needs no look at the floor.
+            # Hidden rays need no look at the floor.
             is_open = ~stands
             floor = floor[is_open[is_floor]]
             is_floor = is_floor & is_open

@@ -27,7 +27,7 @@ _VELOCITY_AND_TURN_RATE = 0x05E7
 _CHUNK = 50
 _UNKNOWN_CM = 65535
 _SECTORS = 72
-_RAYS = 9  # In each of them.
+_RAYS = 9  # The rays of each sector.
 _LEAST_CM, _MOST_CM = 5, 800
 _LOCAL_FRD, _BODY_FRD = 20, 12
 _HEARTBEAT, _SYS_STATUS = 0, 1
@@ -115,7 +115,7 @@ class Rover:
             # It has motors of its own, and cruises at half of their throttle (ArduPilot's CRUISE_THROTTLE).
             wheel.fastest_rad_s = 2 * cruise_m_s / world.body.wheel_radius_m
 
-    # What a person or the world does to it.
+    # Acts of people and of the world.
 
     def take_over(self, mode: int = MANUAL, linear_m_s: float = 0.0, angular_rad_s: float = 0.0) -> None:
         """An operator with a remote control changes the mode, and drives if it is MANUAL."""
@@ -143,7 +143,7 @@ class Rover:
             self._due_s = dict.fromkeys(self._first_s, self._began_s)
             self._drive()
 
-    # What its line asks of it.
+    # Methods of a device on a line.
 
     def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
         """Hear its host and answer."""
@@ -277,7 +277,7 @@ class Rover:
     def _telemetry(self, number: int) -> list[bytes]:
         boot_s = self._time.now_s() - self._began_s
         match number:
-            case 0:  # In the order of their numbers, as in `mavlink_packets.LAYOUTS`.
+            case 0:  # The order is that of numbers, as in `mavlink_packets.LAYOUTS`.
                 return [self._heartbeat()]
             case 1:
                 return [

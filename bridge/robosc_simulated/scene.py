@@ -30,8 +30,8 @@ from robosc_simulated.scene_file import (
 from robosc_simulated.textures import PLAIN, Texture
 from robosc_simulated.walls import CELL_M, Segment, Walls, open_maze
 
-# Of a cell: the robot's middle is out of the gap before it is there, and is there also where it rounds the
-# corner of the gap at once, 0.3 of a cell from it.
+# Share of a cell: the robot's middle is out of the gap before it is there, and is there also where it rounds the corner
+# of the gap at once, 0.3 of a cell from it.
 _GOAL_SHARE = 0.45
 _SEGMENT = "x1, y1, x2, y2"
 _FOLDER = Path(__file__).parent / "scenes"

@@ -21,7 +21,7 @@ WALL_HEIGHT_M, WALL_SHADE = 0.3, 130
 _Metres = Annotated[float, Meta(ge=-FARTHEST_M, le=FARTHEST_M)]
 _Seed = Annotated[int, Meta(ge=0, le=MOST_SEED)]
 _Point = tuple[_Metres, ...]
-# Where a text ends: Python's `$` takes a line feed after it.
+# Python's `$` would take a line feed after the end of a text.
 Name = Annotated[str, Meta(pattern=r"^[a-z][a-z0-9_-]{0,39}(?![\s\S])", title="box or box_2")]
 """Name of an obstacle, as it is given on standard input."""
 

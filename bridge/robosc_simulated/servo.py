@@ -103,7 +103,7 @@ class Servo:
             self.table[name] = value
         self._boot()
 
-    # What a test does to it.
+    # Acts of tests.
 
     def overheat(self, temperature_c: float | None = None) -> None:
         """Make the motor hot: by default 5 degrees above its limit."""
@@ -156,7 +156,7 @@ class Servo:
             self.catch_up()
             self._base_ticks += ticks - self._position()
 
-    # What its bus does with it.
+    # Methods for its bus.
 
     @property
     def device_id(self) -> int:

@@ -65,7 +65,7 @@ class ServoBus:
         return found
 
 
-# Who answers, as which ID, with which error and data.
+# The servo that answers, its ID, error and data.
 Answer = tuple[Servo, int, int, bytes]
 
 

@@ -21,9 +21,9 @@ BEAMS = 360
 
 _HALF = BEAMS // 2
 _PER_RAD = BEAMS / math.tau
-# Of a wall in line with the laser, in square metres.
+# Determinant of a wall in line with the laser, in square metres.
 _PARALLEL = 1e-12
-# In beams: who looks at the very end of a wall sees it, and never between two walls that meet.
+# Slack in beams: a beam at the very end of a wall meets it, and none passes between two walls that meet.
 _SLACK = 1e-9
 _ANGLES = np.arange(-_HALF, BEAMS + _HALF + 1) / _PER_RAD
 # From half a revolution on the right; twice around, since a wall may be across the place where the counting begins.

@@ -82,7 +82,7 @@ class TerminalEnd:
         self._master, self._slave = master, slave
 
     def disconnect(self) -> None:
-        """Let the port be gone: whoever has it open sees a hang-up."""
+        """Let the port be gone: a program that has it open sees a hang-up."""
         self._link.unlink(missing_ok=True)
         os.close(self._master)
         os.close(self._slave)

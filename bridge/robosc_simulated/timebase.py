@@ -22,7 +22,7 @@ _STEP_S = 0.005
 # A host that is silent for longer, by the clock, has ended, or has not begun.
 _AWAY_S = 1.0
 _SILENCE_S = 1.0
-# Who lives for so long at once is too slow for the world's factor.
+# A host that takes so long at once is too slow for the world's factor.
 _SLOW_S = 0.25
 
 

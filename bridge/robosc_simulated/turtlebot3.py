@@ -25,7 +25,7 @@ from robosc_simulated.walls import Walls, room
 from robosc_simulated.world import World
 
 BASES = ("opencr", "dynamixel", "mavlink-rover")
-# As the set-up of a TurtleBot3 leaves its motors.
+# The set-up of a TurtleBot3 leaves its motors in this mode.
 _VELOCITY_MODE = 1
 
 
@@ -187,7 +187,7 @@ class SimulatedTurtleBot3(Closing):
             batch_s: Time for which its adapter gathers bytes, in seconds.
         """
         there, here = self.profile.to_device, self.profile.to_host
-        # What is a part of a revolution or of an exchange stays one where the world passes faster.
+        # Parts of a revolution or of an exchange stay parts where the world passes faster.
         faults.batch_s, faults.has_wire_time = batch_s / self.time.factor, self.profile.has_wire_time
         faults.drop_share, faults.duplicate_share, faults.cut_share, faults.flip_share = (
             here.drop, here.duplicate, here.cut, here.flip,

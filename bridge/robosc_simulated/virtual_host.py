@@ -156,7 +156,7 @@ class VirtualHost(Closing):
         """Open a line over its network, which reaches this host alone, whatever an address says.
 
         Raises:
-            LineMissingError: Nobody serves there.
+            LineMissingError: The address has no server.
             LineBusyError: The port is in use.
         """
         return self._network.open(address)
@@ -178,7 +178,7 @@ class VirtualHost(Closing):
             thread.join(_END_S)
 
     def _pass_on(self, slot: _Slot) -> None:
-        """Give the processor to whoever's wait is over first, and wait for the own one."""
+        """Give the processor to the thread whose wait is over first, and wait for the own one."""
         following = self._next()
         if following is not slot:
             self._running = following
@@ -192,7 +192,7 @@ class VirtualHost(Closing):
 
     def _next(self) -> _Slot:
         for slot in self._waiting:
-            # Nobody is left waiting whose time is over, so that it can be stated of any run that it ends.
+            # Waiters whose time is over go first, so that every run can be shown to end.
             if slot.end_s <= self._now_s or slot.is_ready():
                 break
         else:

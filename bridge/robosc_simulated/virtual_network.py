@@ -33,7 +33,7 @@ class VirtualNetwork:
         """Open a line.
 
         Raises:
-            LineMissingError: Nobody serves there.
+            LineMissingError: The address has no server.
             LineBusyError: The port is in use.
         """
         scheme, port = address.partition(":")[0], int(address.rpartition(":")[2])
@@ -118,7 +118,7 @@ class _Datagrams(NetworkPort):
             self._peer = self._sender
 
     def write(self, data: bytes, limit_s: float = 0.1) -> None:
-        """Send a datagram; it is lost where nobody listens.
+        """Send a datagram; it is lost without a listener.
 
         Raises:
             LineLostError: It is closed.
@@ -138,7 +138,7 @@ class _Datagrams(NetworkPort):
             del self._network.datagrams[self._port]
 
     def _send(self, to: int, data: bytes) -> None:
-        # A listener hears everybody; who sends somewhere hears from there alone.
+        # A listener hears all senders; a sender hears the one that it sends to.
         end = self._network.datagrams.get(to)
         if end is not None and (end._is_listening or end._peer == self._port):
             end.came.append((self._port, data))

@@ -23,10 +23,10 @@ from robosc_simulated.timebase import Timebase
 from robosc_simulated.walls import Floats, Walls
 
 STEP_S = 0.005
-# What a motor can do at all, and how soon a wheel that nothing drives stands.
+# The motor's highest acceleration, and the deceleration of a wheel that is not driven.
 _STRONGEST_RAD_S2 = 150.0
 _FRICTION_RAD_S2 = 60.0
-# What is left of a change that is done at once, so that a wheel comes to a standstill.
+# A smaller remaining change is done at once, so that a wheel comes to a standstill.
 _NEAR_RAD_S = 0.003
 # A body that has left a wall by so much has left it; less is the same collision.
 _APART_M = 0.005
@@ -259,7 +259,7 @@ class World:
         self._clear_m = 0.0
 
     def watch(self, on_step: OnStep, on_event: OnWorldEvent) -> None:
-        """Notify somebody of every step and of what happens, under the lock of the time."""
+        """Notify an observer of every step and of what happens, under the lock of the time."""
         with self.time.lock:
             self._watchers.append((on_step, on_event))
 
@@ -314,7 +314,7 @@ class World:
         """Move, unless something is in the way; whether it has."""
         x_m, y_m = self.x_m + along_x_m, self.y_m + along_y_m
         radius_m = self.body.radius_m
-        # A distance changes by no more than the way that was gone: most often nobody has to measure.
+        # A distance changes by no more than the way that was gone: most often none is measured.
         self._clear_m -= abs(forward_m)
         if self._clear_m < radius_m + _APART_M:
             nearest_m, name = self._nearest(x_m, y_m)

@@ -15,7 +15,7 @@ from robosc_api.security import is_loopback_host, joined
 from robosc_api.security.addresses import split_address
 
 MAXIMUM_TOKEN = 200
-"""Characters of a token that somebody shows."""
+"""Characters of a token that a page shows."""
 
 
 class Access:

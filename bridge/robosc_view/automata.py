@@ -28,7 +28,7 @@ from robosc_view.reports import SourceKind
 
 MAXIMUM_EVENTS = 500
 MAXIMUM_AUTOMATA = 500
-"""Sizes beyond which there is no page: nobody could find anything on it."""
+"""Sizes beyond which there is no page: it would be useless."""
 
 MAXIMUM_DRAWN = 3_000
 """Edges of all automata that are laid out, which takes its time; automata after those are listed."""

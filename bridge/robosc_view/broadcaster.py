@@ -24,7 +24,7 @@ MAXIMUM_BYTES = 2 * 1024 * 1024
 """Maximum size of the entries that wait for a viewer, in bytes."""
 
 MAXIMUM_ANSWERS = 50
-"""Answers that wait for one who asks; the oldest are forgotten."""
+"""Answers that wait for one page; the oldest are forgotten."""
 
 UPDATE_S, SIGN_OF_LIFE_S = 0.05, 1.0
 """Least and longest time between two updates."""
@@ -145,7 +145,7 @@ class RobotCache:
         """Return the prepared robot."""
         async with self._lock:
             if self._kept is None or self._kept.robot != robot:
-                # In another thread, since the graphs of a large robot take their time.
+                # The graphs of a large robot take their time, in another thread.
                 self._kept = await asyncio.to_thread(PreparedRobot, robot)
             return self._kept
 
@@ -205,7 +205,7 @@ class Broadcaster:
         for task in tasks:
             task.cancel()
         await asyncio.gather(*tasks, return_exceptions=True)
-        # Whoever begins anew may have joined meanwhile.
+        # New pages may have joined meanwhile.
         if not self._tasks:
             self._builder = self._status = self._update = self._position = self._gone = None
 

@@ -15,6 +15,7 @@ from robosc.cli.output import CommandError, ExitCode, UsageError
 from robosc.pipeline.automata_files import SUFFIXES, is_automata
 
 if TYPE_CHECKING:
+    from robosc.certification import SynthesisOutcome
     from robosc.event_logs import LoggedRun
     from robosc.source import Bundle
     from robosc.supervisor import Supervisor
@@ -80,6 +81,12 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         metavar="FILE",
         help="with --log or --ros2: the model (.rscd), which is synthesized, or its supervisor (.rsup); without it the "
         "page of a node cannot show which requests are enabled. Alone it is the same as MODEL",
+    )
+    parser.add_argument(
+        "--counter-strategy",
+        action="store_true",
+        help="with MODEL, whose goals cannot be reached: let the surroundings play, so that they are never reached; "
+        "you choose requests, or wait",
     )
     add_given_supervisor_options(parser, "stands")
     scene = parser.add_argument(
@@ -223,6 +230,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise UsageError("--model goes with --log or --ros2, or alone: a bridge sends its model itself")
     if arguments.model is not None and is_automata(arguments.model):
         _refuse_for_automata(arguments)
+    if arguments.counter_strategy:
+        _refuse_beside_counter_strategy(arguments)
     if arguments.motion is not None and arguments.log is None:
         raise UsageError("--motion goes with --log")
     if arguments.namespace and not arguments.ros2:
@@ -236,8 +245,21 @@ def run(arguments: argparse.Namespace) -> int:
         raise CommandError(str(error), ExitCode.USAGE) from error
 
 
+def _refuse_beside_counter_strategy(arguments: argparse.Namespace) -> None:
+    """Do nothing if a robot's model is played with.
+
+    Raises:
+        UsageError: Something else is to be shown, or goals have no effect.
+    """
+    is_played = arguments.model is not None and not (arguments.bridge or arguments.ros2 or arguments.log)
+    if not is_played or is_automata(arguments.model) or arguments.model.suffix == ".rsup":
+        raise UsageError("--counter-strategy is for the model of a robot (MODEL), whose goals cannot be reached")
+    if arguments.deployment == "layer":
+        raise UsageError("--counter-strategy is for controllers: goals have no effect in a supervision layer")
+
+
 def _refuse_for_automata(arguments: argparse.Namespace) -> None:
-    """Do nothing if all that is asked for means something for automata.
+    """Do nothing if all options have a meaning for automata.
 
     Raises:
         UsageError: Something does not.
@@ -372,6 +394,8 @@ def _watched(arguments: argparse.Namespace, words: list[str]) -> "WatchedModel":
     outcome = synth.make(
         argparse.Namespace(**{**vars(arguments), "deployment": deployment}), bundle, allow_livelock=True
     )
+    if arguments.counter_strategy:
+        return _watched_denied(arguments, bundle, outcome)
     synth.report_problems(outcome, bundle)
     if outcome.supervisor is None:
         raise CommandError(f"there is no supervisor of {bundle.main.name}", ExitCode.FAILED)
@@ -394,6 +418,44 @@ def _watched(arguments: argparse.Namespace, words: list[str]) -> "WatchedModel":
         lambda: seen if text is not None else read_again_().digest,
         make,
     )
+
+
+def _watched_denied(arguments: argparse.Namespace, bundle: "Bundle", outcome: "SynthesisOutcome") -> "WatchedModel":
+    """Return the model that the surroundings play against, which looks at its files again and again.
+
+    Raises:
+        CommandError: The surroundings have no counter-strategy.
+    """
+    from robosc.certification import make_supervisor
+    from robosc.cli import synth
+    from robosc.cli.arguments import engine_options, read_bundle
+    from robosc.errors import RoboscError
+    from robosc_view.watched_model import (
+        NoSupervisorError,
+        SynthesizedModel,
+        WatchedModel,
+        denied_model,
+        synthesized_denied,
+    )
+
+    try:
+        first = denied_model(outcome, _whole_text(bundle))
+    except NoSupervisorError as error:
+        synth.report_problems(outcome, bundle)
+        raise CommandError(f"--counter-strategy: {error}", ExitCode.FAILED) from error
+
+    def read_again() -> "Bundle":
+        try:
+            return bundle if arguments.text is not None else read_bundle(arguments)
+        except (UsageError, RoboscError) as error:
+            raise NoSupervisorError(str(error)) from error
+
+    def made(should_stop: "Callable[[], bool]") -> SynthesizedModel:
+        present = read_again()
+        found = make_supervisor(present, engine=engine_options(arguments), allow_livelock=True, should_stop=should_stop)
+        return denied_model(found, _whole_text(present))
+
+    return WatchedModel(first, bundle.digest, lambda: read_again().digest, lambda: synthesized_denied(made))
 
 
 def _watched_automata(arguments: argparse.Namespace) -> "WatchedModel":

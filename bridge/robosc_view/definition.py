@@ -236,7 +236,7 @@ def definition_text(robot: Robot) -> str:
         "deployment": "automata" if robot.automata else "layer" if robot.is_layer else "controller",
         "source": str(robot.source),
         "can_command": robot.can_command,
-        # Whoever may be commanded wants the token of the server's start for it.
+        # Commands need the token of the server's start.
         "has_token": robot.can_command,
         "components": [
             {

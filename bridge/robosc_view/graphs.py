@@ -21,7 +21,7 @@ from typing import Any
 
 MAXIMUM_STATES = 150
 MAXIMUM_EDGES = 600
-"""A larger automaton is not drawn: nobody could read it."""
+"""A larger automaton is not drawn: it would be unreadable."""
 
 MAXIMUM_LABEL = 60
 """Characters of a label."""
@@ -285,7 +285,7 @@ class _Drawing:
         for node in self._nodes:
             loops = [item for item in self._loops if item.source == node.name]
             edges += [self._loop(item, by_name[node.name], row, len(loops)) for row, item in enumerate(loops)]
-        # In the model's order, whatever the shape.
+        # The model's order stays, whatever the shape.
         edges.sort(key=lambda edge: edge["id"])
         bottom = max(
             self._heights[box.layer] + max(box.height, STATE_HEIGHT) / 2 for box in self._boxes[: len(self._nodes)]

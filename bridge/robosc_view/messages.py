@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from robosc.execution.runtime.event_log import Entry, plain
 from robosc.explanation.blocked import RequestAvailability, Requests, StateError
+from robosc.pipeline.counter_run import CounterRun
 from robosc_view.definition import Robot, definition_text
 from robosc_view.reports import EventBatch, LaserScan, Notice, RunReport, Status
 
@@ -160,7 +161,7 @@ class MessageBuilder:
         return [event for event in events if event in known], disabled, warnings
 
     def _availability(self, status: Status) -> RequestAvailability | str:
-        """The requests judged; or why they cannot be, which is empty where nobody knows the supervisor."""
+        """The requests judged; or why they cannot be, which is empty where the supervisor is unknown."""
         if self._requests is None:
             return ""
         state = status.components, status.communications
@@ -304,6 +305,9 @@ def run_text(run: "ManualRun", entries: int, report: RunReport, beginning: int =
     """
     blocked = run.blocked()
     undone = run.undone
+    opposition = None
+    if isinstance(run, CounterRun):
+        opposition = {"goals": list(run.reached), "denied": run.denied, "assumptions": list(run.came_true)}
     return _text(
         {
             "type": "run",
@@ -317,6 +321,7 @@ def run_text(run: "ManualRun", entries: int, report: RunReport, beginning: int =
             "lines": list(report.lines),
             "choice": None if report.choice is None else asdict(report.choice),
             "beginning": beginning,
+            "opposition": opposition,
         }
     )
 

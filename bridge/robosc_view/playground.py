@@ -11,13 +11,15 @@ import binascii
 import time
 import zlib
 from collections import OrderedDict
-from collections.abc import Awaitable, Callable, Mapping
+from collections.abc import Awaitable, Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, cast
 
 from robosc.certification.supervisor_file import StateInWords
+from robosc.conditions.goals import goal_text
 from robosc.errors import RoboscError
+from robosc.pipeline.counter_run import CounterRun
 from robosc.pipeline.event_scripts import parse_event
 from robosc.pipeline.received_data import NO_DATA
 from robosc.pipeline.saved_runs import ModelOfTest, entries_of, event_log, pytest_module, state_by_component
@@ -32,7 +34,7 @@ from robosc_view.messages import TransitionTracker, run_text, saved_text
 from robosc_view.model_changes import model_changes
 from robosc_view.replay import LastTaken
 from robosc_view.reports import Choice, EventBatch, Notice, RunReport, SourceKind, Status
-from robosc_view.requests import Form, HistoryMove, LoadModel, Restart, Resume, RunCommand, Save, TakeEvent, Walk
+from robosc_view.requests import Form, HistoryMove, LoadModel, Restart, Resume, RunCommand, Save, TakeEvent, Wait, Walk
 from robosc_view.sources import RefusedError, ReplayCommand, Sink, not_replayed
 from robosc_view.watched_model import NoSupervisorError, SynthesizedModel, WatchedModel
 
@@ -50,6 +52,9 @@ MAXIMUM_TEXT = 1 << 20
 
 MAXIMUM_LINK = 8000
 """Characters of a link beyond which none is offered: browsers and messages cut longer ones."""
+
+MAXIMUM_ANSWERS = 5
+"""Events of the surroundings that one report names."""
 
 MAXIMUM_WAYS = 100
 """States to begin in, or that an event can lead to, which a page offers."""
@@ -153,7 +158,7 @@ class Playground:
         self._beginning = 0
 
     async def _begin(self, made: SynthesizedModel, beginning: int = 0) -> None:
-        # In another thread, since that of large automata takes its time.
+        # The graph of large automata takes its time, in another thread.
         self._run, self._edges = await asyncio.to_thread(_run_of, made, beginning)
         self._made, self._beginning, self._is_begun = made, beginning, True
         # The steps that were reported, and the entries of each.
@@ -214,7 +219,7 @@ class Playground:
         match command:
             case TakeEvent(line=line, way=way):
                 self._require_room(1)
-                before = run.state
+                before, count = run.state, len(run)
                 step = await asyncio.to_thread(self._happened, line, way)
                 if isinstance(step, RunReport):
                     await self._show(sink, step)
@@ -222,9 +227,17 @@ class Playground:
                 sentences = [*step.unknown, *(f"{name} keeps its value, since what it was to take is unknown"
                                          for name in step.skipped)]  # fmt: skip
                 changes = changes_text(before, step.state) or "nothing has changed"
-                await self._show(
-                    sink, RunReport("unknown" if sentences else "step", (f"{event_text(step)}: {changes}", *sentences))
-                )
+                kind = "unknown" if sentences else "step"
+                if isinstance(run, CounterRun):
+                    sentences += _answer_texts(run, run.history[count + 1 :])
+                await self._show(sink, RunReport(kind, (f"{event_text(step)}: {changes}", *sentences)))
+            case Wait() if isinstance(run, CounterRun):
+                self._require_room(1)
+                answers = await asyncio.to_thread(run.wait)
+                sentences = [*_answer_texts(run, answers)] or ["the surroundings wait, too"]
+                await self._show(sink, RunReport("step", ("you wait", *sentences)))
+            case Wait():
+                raise RefusedError("waiting is for a run against the surroundings")
             case HistoryMove.UNDO:
                 step_back = run.undo()
                 await self._show(sink, RunReport("step", (f"taken back: {step_back.event}",) if step_back else ()))
@@ -332,7 +345,10 @@ class Playground:
         """Take the events of a run again, as far as they can happen; returns what is in their way."""
         for number, step in enumerate(history):
             try:
-                self._repeat_step(step)
+                if isinstance(self._run, CounterRun):
+                    _repeat_turn(self._run, step, number)
+                else:
+                    self._repeat_step(step)
             except RoboscError as error:
                 return (f"of {len(history)} events {number} happened again: {error}",)
         return ()
@@ -428,8 +444,34 @@ class Playground:
         return found
 
 
+def _answer_texts(run: CounterRun, steps: Sequence[Step]) -> list[str]:
+    """Return what the executor and the surroundings did, in sentences; of many only the first."""
+    found = [f"the {run.actor(step.event)}: {event_text(step)}" for step in steps[:MAXIMUM_ANSWERS]]
+    more = len(steps) - len(found)
+    return [*found, *([f"and {more} events more"] if more > 0 else [])]
+
+
+def _repeat_turn(run: CounterRun, step: Step, number: int) -> None:
+    """Take the turn of a run against the surroundings again that has led to a step.
+
+    Args:
+        run: The run.
+        step: The step.
+        number: Number of the steps before it.
+    """
+    # The surroundings may have answered waits, which no history tells.
+    for _ in range(len(run.came_true) + 1):
+        if len(run) >= number + (run.actor(step.event) != "you"):
+            break
+        run.wait()
+    if run.actor(step.event) == "you":
+        run.step(step.event)
+
+
 def _run_of(made: SynthesizedModel, beginning: int) -> tuple[Run | SystemRun, EdgesTaken | None]:
     """Return a run of a model; for automata, also the object that finds the edges which its events take."""
+    if made.denied is not None:
+        return CounterRun(made.denied), None
     if not isinstance(made.supervisor, SystemSupervisor):
         return Run(made.supervisor), None
     parts = made.beginnings[beginning].parts
@@ -440,13 +482,14 @@ def playable(made: SynthesizedModel, scene: Any = None) -> Robot:
     """Return the robot of a model that is stepped by hand."""
     play: dict[str, Any] = {
         "language": made.language,
+        "goals": (),
         "link": None if made.text is None else packed(made.text),
         # A single state to begin in is nothing to choose.
         "beginnings": distinguishing_parts(made.beginnings)[:MAXIMUM_WAYS] if len(made.beginnings) > 1 else (),
     }
     if isinstance(made.supervisor, SystemSupervisor):
         return robot_of_automata(made.supervisor, {**play, "forms": ()})
-    run = Run(made.supervisor)
+    run = Run(made.supervisor) if made.denied is None else CounterRun(made.denied)
     events = [
         {
             "event": event,
@@ -456,4 +499,8 @@ def playable(made: SynthesizedModel, scene: Any = None) -> Robot:
         for event in run.events
     ]
     play |= {"events": events, "forms": tuple(Form)}
+    if made.denied is not None:
+        # A link, and a test, would load the model, which has no supervisor.
+        goals = [f"goal {goal_text(item)}" for item in run.supervisor.model.goals]
+        play |= {"forms": (Form.LOG,), "link": None, "goals": goals}
     return robot_of(made.supervisor, SourceKind.MODEL, version="", can_command=False, scene=scene, play=play)

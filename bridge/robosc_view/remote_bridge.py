@@ -95,7 +95,7 @@ class RemoteBridge:
         """
         try:
             if command is OperatorCommand.STOP:
-                # It is sent, whether or not anybody waits for the answer.
+                # The command is sent, whether or not its answer is awaited.
                 await asyncio.shield(self._stop())
             else:
                 await self._asked(lambda client: client.request(RequestedCommand(str(command))))
@@ -150,7 +150,7 @@ class RemoteBridge:
 
 
 def _background_task[Found](work: Coroutine[Any, Any, Found]) -> asyncio.Task[Found]:
-    """Work that is begun now and goes on, whoever waits for it; what becomes of it need not be asked for."""
+    """Work that is begun now and goes on even if its result is not awaited."""
     task = asyncio.Task(work, loop=asyncio.get_running_loop(), eager_start=True)
     task.add_done_callback(lambda done: done.cancelled() or done.exception())
     return task
@@ -210,7 +210,7 @@ class _Watch:
         # Ends what the thread waits for.
         self._client.close()
         if self._next.done() and not self._next.cancelled():
-            self._next.exception()  # Nobody waits for it any more.
+            self._next.exception()  # Its result is awaited no more.
 
     def _run(self) -> None:
         why: Exception = SourceLostError("the bridge has ended the stream")

@@ -116,7 +116,7 @@ class LastTaken:
     """
 
     def __init__(self, tracker: TransitionTracker, documents: Iterable[Mapping[str, Any]]) -> None:
-        # How many entries there are after which a component has taken something, and what.
+        # Numbers of entries after which a component has taken transitions, and these transitions.
         self._taken: dict[str, tuple[list[int], list[int]]] = {}
         self._begins = [0]
         tracker.begin({})

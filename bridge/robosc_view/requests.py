@@ -67,6 +67,11 @@ class TakeEvent:
     way: int | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class Wait:
+    """Request nothing, in a run against the surroundings."""
+
+
 class HistoryMove(StrEnum):
     """Move in a run that is stepped by hand."""
 
@@ -144,7 +149,7 @@ class Resume:
     page: str
 
 
-RunCommand = TakeEvent | HistoryMove | Restart | Walk | Save | LoadModel | Resume
+RunCommand = TakeEvent | Wait | HistoryMove | Restart | Walk | Save | LoadModel | Resume
 
 
 @runtime_checkable
@@ -191,6 +196,8 @@ def parse_request(text: str) -> PageRequest:
             return Pause()
         case "event":
             return TakeEvent(_text(document, "line"), _choice(document, "way"))
+        case "wait":
+            return Wait()
         case "undo" | "redo" as name:
             return HistoryMove(name)
         case "restart":

@@ -185,7 +185,7 @@ class _Step:
 
 
 def _steps(robot: Robot) -> dict[int, _Step]:
-    # With the model the names of silent steps are known.
+    # The model gives the names of silent steps.
     names = {
         number: event for event, parts in robot.table.items() for states in parts.values() for number in states.values()
     }
@@ -400,7 +400,7 @@ class _Listener:
         from std_msgs.msg import String
 
         context = rclpy.context.Context()
-        # Without handlers of its own: signals are for whoever serves the page.
+        # Signals belong to the process that serves the page, so rclpy installs no handlers.
         rclpy.init(args=[], context=context, signal_handler_options=SignalHandlerOptions.NO)
         try:
             node = rclpy.create_node(f"robosc_view_{os.getpid()}_{next(_numbers)}", context=context)

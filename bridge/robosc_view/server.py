@@ -60,7 +60,7 @@ REQUESTS_A_S, BURST = 20.0, 60
 """Maximum requests of one page per second, and at once, besides stops; a page that sends more is cut off."""
 
 REQUEST_LIMIT_S = 10.0
-"""For a request to be sent, and for a WebSocket to be asked for."""
+"""Time for a request to be sent, and for a WebSocket to be opened."""
 
 SEND_LIMIT_S = 30.0
 """A page that has no room for its next message for so long is cut off."""
@@ -203,7 +203,7 @@ class ViewServer:
 
     def _connected(self) -> asyncio.Protocol:
         """A protocol for one more connection, or one that ends it at once."""
-        assert self._runner is not None  # noqa: S101  # Nobody connects before `start`.
+        assert self._runner is not None  # noqa: S101  # Connections come only after `start`.
         server = self._runner.server
         # Those that were accepted just now are no connections of the server's yet.
         if server is None:
@@ -218,7 +218,7 @@ class ViewServer:
         return handler
 
     async def _sweep_up(self) -> None:
-        """End connections on which nothing is asked for."""
+        """End connections without a request."""
         loop = asyncio.get_running_loop()
         while True:
             await asyncio.sleep(_SWEEP_S)
@@ -231,7 +231,7 @@ class ViewServer:
                     del self._ending[handler]
 
     def _cut_off(self, handler: Any) -> None:
-        """End a connection on which nothing was asked for."""
+        """End a connection without a request."""
         del self._silent[handler]
         handler.force_close()
         if handler.transport is None:
@@ -406,7 +406,7 @@ class _Session:
             task.cancel()
 
     def _take(self, text: str) -> bool:
-        """Begin what is asked for; False: it asks for too much."""
+        """Begin what a message requests; False: the page requests too much."""
         try:
             wanted = parse_request(text)
         except RefusedError as error:

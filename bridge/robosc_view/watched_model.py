@@ -11,14 +11,17 @@ import hashlib
 import pickle
 import sys
 import tempfile
+import threading
 from collections.abc import AsyncIterator, Awaitable, Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import msgspec
 
+from robosc.certification import SynthesisOutcome
+from robosc.certification.goals import GoalExplanation
 from robosc.certification.supervisor_file import StateInWords
-from robosc.errors import RoboscError
+from robosc.errors import RoboscError, Severity
 from robosc.pipeline.systems import SystemSupervisor
 from robosc.supervisor import Supervisor, decode
 from robosc_view.requests import ROBOSC
@@ -41,6 +44,7 @@ class SynthesizedModel:
         text: Text of the model, if it is complete without libraries.
         language: Language of the text: `rscd`, or for automata the ending of their files.
         beginnings: Initial states of automata.
+        denied: Explanation why the goals cannot be reached, where the surroundings play against a person.
     """
 
     supervisor: Supervisor | SystemSupervisor
@@ -48,6 +52,7 @@ class SynthesizedModel:
     text: str | None = None
     language: str = ROBOSC
     beginnings: tuple[StateInWords, ...] = ()
+    denied: GoalExplanation | None = None
 
 
 class WatchedModel:
@@ -133,7 +138,7 @@ class WatchedModel:
 
 
 async def _ended(making: "asyncio.Task[SynthesizedModel] | asyncio.Task[None] | None") -> None:
-    """End a synthesis, or a watch, that nobody wants any more."""
+    """End a synthesis, or a watch, that has become useless."""
     if making is not None:
         making.cancel()
         await asyncio.gather(making, return_exceptions=True)
@@ -172,6 +177,44 @@ async def synthesized(words: Sequence[str], text: str | None = None) -> Synthesi
             raise NoSupervisorError(_reason(output, errors))
         failure = msgspec.json.decode(output, type=_FailureOutput)
         return SynthesizedModel(read(made), tuple(map(str, failure.diagnostics)), text)
+
+
+def denied_model(outcome: SynthesisOutcome, text: str | None) -> SynthesizedModel:
+    """Return the model of a synthesis whose goals cannot be reached, to be played against the surroundings.
+
+    Args:
+        outcome: Outcome of the synthesis.
+        text: Text of the model, if it is complete without libraries.
+
+    Raises:
+        NoSupervisorError: There is no counter-strategy.
+    """
+    goals = outcome.goals
+    findings = tuple(finding_text(item.severity, item.message, item.code) for item in outcome.diagnostics)
+    if goals is None:
+        errors = [item.message for item in outcome.diagnostics if item.severity is Severity.ERROR]
+        raise NoSupervisorError(outcome.reason or (errors or ["the surroundings have no counter-strategy"])[0])
+    if goals.counter is None:
+        raise NoSupervisorError("the counter-strategy of the surroundings is too large to be played")
+    return SynthesizedModel(goals.supervisor, findings, text, denied=goals)
+
+
+async def synthesized_denied(make: Callable[[Callable[[], bool]], SynthesizedModel]) -> SynthesizedModel:
+    """Return the model that a function makes in a thread; cancelling this ends its work.
+
+    Args:
+        make: Function that makes the model; it asks the function that it is given whether to stop.
+
+    Raises:
+        NoSupervisorError: There is no counter-strategy.
+    """
+    stop = threading.Event()
+    try:
+        return await asyncio.to_thread(make, stop.is_set)
+    except RoboscError as error:
+        raise NoSupervisorError(str(error)) from error
+    finally:
+        stop.set()
 
 
 async def synthesized_automata(arguments: argparse.Namespace, text: str | None = None) -> SynthesizedModel:

@@ -119,7 +119,7 @@ class AsyncClient:
         self._is_closed = True
         await self._channel.close()
 
-    # As in `Client`, line by line: the methods are made by other functions, and type checkers read them here.
+    # The methods are those of `Client`, line by line: other functions make them, and type checkers read them here.
     check = _unary_method(operations.check)
     synthesize = _unary_method(operations.synthesize)
     generate = _unary_method(operations.generate)

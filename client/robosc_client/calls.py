@@ -139,7 +139,7 @@ def job_reader(job_id: str) -> Callable[[Any], Job]:
 
 
 class JobPages:
-    """Pages of jobs, as they are asked for."""
+    """Pages of jobs, each requested on first use."""
 
     def __init__(
         self,

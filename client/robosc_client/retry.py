@@ -27,7 +27,7 @@ from robosc_client.errors import (
 _CLOCK_TOLERANCE_S = 0.05
 
 _LOST = frozenset({grpc.StatusCode.UNAVAILABLE, grpc.StatusCode.CANCELLED})
-"""Codes of calls that nobody has answered. A client never retries a call that its own program has cancelled, so any
+"""Codes of calls that no server has answered. A client never retries a call that its own program has cancelled, so any
 CANCELLED here comes from the other end: gRPC cancels calls of an overloaded server before the server sees them."""
 
 _BUSY = frozenset({"SERVER_BUSY", "QUOTA_EXCEEDED"})

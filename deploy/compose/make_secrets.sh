@@ -31,7 +31,7 @@ if [ ! -e server/tls_key ]; then
         -addext "subjectAltName=$kind:$name" -keyout server/tls_key -out server/tls_certificate 2>/dev/null
 fi
 if [ ! -e server/tokens ]; then
-    # As `robosc-server token` makes it.
+    # The token has the form of those of `robosc-server token`.
     token=robosc_$(openssl rand -base64 32 | tr '+/' '-_' | tr -d '=')
     digest=$(printf '%s' "$token" | openssl dgst -sha256 -r | cut -d ' ' -f 1)
     printf '%s\n' "$token" > first_token

@@ -11,7 +11,7 @@ FROM ${BUILD_IMAGE} AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_NO_INPUT=1
 WORKDIR /build
 COPY deploy/requirements-build.txt deploy/requirements-bridge.txt ./
-# Everything that is installed is locked by its hash, what builds it, too; no requirement of a package is followed.
+# All packages, also those that build others, are locked by their hashes; no requirement of a package is followed.
 RUN python -m venv /build/venv \
     && /build/venv/bin/pip install --no-deps --require-hashes --only-binary :all: -r requirements-build.txt \
     && /build/venv/bin/pip wheel --no-deps --require-hashes --no-build-isolation -r requirements-bridge.txt -w wheels \
@@ -36,10 +36,10 @@ RUN install -d -o 10001 -g 10001 -m 0700 /var/lib/robosc-bridge
 COPY --from=build /opt/robosc /opt/robosc
 ENV PATH=/opt/robosc/bin:$PATH \
     PYTHONDONTWRITEBYTECODE=1
-# Whoever starts it adds the group that the serial lines belong to on the robot (--group-add).
+# The command that starts it adds the group that the serial lines belong to on the robot (--group-add).
 USER 10001:10001
 WORKDIR /var/lib/robosc-bridge
-# What a synthesis server made last; the root may be read-only.
+# The last supervisor of a synthesis server is kept here; the root may be read-only.
 VOLUME ["/var/lib/robosc-bridge"]
 EXPOSE 50061
 STOPSIGNAL SIGTERM

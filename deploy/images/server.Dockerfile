@@ -12,7 +12,7 @@ FROM ${BUILD_IMAGE} AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1 PIP_NO_INPUT=1
 WORKDIR /build
 COPY deploy/requirements-build.txt deploy/requirements-server.txt ./
-# Everything that is installed is locked by its hash, what builds it, too; no requirement of a package is followed.
+# All packages, also those that build others, are locked by their hashes; no requirement of a package is followed.
 RUN python -m venv /build/venv \
     && /build/venv/bin/pip install --no-deps --require-hashes --only-binary :all: -r requirements-build.txt \
     && /build/venv/bin/pip wheel --no-deps --require-hashes --no-build-isolation -r requirements-server.txt -w wheels \
@@ -35,8 +35,8 @@ LABEL org.opencontainers.image.title="RoboSC synthesis server" \
     org.opencontainers.image.licenses="MIT"
 RUN install -d -o 10001 -g 10001 -m 0700 /var/lib/robosc
 COPY --from=build /opt/robosc /opt/robosc
-# Where other machines reach it, it wants TLS: ROBOSC_SERVER_TLS_CERTIFICATE and ROBOSC_SERVER_TLS_KEY, or the word that
-# the network is trusted.
+# A server that other machines reach wants TLS, ROBOSC_SERVER_TLS_CERTIFICATE and ROBOSC_SERVER_TLS_KEY, or the word
+# that the network is trusted.
 ENV PATH=/opt/robosc/bin:$PATH \
     PYTHONDONTWRITEBYTECODE=1 \
     ROBOSC_SERVER_HOST=0.0.0.0 \

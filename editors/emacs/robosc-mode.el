@@ -41,6 +41,18 @@
     ("\\_<\\(leads\\)[ \t]+to\\_>" 1 'font-lock-keyword-face))
   "Words of goals and assumptions, where they are no names.")
 
+(defconst robosc-mode-mission-words
+  '(("^[ \t]*\\(mission\\)[ \t]+\\^?[a-zA-Z_][a-zA-Z_0-9]*[ \t]*\\(?:{\\|while\\_>\\|$\\)" 1 'font-lock-keyword-face)
+    ("^[ \t]*\\(?:mission[ \t]+\\^?[a-zA-Z_][a-zA-Z_0-9]*[ \t]+\\)?\\(while\\)[ \t]+[a-zA-Z_0-9(!^-]"
+     1 'font-lock-keyword-face)
+    ("\\(?:^\\|{\\|\\_<anywhere[ \t]\\)[ \t]*\\(visit\\)[ \t]+[a-zA-Z_0-9(!^-]" 1 'font-lock-keyword-face)
+    ("\\_<from[ \t]+\\(anywhere\\)[ \t]*\\(?:visit\\_>\\|$\\)" 1 'font-lock-keyword-face)
+    ("^[ \t]*\\(prefer\\)[ \t]+\\(?:{\\|\\^?[a-zA-Z_][a-zA-Z_0-9]*[ \t]*\\(?:over\\_>\\|$\\)\\)"
+     1 'font-lock-keyword-face)
+    ("^[ \t]*\\(?:prefer[ \t]+\\(?:{[^}\n]*}\\|\\^?[a-zA-Z_][a-zA-Z_0-9]*\\)[ \t]+\\)?\\(over\\)[ \t]+[a-zA-Z_{^]"
+     1 'font-lock-keyword-face))
+  "Words of missions and preferences, where they are no names.")
+
 (defconst robosc-mode-indentation 4 "Columns for each brace, as `eglot-format' has them.")
 
 (defun robosc-mode-indent-line ()
@@ -61,7 +73,7 @@
   (setq-local indent-tabs-mode nil)
   (setq-local indent-line-function #'robosc-mode-indent-line)
   (setq-local electric-indent-chars (append ")]}" electric-indent-chars))
-  (setq-local font-lock-defaults `(((,robosc-mode-keywords 0 'font-lock-keyword-face) ,@robosc-mode-goal-words))))
+  (setq-local font-lock-defaults `(((,robosc-mode-keywords 0 'font-lock-keyword-face) ,@robosc-mode-goal-words ,@robosc-mode-mission-words))))
 
 ;;;###autoload
 (add-to-list 'auto-mode-alist '("\\.rscd\\'" . robosc-mode))

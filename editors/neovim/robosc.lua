@@ -82,7 +82,7 @@ local function attach(file)
   end
 end
 
--- There is one style, of whole files: `gq` formats all of it, wherever it stands.
+-- The style is one of whole files: `gq` formats all of it, wherever it stands.
 function _G.robosc_formatexpr()
   if vim.fn.mode():find("[iR]") then
     return 1 -- A line that is typed has become too long: that is Neovim's own work.

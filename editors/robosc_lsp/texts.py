@@ -54,7 +54,8 @@ class Text:
         begin = self._starts[position.line]
         length = len(self._line(position.line))
         units = range(min(position.character, length) + 1)
-        # As many characters as units at most: the first whose units reach so far, or else the end of the line.
+        # The characters are as many as the units at most: the first whose units reach so far, or else the end of the
+        # line.
         taken = self._taken(begin)
         found = bisect_left(units, position.character, key=lambda count: count + self._taken(begin + count) - taken)
         return begin + min(found, length)

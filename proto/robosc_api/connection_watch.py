@@ -29,12 +29,15 @@ import time
 from collections import Counter
 from collections.abc import AsyncIterator, Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from enum import StrEnum
+from functools import lru_cache
 from pathlib import Path
 from types import TracebackType
 from typing import Any, NamedTuple, Self
 from urllib.parse import unquote
 
-from robosc_api.layers import Layer, behaviour_of, with_behaviour
+from robosc_api.layers import Layer, behaviour_of, when_call_ends, with_behaviour
+from robosc_api.peers import peer_of
 
 _log = logging.getLogger(__name__)
 
@@ -53,8 +56,11 @@ _ANSWER_BYTES = 50
 _REFUSED_BYTES = 96 * 2**10
 """Bytes that a call may bring whose request is refused: a window of HTTP/2, and headers."""
 
-LOOK_S = 0.05
-"""Shortest time between two looks, in seconds."""
+MEMORY_LOOK_S = 0.05
+"""Time between two looks at this process's memory, in seconds."""
+
+LOOK_S = 0.1
+"""Shortest time between two looks at connections, in seconds, unless memory grows."""
 
 ALERT_LOOK_S = 0.01
 """The same after a flood."""
@@ -75,6 +81,16 @@ _TRIM = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linu
 
 type Peer = tuple[str, int]
 """Address and port of the other end of a connection."""
+
+
+class CloseReason(StrEnum):
+    """Reason why a connection was closed, as a sentence; its name is that in metrics."""
+
+    RESETS = "its calls are reset before their requests"
+    BYTES = "it sends bytes and no requests"
+    BYTES_TOGETHER = "connections together send too many bytes and no requests"
+    SILENCE = "no request arrives on it"
+    UNUSED = "there are too many connections, and it is not used"
 
 
 class Traffic(NamedTuple):
@@ -182,7 +198,7 @@ class Ledger:
         self._suspect_until_s: dict[str, float] = {}
         self._last_s: float | None = None
 
-    def look(self, traffic: Mapping[Peer, Traffic], calls: CallsSince[Peer], now_s: float) -> dict[Peer, str]:
+    def look(self, traffic: Mapping[Peer, Traffic], calls: CallsSince[Peer], now_s: float) -> dict[Peer, CloseReason]:
         """Return the connections to close, with the reason.
 
         Args:
@@ -218,16 +234,17 @@ class Ledger:
         """True if some host is suspect."""
         return bool(self._suspect_until_s)
 
-    def _flooding(self, open_calls: Mapping[Peer, int], now_s: float) -> dict[Peer, str]:
+    def _flooding(self, open_calls: Mapping[Peer, int], now_s: float) -> dict[Peer, CloseReason]:
         """Connections that have received more than requests can have, the worst first."""
-        limits, closed, suspects = self._limits, {}, self._suspect_until_s
+        limits, suspects = self._limits, self._suspect_until_s
+        closed: dict[Peer, CloseReason] = {}
         for host in [host for host, until_s in suspects.items() if until_s <= now_s]:
             del suspects[host]
         total = 0.0
         for peer, account in self._accounts.items():
             total += account.unasked
             if account.owed > limits.resets:
-                closed[peer] = "its calls are reset before their requests"
+                closed[peer] = CloseReason.RESETS
                 total -= account.unasked
                 continue
             if account.unasked <= limits.slack_bytes:
@@ -235,12 +252,12 @@ class Ledger:
             # One request may be on its way before its call has begun.
             requests = open_calls.get(peer, 0) + (account.asked_s is not None or peer[0] not in suspects)
             if account.unasked > limits.slack_bytes + requests * limits.request_bytes:
-                closed[peer] = "it sends bytes and no requests"
+                closed[peer] = CloseReason.BYTES
                 total -= account.unasked
         if total > limits.unasked_bytes:
             for peer, account in sorted(self._accounts.items(), key=lambda item: -item[1].unasked):
                 if peer not in closed:
-                    closed[peer] = "connections together send too many bytes and no requests"
+                    closed[peer] = CloseReason.BYTES_TOGETHER
                     total -= account.unasked
                     if total <= limits.unasked_bytes / 2:
                         break
@@ -248,16 +265,16 @@ class Ledger:
             suspects[host] = now_s + limits.suspicion_s
         return closed
 
-    def _silent(self, open_calls: Mapping[Peer, int], now_s: float) -> dict[Peer, str]:
+    def _silent(self, open_calls: Mapping[Peer, int], now_s: float) -> dict[Peer, CloseReason]:
         """Connections on which no request has arrived in time."""
         latest_s = now_s - self._limits.first_request_s
         return {
-            peer: "no request arrives on it"
+            peer: CloseReason.SILENCE
             for peer, account in self._accounts.items()
             if account.asked_s is None and account.since_s <= latest_s and not open_calls.get(peer)
         }
 
-    def _unused(self, open_calls: Mapping[Peer, int], closed: Mapping[Peer, str]) -> dict[Peer, str]:
+    def _unused(self, open_calls: Mapping[Peer, int], closed: Mapping[Peer, str]) -> dict[Peer, CloseReason]:
         """Connections that give way to others: of the hosts with the most, those without a call for the longest."""
         left = self._accounts.keys() - closed.keys()
         excess = len(left) - self._limits.connections * 3 // 4
@@ -272,10 +289,10 @@ class Ledger:
             free = sorted((peer for peer in peers if not open_calls.get(peer)), key=self._use, reverse=True)
             if free:
                 unused[host] = free
-        found: dict[Peer, str] = {}
+        found: dict[Peer, CloseReason] = {}
         while unused and len(found) < excess:
             host = max(unused, key=lambda name: sizes[name])
-            found[unused[host].pop()] = "there are too many connections, and it is not used"
+            found[unused[host].pop()] = CloseReason.UNUSED
             sizes[host] -= 1
             if not unused[host]:
                 del unused[host]
@@ -308,11 +325,11 @@ class Arrivals(Layer):
         behaviour = behaviour_of(inner)
 
         def noted(request: Any, context: Any) -> Any:
-            self._arrived.add(context.peer())
+            self._arrived.add(peer_of(context))
             return behaviour(request, context)
 
         def noted_each(requests: Any, context: Any) -> Any:
-            return behaviour(self._each(requests, context.peer()), context)
+            return behaviour(self._each(requests, peer_of(context)), context)
 
         return with_behaviour(inner, noted_each if inner.request_streaming else noted)
 
@@ -359,7 +376,7 @@ class CallsByConnection(Layer):
     calls notes them itself.
 
     Args:
-        arrivals: Layer that is told.
+        arrivals: Layer that is notified.
     """
 
     def __init__(self, arrivals: Arrivals) -> None:
@@ -371,9 +388,9 @@ class CallsByConnection(Layer):
         behaviour, arrivals, is_check = behaviour_of(inner), self._arrivals, is_health_check(method)
 
         def noted(request: Any, context: Any) -> Any:
-            peer = context.peer()
+            peer = peer_of(context)
             arrivals.begun(peer)
-            context.add_done_callback(lambda _: arrivals.ended(peer, is_check=is_check))
+            when_call_ends(lambda _: arrivals.ended(peer, is_check=is_check))
             return behaviour(request, context)
 
         return with_behaviour(inner, noted)
@@ -390,6 +407,9 @@ class ConnectionWatch:
         returns_memory: True to return the memory that floods have taken to the system at once. Meanwhile, threads of
             this process that need memory may have to wait.
         clock: Seconds of a monotonic clock.
+
+    Attributes:
+        closed: Number of closed connections, by reason, each of which is there.
     """
 
     def __init__(
@@ -408,11 +428,13 @@ class ConnectionWatch:
         self._share = share
         self._returns_memory = returns_memory
         self._clock = clock
-        self._warned_s = float("-inf")
-        self._unreported: Counter[str] = Counter()
+        self._warned_s = self._failed_s = float("-inf")
+        self._unreported: Counter[CloseReason] = Counter()
+        self._last: dict[CloseReason, Peer] = {}
+        self._failures = 0
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, name="connection watch", daemon=True)
-        self.closed: Counter[str] = Counter()
+        self.closed: Counter[CloseReason] = Counter(dict.fromkeys(CloseReason, 0))
 
     def __enter__(self) -> Self:
         if can_watch():
@@ -438,16 +460,18 @@ class ConnectionWatch:
             if self._sockets.close(peer):
                 self.closed[reason] += 1
                 self._unreported[reason] += 1
+                self._last[reason] = peer
         if self._unreported and now_s - self._warned_s >= _WARNING_S:
             self._warned_s = now_s
             for reason, count in self._unreported.items():
-                _log.warning("closed connections: %d: %s; the last one: %s", count, reason, next(iter(closed), ""))
+                host, port = self._last[reason]
+                _log.warning("closed connections: %d: %s; the last one: %s port %d", count, reason, host, port)
             self._unreported.clear()
 
     def _run(self) -> None:
         due_s = trimmed_s = 0.0
         memory = _resident_bytes()
-        while not self._end.wait(ALERT_LOOK_S if self._ledger.is_alert else LOOK_S):
+        while not self._end.wait(ALERT_LOOK_S if self._ledger.is_alert else MEMORY_LOOK_S):
             now_s, taken = self._clock(), _resident_bytes()
             if now_s < due_s and taken < memory + _GROWTH_BYTES:
                 continue
@@ -460,8 +484,17 @@ class ConnectionWatch:
                 self.look()
             except Exception:
                 # A watch that ends would leave the server open without a word.
-                _log.exception("watching the connections failed")
-            due_s = now_s + (time.thread_time() - used_s) / self._share
+                self._report_failure()
+            due_s = now_s + max((time.thread_time() - used_s) / self._share, 0 if self._ledger.is_alert else LOOK_S)
+
+    def _report_failure(self) -> None:
+        """Log the error that is handled now, unless one was logged just now."""
+        self._failures += 1
+        now_s = self._clock()
+        if now_s - self._failed_s >= _WARNING_S:
+            self._failed_s = now_s
+            _log.exception("watching the connections failed (%d times since the last such line)", self._failures)
+            self._failures = 0
 
 
 class _Sockets:
@@ -538,7 +571,8 @@ def can_watch() -> bool:
     return True
 
 
-def peer_of(text: str) -> Peer | None:
+@lru_cache(maxsize=8192)
+def address_of(text: str) -> Peer | None:
     """Return the other end of a connection from gRPC's words for it; None: it is no TCP connection."""
     kind, _, rest = unquote(text).partition(":")
     host, _, port = rest.rpartition(":")
@@ -549,7 +583,7 @@ def peer_of(text: str) -> Peer | None:
 
 def _by_peer(calls: CallsSince[str]) -> CallsSince[Peer]:
     """Return calls by the other end of their connection, without those over other lines than TCP."""
-    peers = {text: peer_of(text) for text in {*calls.asked, *calls.ended, *calls.open}}
+    peers = {text: address_of(text) for text in {*calls.asked, *calls.ended, *calls.open}}
     ended, opened = (
         {peer: count for text, count in counts.items() if (peer := peers[text]) is not None}
         for counts in (calls.ended, calls.open)
@@ -572,7 +606,7 @@ def _descriptors() -> list[int]:
 
 @contextlib.contextmanager
 def _borrowed(descriptor: int) -> Iterator[socket.socket]:
-    """Yield a socket of a descriptor that somebody else closes."""
+    """Yield a socket of a descriptor that its owner closes."""
     line = socket.socket(socket.AF_INET, socket.SOCK_STREAM, 0, fileno=descriptor)
     try:
         yield line

@@ -135,7 +135,7 @@ def ask_alive(
     certificate: Path | None = None,
     client_certificate: tuple[Path, Path] | None = None,
 ) -> Condition:
-    """Query whether a service is alive, for whoever restarts dead programs: unusable certificate files do not count.
+    """Query whether a service is alive, for those who restart dead programs: unusable certificate files do not count.
 
     The program may still use the earlier content of the files.
     """

@@ -3,13 +3,17 @@
 Each interceptor of grpc.aio adds a coroutine to every call; layers do not.
 """
 
+import asyncio
 from abc import abstractmethod
 from collections.abc import AsyncIterator, Awaitable, Callable
 from contextlib import aclosing
+from itertools import groupby
 from typing import Any
 
 import grpc
 import grpc.aio
+
+from robosc_api.peers import begin_call
 
 
 class Layer(grpc.aio.ServerInterceptor):
@@ -56,14 +60,54 @@ class Layers(grpc.aio.ServerInterceptor):
     """
 
     def __init__(self, *layers: Layer) -> None:
-        self._inside_out = layers[::-1]
+        self._inside_out: list[Layer] = []
+        for is_same, run in groupby(layers[::-1], _is_same_for_each_call):
+            found = list(run)
+            self._inside_out += [_Joined(found)] if is_same and len(found) > 1 else found
 
     async def intercept_service(self, continuation: Callable[[Any], Awaitable[Any]], handler_call_details: Any) -> Any:
         """Return the handler of a call, wrapped in all layers."""
+        begin_call()
         handler = await continuation(handler_call_details)
         for layer in self._inside_out:
             handler = layer.handler(handler, handler_call_details)
         return handler
+
+
+def _is_same_for_each_call(layer: Layer) -> bool:
+    """Return True if a layer only wraps the handlers of methods, and looks at no call before its handler begins."""
+    return type(layer).handler is Layer.handler
+
+
+class _Joined(Layer):
+    """Neighbouring layers whose handlers are looked up together.
+
+    Args:
+        inside_out: The innermost first.
+    """
+
+    def __init__(self, inside_out: list[Layer]) -> None:
+        super().__init__()
+        self._layers = inside_out
+
+    def wrap(self, inner: Any, method: str) -> Any:
+        """Wrap a handler in all of them."""
+        for layer in self._layers:
+            inner = layer.wrap(inner, method)
+        return inner
+
+
+def when_call_ends(callback: Callable[[Any], None]) -> None:
+    """Call a function when the call whose handler runs has ended for gRPC as well, and its response is on its way.
+
+    gRPC's context offers the same, but then refers to itself: the context, its metadata and its state in gRPC would
+    stay until the garbage collector finds them, and each call would take new memory.
+
+    Args:
+        callback: Function of the call's task, in which gRPC runs handlers.
+    """
+    task: Any = asyncio.current_task()
+    task.add_done_callback(callback)
 
 
 async def write_responses(made: Awaitable[Any] | AsyncIterator[Any], context: Any) -> None:

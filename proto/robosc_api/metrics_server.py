@@ -168,7 +168,7 @@ class _Handler(WSGIRequestHandler):
         """Log nothing: callers decide how many lines there would be."""
 
     def get_stderr(self) -> Any:
-        """Return a place for tracebacks, which nobody reads."""
+        """Return a place for tracebacks that is not read."""
         return io.StringIO()
 
 

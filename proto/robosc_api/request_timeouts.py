@@ -1,6 +1,7 @@
 """Timeouts for calls whose request does not arrive: such calls would count as open calls for ever."""
 
 import asyncio
+import contextvars
 from collections.abc import AsyncIterator, Awaitable, Callable, Mapping
 from typing import Any
 
@@ -54,13 +55,20 @@ class RequestTimeouts(Layer):
         return make(answer, handler.request_deserializer, handler.response_serializer)
 
     def _unary(self, answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any, Any], Awaitable[Any]]:
-        wait, end = self._first.wait, grpc.aio.EOF
+        waits, end, current_task = self._first, grpc.aio.EOF, asyncio.current_task
 
         async def answered(requests: Any, context: Any) -> Any:
+            # The same as `wait`, whose coroutine would delay every call.
+            task: Any = current_task()
+            waits.begin(task)
             try:
-                request = await wait(context.read())
-            except _RequestTimeoutError:
+                request = await context.read()
+            except asyncio.CancelledError:
+                if not waits.is_late(task):
+                    raise
                 request = end
+            finally:
+                waits.end(task)
             if request is end:
                 await _abort(context, f"the request did not arrive within {self._first.limit_s:g} seconds")
             return await answer(request, context)
@@ -114,21 +122,34 @@ class _Timeout:
         Raises:
             _RequestTimeoutError: It does not come in time.
         """
-        loop = asyncio.get_running_loop()
         task: Any = asyncio.current_task()
-        self._since_s[task] = loop.time()
-        if not self._is_scheduled:
-            self._is_scheduled = True
-            loop.call_later(self.limit_s, self._cancel_overdue)
+        self.begin(task)
         try:
             return await answer
         except asyncio.CancelledError:
-            # Another cancellation may have happened as well.
-            if task in self._overdue and task.uncancel() == 0:
+            if self.is_late(task):
                 raise _RequestTimeoutError from None
             raise
         finally:
-            self._since_s.pop(task, None)
+            self.end(task)
+
+    def begin(self, task: asyncio.Task[Any]) -> None:
+        """Begin the wait of a task, which is cancelled unless it ends in time."""
+        loop = asyncio.get_running_loop()
+        self._since_s[task] = loop.time()
+        if not self._is_scheduled:
+            self._is_scheduled = True
+            # In a context of its own: that of this call would be kept until then.
+            loop.call_later(self.limit_s, self._cancel_overdue, context=contextvars.Context())
+
+    def is_late(self, task: asyncio.Task[Any]) -> bool:
+        """Return True if a task, which is cancelled, is so only because its wait took too long."""
+        # Another cancellation may have happened as well.
+        return task in self._overdue and task.uncancel() == 0
+
+    def end(self, task: asyncio.Task[Any]) -> None:
+        """End the wait of a task, once it is over or cancelled."""
+        if self._since_s.pop(task, None) is None:
             self._overdue.discard(task)
 
     def _cancel_overdue(self) -> None:

@@ -154,7 +154,7 @@ class _Rule:
 
     def _choices(self, state: State) -> list[list[_Arc]] | None:
         """The arcs of each plant and each monitor that moves; None where the plants cannot do the event."""
-        # An event in no alphabet belongs to nobody, so it cannot happen.
+        # An event in no alphabet belongs to no automaton, so it cannot happen.
         if not (self.participants or self.observers or self.monitors):
             return None
         if not _all_hold(self.plant_conditions, state):

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from typing import Any
 
-from robosc.certification.supervisor_file import Fault, FileVerification, StateInWords
+from robosc.certification.supervisor_file import GOALS, Fault, FileVerification, StateInWords
 from robosc.errors import InvalidSupervisorError
 from robosc.json_documents import diagnostics_json
 from robosc.signatures import SignatureError
@@ -102,7 +102,7 @@ def _fault_lines(fault: Mapping[str, Any]) -> list[str]:
         return [f"{name}: {fault['message']}"]
     run = "after" if fault["shortest"] else "after (there may be shorter runs)"
     return [
-        f"not {name}: {fault['message']}",
+        f"{name if fault['check'] == GOALS else f'not {name}'}: {fault['message']}",
         f"  {run}: {', '.join(fault['trace']) or 'nothing: it is so at the start'}",
         f"  in: {StateInWords(**fault['state']).text()}",
     ]

@@ -162,7 +162,7 @@ def make_supervisor(
     if result.status is SynthesisStatus.EMPTY:
         reason = f"no supervisor exists: {result.reason}"
         explanation = None
-        # Whatever the limit of nodes, that there is no supervisor is known.
+        # The verdict, no supervisor, holds whatever the limit of nodes.
         with suppress(NodeLimitError):
             explanation = explanations.explain_empty(
                 explanations.ModelWords(model, places, system, deployment),
@@ -226,7 +226,14 @@ def make_supervisor(
             return SynthesisOutcome(
                 OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, reason, goals=goals
             )
-        check = check_strategy(problem.system, result.added, strategy, semantics=semantics, should_stop=should_stop)
+        check = check_strategy(
+            problem.system,
+            result.added,
+            strategy,
+            limit=Limits.of(verify_limit).positions,
+            semantics=semantics,
+            should_stop=should_stop,
+        )
         if check.missed is not None:
             raise InternalError(f"the strategy misses a goal after {', '.join(check.missed.trace)}")
         outcome: CheckResult = "passed" if check.result == "passed" else "not checked"

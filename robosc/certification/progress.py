@@ -1,4 +1,4 @@
-"""Progress of long work, and how whoever waits for it follows and stops it."""
+"""Progress of long work, for callers who follow it and may stop it."""
 
 from collections.abc import Callable
 from dataclasses import dataclass

@@ -31,6 +31,9 @@ from robosc.verification import CheckOutcome, Limits, Verification, Verification
 PROPERTIES = ("safe", "controllable", "nonblocking", "maximally_permissive")
 """The four properties, as certificates call them."""
 
+GOALS = "goals"
+"""The check of a strategy, as certificates call it."""
+
 
 @dataclass(frozen=True, slots=True)
 class StateInWords:
@@ -90,12 +93,14 @@ class FileVerification:
         faults: Faults of the supervisor; a right one has none.
         notes: Remarks that are worth knowing, but decide nothing.
         report: The verifier's, or None where the supervisor is for another model or deployment.
+        goals: Outcome of the check of its strategy, or None where it has none.
     """
 
     diagnostics: tuple[Diagnostic, ...]
     faults: tuple[Fault, ...]
     notes: tuple[str, ...]
     report: VerificationReport | None
+    goals: CheckOutcome | None = None
 
     def outcomes(self) -> dict[str, CheckOutcome]:
         """Return the outcome of each check, in order."""
@@ -104,14 +109,18 @@ class FileVerification:
             name: CheckOutcome.FAILED if name in faulty else CheckOutcome.PASSED for name in ("deployment", "model")
         }
         if self.report is None:
-            return found | dict.fromkeys(("certificate", *PROPERTIES), CheckOutcome.NOT_CHECKED)
-        found["certificate"] = CheckOutcome.FAILED if "certificate" in faulty else CheckOutcome.PASSED
-        return found | {name: getattr(self.report.verification, name) for name in PROPERTIES}
+            found |= dict.fromkeys(("certificate", *PROPERTIES), CheckOutcome.NOT_CHECKED)
+        else:
+            found["certificate"] = CheckOutcome.FAILED if "certificate" in faulty else CheckOutcome.PASSED
+            found |= {name: getattr(self.report.verification, name) for name in PROPERTIES}
+        return found if self.goals is None else found | {GOALS: self.goals}
 
     @property
     def has_passed(self) -> bool:
-        """True if it is safe, controllable and nonblocking for certain, and nothing is wrong with it."""
-        return not self.faults and self.report is not None and self.report.is_complete
+        """True if it is safe, controllable and nonblocking for certain, reaches its goals, and nothing is wrong."""
+        if self.faults or self.report is None or self.goals is CheckOutcome.NOT_CHECKED:
+            return False
+        return self.report.is_complete
 
     def unchecked(self) -> tuple[str, ...]:
         """Return the names of the checks that were not made."""
@@ -158,8 +167,10 @@ def verify_supervisor_file(
     if deployment not in (None, supervisor.deployment) and has_actions:
         faults.append(Fault("deployment", f"it was made for the deployment {supervisor.deployment}, not {deployment}"))
     notes = tuple(_notes(supervisor.certificate, bundle))
+    # Until its strategy is checked.
+    goals = None if supervisor.strategy is None else CheckOutcome.NOT_CHECKED
     if faults:
-        return FileVerification((), tuple(faults), notes, None)
+        return FileVerification((), tuple(faults), notes, None, goals)
     executable = ExecutableSystem(model, supervisor.deployment)
     system = executable.automata
     semantics = Semantics(system)
@@ -195,13 +206,22 @@ def verify_supervisor_file(
         ).certified()
         faults += [Fault("certificate", text) for text in _false_properties(claimed, properties)]
     if supervisor.strategy is not None:
-        goals = check_strategy(
-            executable, supervisor.added, supervisor.strategy, semantics=semantics, should_stop=should_stop
+        under = check_strategy(
+            executable,
+            supervisor.added,
+            supervisor.strategy,
+            limit=limits.positions,
+            semantics=semantics,
+            should_stop=should_stop,
         )
-        if goals.missed is not None:
-            aims, number = executable.obligations.aims, goals.missed.goal
-            missed = _missed(None if number is None else aims[number])
-            faults.append(Fault("goals", missed, goals.missed.trace, is_shortest=False))
+        goals = CheckOutcome(under.result)
+        if under.missed is not None:
+            if supervisor.certificate.goals == "passed":
+                faults.append(Fault("certificate", "it says 'goals: passed', which is false"))
+            state = state_in_words(system, model, under.missed.state)
+            number = under.missed.goal
+            missed = _missed(None if number is None else executable.obligations.aims[number])
+            faults.append(Fault(GOALS, missed, under.missed.trace, is_shortest=False, state=state))
     faults += [
         Fault(
             item.property.replace(" ", "_"),
@@ -212,7 +232,8 @@ def verify_supervisor_file(
         )
         for item in found.failures
     ]
-    return FileVerification((), tuple(faults), (*notes, *_beliefs(supervisor.certificate, found)), report)
+    remarks = (*notes, *_beliefs(supervisor.certificate, found, goals))
+    return FileVerification((), tuple(faults), remarks, report, goals)
 
 
 def _missed(aim: Aim | None) -> str:
@@ -258,13 +279,15 @@ def _false_properties(stated: ControllerProperties, found: ControllerProperties)
     ]
 
 
-def _beliefs(certificate: Certificate, found: Verification) -> list[str]:
+def _beliefs(certificate: Certificate, found: Verification, goals: CheckOutcome | None) -> list[str]:
     """Return the claims of a certificate that were not checked here."""
     claimed = [
         name.replace("_", " ")
         for name in PROPERTIES
         if getattr(certificate, name) == "passed" and getattr(found, name) is CheckOutcome.NOT_CHECKED
     ]
+    if certificate.goals == "passed" and goals is CheckOutcome.NOT_CHECKED:
+        claimed.append(GOALS)
     return [f"the certificate says 'passed' for what was not checked here: {', '.join(claimed)}"] if claimed else []
 
 

@@ -94,7 +94,7 @@ class Lowering:
         self.typing.error(code, message, location, fix)
 
     def unsupported(self, scope: Scope, message: str, location: Location, fix: str) -> None:
-        """Report what synthesis does not take, unless it stands in a definition that nobody instantiates."""
+        """Report what synthesis does not take, unless it stands in a definition without an instance."""
         if scope.is_real:
             self.error("cif-unsupported", message, location, fix)
 

@@ -109,7 +109,7 @@ class Definition:
 
 @dataclass(eq=False, slots=True)
 class PendingInstance:
-    """An instance whose scope is made when it is first asked for."""
+    """An instance whose scope is made on first use."""
 
     instance: syntax.Instance
     container: "Scope"
@@ -125,7 +125,7 @@ class PendingInstance:
 
 @dataclass(eq=False, slots=True)
 class Alias:
-    """A parameter that stands for something declared elsewhere, found when it is first asked for."""
+    """A parameter that stands for something declared elsewhere, found on first use."""
 
     parameter: syntax.Parameter
     argument: syntax.Expression
@@ -156,7 +156,7 @@ class Scope:
         entries: Names declared in it.
         parameters: Names of its parameters.
         body: Declarations in order, those of merged groups one after the other.
-        is_real: False in a definition that is looked at though nobody instantiates it.
+        is_real: False in a definition that is checked without an instance.
     """
 
     path: str
@@ -375,7 +375,7 @@ class Scopes:
         return Entity(declaration, scope, parameter.name, value, value_scope)
 
     def _look_at(self, definition: Definition) -> None:
-        """Make a scope of a definition that nobody instantiates, so that it is checked, too."""
+        """Make a scope of a definition without an instance, so that it is checked, too."""
         if definition.component in definition.scope.ancestry:
             return
         scope = self._new_scope(definition, definition.scope.absolute(definition.component.name.text),

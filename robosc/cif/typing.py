@@ -153,7 +153,7 @@ class Typing(ExpressionTyping):
         type_ = self.type(declaration.type, scope)
         if entity.value_scope is not None:
             if entity.value is None:
-                # A parameter of a definition that nobody instantiates: any value.
+                # A parameter of a definition without an instance: any value.
                 return broken(type_, problem=Problem(f"'{entity.name}' has no value", entity.at))
             return self._fitted(self.term(entity.value, entity.value_scope), type_, entity.value.at)
         values = [(None, declaration.value)] if declaration.value is not None else []

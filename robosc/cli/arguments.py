@@ -23,7 +23,7 @@ def given_path(text: str) -> Path:
     """A file or folder that an argument names.
 
     Raises:
-        argparse.ArgumentTypeError: It is empty, such as a variable that nobody has set; that is no name of this folder.
+        argparse.ArgumentTypeError: It is empty, such as a variable that is not set; that is no name of this folder.
     """
     if not text:
         raise argparse.ArgumentTypeError("the name of a file or folder is empty")
@@ -183,8 +183,8 @@ def add_verify_limit_argument(parser: argparse.ArgumentParser, name: str, defaul
         default=default,
         metavar="N",
         help="verify up to N states one by one, recompute the supervisor up to N/4 states of the system without it, "
-        "and search symbolically beyond, with 25 N nodes of work; what takes more is 'not checked' (default: "
-        "%(default)s)",
+        "search symbolically beyond, with 25 N nodes of work, and check a strategy up to N/10 positions; what takes "
+        "more is 'not checked' (default: %(default)s)",
     )
 
 

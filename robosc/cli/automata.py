@@ -11,15 +11,15 @@ from robosc.cli.output import (
     CommandError,
     ExitCode,
     UsageError,
-    has_errors,
     print_diagnostics,
     print_json,
+    report_check,
     require_other_file,
     write_bytes,
 )
 from robosc.cli.statistics import Figures, timed
 from robosc.errors import Diagnostic, InvalidSupervisorError, UnsupportedModelError
-from robosc.json_documents import counts_text, diagnostics_json, json_text
+from robosc.json_documents import diagnostics_json, json_text
 from robosc.model.structure import Deployment
 from robosc.pipeline.automata_files import SUFFIXES, is_automata
 from robosc.source import SourceFile, visible
@@ -84,7 +84,7 @@ def controlled_system(supervisor: "SystemSupervisor", suffix: str) -> bytes:
 
 
 def check(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> ExitCode:
-    """Check automata, and synthesize if that is asked for; 0 without errors, else 1.
+    """Check automata, with `--synthesize` also by synthesis; 0 without errors, else 1.
 
     Raises:
         UsageError: An argument means nothing for it, or it cannot be read.
@@ -99,17 +99,12 @@ def check(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Exi
         if synthesis.status is not SynthesisStatus.MODEL_ERRORS:
             outcome_json = {"status": str(synthesis.status), "reason": synthesis.reason}
     diagnostics = machine.check(model) if synthesis is None else synthesis.diagnostics
-    if arguments.json:
-        print_json({"file": str(arguments.model), **outcome_json, **diagnostics_json(diagnostics)})
-    elif diagnostics:
-        print_diagnostics(diagnostics, model)
-    else:
-        sys.stdout.write(f"{arguments.model}: {counts_text(diagnostics)}\n")
+    status = report_check(arguments, diagnostics, model, outcome_json)
     if outcome_json and synthesis is not None and synthesis.supervisor is None:
         if not arguments.json:
             sys.stderr.write(f"{arguments.model}: {visible(synthesis.reason)}\n")
         return ExitCode.FAILED
-    return ExitCode.FAILED if has_errors(diagnostics, strict=arguments.strict) else ExitCode.OK
+    return status
 
 
 def synth(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> ExitCode:
@@ -449,7 +444,7 @@ def require_supported(outcome: "Exploration | Generation | Verification") -> Non
 def report_none(
     arguments: argparse.Namespace, made: _Outcome, model: "LoadedAutomata", figures: Figures | None = None
 ) -> ExitCode:
-    """Report that there is no supervisor, what is to blame, and the figures of the synthesis if they are asked for."""
+    """Report that there is no supervisor, what is to blame, and the figures of the synthesis if they are wanted."""
     from robosc.explanation import EmptyExplanation, document, empty_text
 
     explanation = made.explanation if isinstance(made.explanation, EmptyExplanation) else None

@@ -1,17 +1,14 @@
 """`robosc check`: everything that is wrong with a model, in one run."""
 
 import argparse
-import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass
-from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from robosc.cli import automata, synth
 from robosc.cli.arguments import add_deployment_argument, add_engine_options, add_model_arguments, read_bundle
-from robosc.cli.output import ExitCode, UsageError, has_errors, print_diagnostics, print_json
+from robosc.cli.output import ExitCode, UsageError, report_check
 from robosc.errors import Diagnostic, LanguageError, UnsupportedModelError
-from robosc.json_documents import counts_text, diagnostics_json
 from robosc.model.structure import Deployment
 from robosc.source import Bundle
 
@@ -43,7 +40,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Check the model; 0 without errors (and, where it was asked for, with a supervisor), else 1."""
+    """Check the model; 0 without errors (and, with `--synthesize`, with a supervisor), else 1."""
     require_synthesis(arguments)
     if automata.is_given(arguments):
         return automata.check(arguments)
@@ -132,19 +129,3 @@ def _report_synthesized(arguments: argparse.Namespace, found: _Synthesized, bund
     if not arguments.json:
         synth.report_reasons(found, bundle)
     return ExitCode.FAILED if found.has_failed else status
-
-
-def report_check(
-    arguments: argparse.Namespace,
-    diagnostics: tuple[Diagnostic, ...],
-    bundle: Bundle | None,
-    summary: Mapping[str, object] = MappingProxyType({}),
-) -> ExitCode:
-    """Print the findings, in JSON with what else is reported, and return the exit status."""
-    if arguments.json:
-        print_json({"file": str(arguments.model), **summary, **diagnostics_json(diagnostics)})
-    elif diagnostics:
-        print_diagnostics(diagnostics, bundle)
-    else:
-        sys.stdout.write(f"{arguments.model}: {counts_text(diagnostics)}\n")
-    return ExitCode.FAILED if has_errors(diagnostics, strict=arguments.strict) else ExitCode.OK

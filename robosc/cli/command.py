@@ -7,7 +7,7 @@ from typing import NoReturn
 from robosc.cli.starting import start
 
 _OBJECTS = 50_000
-"""Objects that are made before Python looks for cycles of those that nobody needs any more."""
+"""Objects that are made before Python looks for unused cycles of them."""
 
 
 def entry() -> NoReturn:

@@ -25,7 +25,7 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Print what was asked for.
+    """Print the page of a code, the list of codes, or all pages.
 
     Raises:
         UsageError: There is no such code.

@@ -205,7 +205,7 @@ def _shown(path: Path) -> str:
     return os.fsencode(path).decode("utf-8", errors="backslashreplace")
 
 
-# What is printed
+# Output
 
 
 def _report(arguments: argparse.Namespace, outcomes: Sequence[_Outcome]) -> None:

@@ -108,14 +108,14 @@ def _make_folders(folder: Path, made: list[Path]) -> None:
 
 
 def _create(path: Path, text: str, made: list[Path]) -> None:
-    """Create a file that nobody else has made in the meantime."""
+    """Create a file, unless another program has made it in the meantime."""
     with path.open("x", encoding="utf-8", newline="\n") as file:
         made.append(path)
         file.write(text)
 
 
 def _remove(made: list[Path]) -> None:
-    """Undo what was made, last first; a folder that somebody else has used meanwhile stays."""
+    """Undo what was made, last first; a folder with files of others stays."""
     for path in reversed(made):
         with contextlib.suppress(OSError):
             path.rmdir() if path.is_dir() else path.unlink()

@@ -5,6 +5,7 @@ standard output and also holds the findings. If a command fails, the document is
 to standard error as well.
 """
 
+import argparse
 import codecs
 import io
 import os
@@ -12,10 +13,11 @@ import sys
 from collections.abc import Mapping, Sequence
 from enum import IntEnum
 from pathlib import Path
+from types import MappingProxyType
 from typing import TextIO
 
 from robosc.errors import Diagnostic, Severity
-from robosc.json_documents import counts_text, json_text
+from robosc.json_documents import counts_text, diagnostics_json, json_text
 from robosc.pipeline.files import FileAccessError, write_whole
 from robosc.source import Bundle
 
@@ -68,7 +70,7 @@ ESCAPED = {code: f"\\u{code:04x}" for code in (*range(0x7F, 0xA0), 0x200E, 0x200
 
 def print_json(document: Mapping[str, object]) -> None:
     """One JSON document on standard output, keys in the order given."""
-    # What cannot be encoded is escaped, and in JSON by JSON's own rules.
+    # Characters that cannot be encoded are escaped, and in JSON by JSON's own rules.
     sys.stdout.write(json_text(document, is_ascii=not has_unicode_output()).translate(ESCAPED))
 
 
@@ -93,6 +95,22 @@ def has_errors(diagnostics: Sequence[Diagnostic], *, strict: bool = False) -> bo
     """Return True if any finding is an error; with `strict`, if any is an error or a warning."""
     grave = {Severity.ERROR, Severity.WARNING} if strict else {Severity.ERROR}
     return any(diagnostic.severity in grave for diagnostic in diagnostics)
+
+
+def report_check(
+    arguments: argparse.Namespace,
+    diagnostics: tuple[Diagnostic, ...],
+    bundle: Bundle | None,
+    summary: Mapping[str, object] = MappingProxyType({}),
+) -> ExitCode:
+    """Print the findings, in JSON with what else is reported, and return the exit status."""
+    if arguments.json:
+        print_json({"file": str(arguments.model), **summary, **diagnostics_json(diagnostics)})
+    elif diagnostics:
+        print_diagnostics(diagnostics, bundle)
+    else:
+        sys.stdout.write(f"{arguments.model}: {counts_text(diagnostics)}\n")
+    return ExitCode.FAILED if has_errors(diagnostics, strict=arguments.strict) else ExitCode.OK
 
 
 def require_other_file(output: Path | None, model: Path) -> None:

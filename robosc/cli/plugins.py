@@ -77,7 +77,7 @@ def _loaded(item: "EntryPoint") -> Plugin:
     except ModuleNotFoundError as error:
         return Plugin(item.name, None, _missing(item.name, error))
     except Exception as error:
-        # Somebody else's package must not take the built-in commands with it.
+        # Packages of others must not take the built-in commands with them.
         return Plugin(item.name, None, f"'robosc {item.name}' cannot be loaded: {_one_line(error)}")
     if not (callable(getattr(module, "add_parser", None)) and callable(getattr(module, "run", None))):
         return Plugin(item.name, None, f"'robosc {item.name}' cannot be loaded: {item.value} is not a command")

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 from robosc.cli import automata
 from robosc.cli.arguments import add_engine_options, add_model_arguments
-from robosc.cli.output import ESCAPED, CommandError, ExitCode, UsageError, has_unicode_output
+from robosc.cli.output import ESCAPED, CommandError, ExitCode, UsageError, has_unicode_output, print_json
 from robosc.cli.simulation_steps import parts_text, state_lines, step_lines, take_event, write_lines
 from robosc.cli.supervisor_argument import supervisor_of_arguments
 from robosc.model.structure import Deployment
@@ -17,6 +17,7 @@ from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.certification.supervisor_file import StateInWords
+    from robosc.pipeline.counter_run import CounterRun
     from robosc.pipeline.manual_run import ManualRun
     from robosc.pipeline.missions import MissionProgress
     from robosc.pipeline.saved_runs import ModelOfTest
@@ -38,6 +39,7 @@ a file of events has one a line, with its data as JSON or as name=value; what is
   scan.response {"front": 0.7}
   level.response 3
   move.request                         a request, where it is allowed
+  wait                                 no request; with --counter-strategy
   take -> Buffer = full                of automata, which of several states it leads to
 An event log (.jsonl) is taken as well: its events happen again.
 
@@ -83,6 +85,12 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         action="store_true",
         help="let the controller follow its strategy in --random and --until-finding: only the world plays by chance",
     )
+    group.add_argument(
+        "--counter-strategy",
+        action="store_true",
+        help="let the surroundings play, so that goals that cannot be reached are never reached: you choose requests, "
+        "or 'wait', in commands or in --events; in --random chance does",
+    )
     group.add_argument("--seed", type=int, default=0, metavar="SEED", help="seed of the chance (default: 0)")
     group.add_argument(
         "--finding",
@@ -117,7 +125,7 @@ _count.__name__ = "number of events from 1 to 1000000"
 
 
 def run(arguments: argparse.Namespace) -> int:
-    """Simulate; 0 if all that was asked for has happened, 1 if not.
+    """Simulate; 0 if every given step was taken, 1 if not.
 
     Raises:
         UsageError: A file cannot be read or written.
@@ -137,21 +145,76 @@ def run(arguments: argparse.Namespace) -> int:
     is_scripted = arguments.events is not None or arguments.random or arguments.until_finding
     if not is_scripted and (arguments.json or arguments.save):
         raise UsageError("--json and --save need events: --events, --random or --until-finding")
+    if arguments.counter_strategy:
+        _refuse_beside_counter_strategy(arguments)
     if automata.is_given(arguments):
         return _run_automata(arguments, is_scripted=bool(is_scripted))
     if arguments.initial is not None:
         raise UsageError("--initial chooses where automata begin: a robot begins in one state")
-    supervisor = supervisor_of_arguments(arguments, is_json=arguments.json)
-    if supervisor is None:
-        return ExitCode.FAILED
-    if arguments.deployment not in (None, str(supervisor.deployment)):
-        raise UsageError(f"{arguments.model} was made for the deployment {supervisor.deployment}")
-    run_ = Run(supervisor)
+    run_: Run | None
+    if arguments.counter_strategy:
+        run_ = counter_run(arguments)
+        if run_ is None:
+            return ExitCode.FAILED
+    else:
+        supervisor = supervisor_of_arguments(arguments, is_json=arguments.json)
+        if supervisor is None:
+            return ExitCode.FAILED
+        if arguments.deployment not in (None, str(supervisor.deployment)):
+            raise UsageError(f"{arguments.model} was made for the deployment {supervisor.deployment}")
+        run_ = Run(supervisor)
     if is_scripted:
         return _script(arguments, run_)
     from robosc.cli.simulation_shell import Shell
 
     return Shell(run_, model_of_test(arguments)).loop(sys.stdin)
+
+
+def _refuse_beside_counter_strategy(arguments: argparse.Namespace) -> None:
+    """Do nothing if all that is asked for means something where the surroundings play.
+
+    Raises:
+        UsageError: Something does not.
+    """
+    automata.refuse(arguments.strategy, "--strategy: there is none where goals cannot be reached")
+    automata.refuse(
+        arguments.until_finding is not None, "--until-finding: the surroundings do not play by chance in this run"
+    )
+    if automata.is_given(arguments) or arguments.model.suffix == ".rsup":
+        raise UsageError("--counter-strategy is for the model of a robot, whose goals cannot be reached")
+    if arguments.deployment == str(Deployment.LAYER):
+        raise UsageError("--counter-strategy is for controllers: goals have no effect in a supervision layer")
+
+
+def counter_run(arguments: argparse.Namespace) -> "CounterRun | None":
+    """Return the run against the surroundings; None if the model has errors, which have been reported.
+
+    Raises:
+        CommandError: There is no counter-strategy: every goal can be reached, there are none, or it is too large.
+    """
+    from robosc.cli import synth
+    from robosc.cli.arguments import read_bundle
+    from robosc.json_documents import diagnostics_json
+    from robosc.pipeline.counter_run import CounterRun, NoCounterStrategyError
+
+    bundle = read_bundle(arguments)
+    given = argparse.Namespace(**{**vars(arguments), "deployment": str(Deployment.CONTROLLER)})
+    outcome = synth.make(given, bundle, allow_livelock=True)
+    if outcome.goals is not None:
+        try:
+            return CounterRun(outcome.goals)
+        except NoCounterStrategyError as error:
+            raise CommandError(str(error), ExitCode.FAILED) from error
+    if outcome.supervisor is not None:
+        why = "every goal can be reached" if outcome.supervisor.model.goals else "the model has no goals"
+        raise CommandError(f"--counter-strategy: the surroundings have none, since {why}", ExitCode.FAILED)
+    if arguments.json:
+        print_json(
+            {"status": str(outcome.status), **synth.reasons_json(outcome), **diagnostics_json(outcome.diagnostics)}
+        )
+    else:
+        synth.report_problems(outcome, bundle)
+    return None
 
 
 def _run_automata(arguments: argparse.Namespace, *, is_scripted: bool) -> int:
@@ -200,6 +263,9 @@ def _script(arguments: argparse.Namespace, run_: "Run | SystemRun") -> int:
 
     report = _JsonReport(run_) if arguments.json else _TextReport(run_)
     finding, problem = None, ""
+    # The surroundings may have begun.
+    for step in run_.history:
+        report.step(step)
     try:
         if arguments.events is not None:
             problem = _take_events(arguments.events, run_, report.step)
@@ -257,10 +323,13 @@ def _take_events(name: str, run_: "Run | SystemRun", report: Callable[["Step"], 
         if not item.event:
             run_.restart()
             continue
+        before = len(run_)
         try:
-            report(take_event(run_, item.event, item.data, item.target))
+            take_event(run_, item.event, item.data, item.target)
         except (ChoiceError, DataError, EventNotPossibleError, UnknownNameError) as error:
             return f"{shown}:{item.line}: {error}"
+        for step in run_.history[before:]:
+            report(step)
     return ""
 
 
@@ -270,11 +339,11 @@ class _TextReport:
     def __init__(self, run_: "ManualRun") -> None:
         self._run = run_
         self._count = 0
-        self._state = run_.state
+        self._state = run_.initial
 
     def step(self, step: "Step") -> None:
         self._count += 1
-        write_lines(step_lines(self._count, step, self._state))
+        write_lines(step_lines(self._count, step, self._state, self._run.actor(step.event)))
         self._state = step.state
 
     def end(self, finding: "WalkFinding | None", problem: str) -> None:
@@ -294,6 +363,7 @@ class _JsonReport:
             {
                 "step": self._count,
                 "event": step.event,
+                **({"by": by} if (by := self._run.actor(step.event)) else {}),
                 "controllable": step.is_controllable,
                 "data": dict(step.data),
                 "provided": step.provided,
@@ -320,6 +390,7 @@ class _JsonReport:
                 "goals": list(run_.reached),
                 "missions": [mission_json(item) for item in run_.missions],
                 "strategy": run_.chosen,
+                **opposition_json(run_),
                 "enabled": list(run_.enabled),
                 "disabled": [{"event": event, "why": list(run_.reasons(event))} for event in disabled],
                 "possible": list(run_.possible),
@@ -355,6 +426,15 @@ def mission_json(mission: "MissionProgress") -> dict[str, object]:
             {"detour": item.number, "visit": item.visit, "condition": item.condition} for item in mission.detours
         ],
     }
+
+
+def opposition_json(run_: "ManualRun") -> dict[str, object]:
+    """Return what the surroundings deny, and how often each assumption came true; nothing where they deny nothing."""
+    from robosc.pipeline.counter_run import CounterRun
+
+    if not isinstance(run_, CounterRun):
+        return {}
+    return {"denied": run_.denied, "assumptions": list(run_.came_true)}
 
 
 def finding_json(finding: "WalkFinding") -> dict[str, object]:

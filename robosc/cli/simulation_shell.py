@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, TextIO
 from robosc.cli.output import ExitCode
 from robosc.cli.simulation_steps import state_lines, step_lines, take_event, write_lines
 from robosc.errors import RoboscError
+from robosc.pipeline.counter_run import CounterRun
 from robosc.pipeline.event_scripts import parse_event, target_split
-from robosc.pipeline.received_data import DataField
+from robosc.pipeline.received_data import NO_DATA, DataField
 from robosc.source import visible
 
 if TYPE_CHECKING:
@@ -39,6 +40,20 @@ help, quit
 AUTOMATA_HELP = """\
 EVENT [DATA] [-> STATE]    an event: press, sensor true, take -> Buffer = full where it can lead to several states
 """ + "".join(line for line in HELP.splitlines(keepends=True)[1:] if line.split()[0] not in ("save", "strategy"))
+
+COUNTER_HELP = """\
+REQUEST                    a request that is allowed: move.request, or move; the surroundings answer
+wait [N]                   request nothing, N times
+enabled                    what you may request now
+why EVENT                  why you cannot request something now
+state                      where everything is
+undo [N], redo [N]         take back the last requests, with what followed; take them again
+history                    the events so far
+restart                    begin again; the surroundings may begin
+random N [SEED]            N events, where you request by chance or wait
+save FILE                  the events so far, as an event log (.jsonl)
+help, quit
+"""
 
 _DEFAULT_STEPS = 1000
 _MOST = 1_000_000
@@ -76,6 +91,8 @@ class Shell:
             "save": self._save,
             "help": self._help,
         }
+        if isinstance(run, CounterRun):
+            self._commands["wait"] = self._wait
 
     def loop(self, stream: TextIO) -> int:
         """Do the commands of a stream until it ends; returns the exit status.
@@ -85,6 +102,9 @@ class Shell:
         is_terminal = stream.isatty()
         if is_terminal:
             return self._converse()
+        if len(self._run):
+            # The surroundings have begun.
+            self._print_steps(0)
         for number, line in enumerate(stream, start=1):
             try:
                 if not self.do(line):
@@ -103,7 +123,9 @@ class Shell:
             readline.set_completer(lambda text, state: self._completion(readline.get_line_buffer(), text, state))
             is_libedit = getattr(readline, "backend", "readline") == "editline"
             readline.parse_and_bind("bind ^I rl_complete" if is_libedit else "tab: complete")
-        write_lines([f"{self._run.name}: 'help' lists the commands, Tab completes", *state_lines(self._run)])
+        write_lines([f"{self._run.name}: 'help' lists the commands, Tab completes"])
+        self._print_steps(0)
+        write_lines(state_lines(self._run))
         while True:
             try:
                 line = input(PROMPT)
@@ -132,9 +154,10 @@ class Shell:
             return True
         text, target = target_split(line) if self._model is None else (line, "")
         event, data = parse_event(text)
-        before = self._run.state
-        step = take_event(self._run, event, data, target)
-        write_lines([*step_lines(len(self._run), step, before), *state_lines(self._run)])
+        before = len(self._run)
+        take_event(self._run, event, data, target)
+        self._print_steps(before)
+        write_lines(state_lines(self._run))
         return True
 
     # The commands
@@ -150,6 +173,15 @@ class Shell:
             raise _CommandFault("why which event? why EVENT")
         event = self._run.event_called(words[0])
         write_lines(self._run.reasons(event) or [f"{event} can happen"])
+
+    def _wait(self, words: Sequence[str]) -> None:
+        (count,) = _numbers("wait", words, (1,))
+        before = len(self._run)
+        for _ in range(count):
+            take_event(self._run, "wait", NO_DATA, "")
+        self._print_walk(before)
+        nothing = ["the surroundings wait, too"] if len(self._run) == before else []
+        write_lines([*nothing, *state_lines(self._run)])
 
     def _state(self, words: Sequence[str]) -> None:
         _no_words("state", words)
@@ -178,6 +210,7 @@ class Shell:
     def _restart(self, words: Sequence[str]) -> None:
         _no_words("restart", words)
         self._run.restart()
+        self._print_steps(0)
         write_lines(state_lines(self._run))
 
     def _random(self, words: Sequence[str]) -> None:
@@ -214,7 +247,8 @@ class Shell:
         write_lines([f"written to {self._run.save(Path(words[0]), self._model)}"])
 
     def _help(self, words: Sequence[str]) -> None:
-        sys.stdout.write(HELP if self._model is not None else AUTOMATA_HELP)
+        of_robots = COUNTER_HELP if isinstance(self._run, CounterRun) else HELP
+        sys.stdout.write(of_robots if self._model is not None else AUTOMATA_HELP)
 
     # Output and completion
 
@@ -230,7 +264,7 @@ class Shell:
         """Print the steps after a number of steps."""
         before = self._run.history[number - 1].state if number else self._run.initial
         for count, step in enumerate(self._run.history[number:], start=number + 1):
-            write_lines(step_lines(count, step, before))
+            write_lines(step_lines(count, step, before, self._run.actor(step.event)))
             before = step.state
 
     def _completion(self, line: str, text: str, state: int) -> str | None:

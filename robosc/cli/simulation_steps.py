@@ -15,8 +15,8 @@ if TYPE_CHECKING:
     from robosc.pipeline.system_runs import SystemRun
 
 
-def take_event(run_: "Run | SystemRun", name: str, data: object, target: str) -> "Step":
-    """Take an event as a person wrote it.
+def take_event(run_: "Run | SystemRun", name: str, data: object, target: str) -> None:
+    """Take an event as a person wrote it; the run's history tells what has happened.
 
     Args:
         run_: The run.
@@ -27,15 +27,20 @@ def take_event(run_: "Run | SystemRun", name: str, data: object, target: str) ->
     Raises:
         RoboscError: It cannot happen so.
     """
+    from robosc.pipeline.counter_run import WAIT, CounterRun
     from robosc.pipeline.received_data import NO_DATA
     from robosc.pipeline.simulation import Run
     from robosc.pipeline.system_runs import ChoiceError, state_parts
 
     event, given = run_.event_called(name), () if data is NO_DATA else (data,)
+    if isinstance(run_, CounterRun) and event == WAIT:
+        run_.wait()
+        return
     if isinstance(run_, Run):
-        return run_.step(event, *given)
+        run_.step(event, *given)
+        return
     try:
-        return run_.step(event, *given, to=state_parts(run_.supervisor.system, target) if target else None)
+        run_.step(event, *given, to=state_parts(run_.supervisor.system, target) if target else None)
     except ChoiceError as error:
         choose = f"; choose one: {name} -> {parts_text(error.example)}" if error.example else ""
         raise ChoiceError(f"{error.problem}{choose}") from error
@@ -53,11 +58,19 @@ def write_lines(lines: Iterable[str]) -> None:
     sys.stdout.write("".join(visible(line) + "\n" for line in lines))
 
 
-def step_lines(number: int, step: "Step", before: "StateInWords") -> list[str]:
-    """A step in lines: the event with its data, what it changed, what a request sends, and what was unknown."""
+def step_lines(number: int, step: "Step", before: "StateInWords", actor: str = "") -> list[str]:
+    """Return a step in lines: the event with its data, its changes, the data of a request, and what was unknown.
+
+    Args:
+        number: Number of the step.
+        step: The step.
+        before: The state before it.
+        actor: Side whose event it is, in a run against the surroundings; else empty.
+    """
     from robosc.pipeline.steps import changes_text, event_text
 
-    lines = [f"{number:4}  {': '.join(filter(None, (event_text(step), changes_text(before, step.state))))}"]
+    who = f"{actor:<14}" if actor else ""
+    lines = [f"{number:4}  {who}{': '.join(filter(None, (event_text(step), changes_text(before, step.state))))}"]
     if step.provided is not None:
         lines.append(f"      sends {json.dumps(step.provided, default=str)}")
     goals = [f"goal {', '.join(map(str, step.reached))}"] if step.reached else []
@@ -70,22 +83,26 @@ def step_lines(number: int, step: "Step", before: "StateInWords") -> list[str]:
 
 def state_lines(run_: "ManualRun") -> list[str]:
     """Return the state and what can happen in it, in lines."""
+    from robosc.pipeline.counter_run import CounterRun
+
     others = [event for event in run_.possible if not run_.is_controllable(event)]
+    can_come = [] if isinstance(run_, CounterRun) else [f"can come  {', '.join(others) or 'nothing'}"]
     return [
         f"now       {run_.state}{' (marked)' if run_.is_marked else ''}",
         *_strategy_lines(run_),
         f"allowed   {', '.join(run_.enabled) or 'nothing'}",
-        f"can come  {', '.join(others) or 'nothing'}",
+        *can_come,
     ]
 
 
 def _strategy_lines(run_: "ManualRun") -> list[str]:
-    """Return which goals are true, how far missions are, and what the strategy chooses; nothing without a strategy."""
-    if not run_.has_strategy:
-        return []
+    """Return which goals are true, how far missions are, and what either side is about; nothing without any of them."""
+    from robosc.pipeline.counter_run import CounterRun
+
     goals = ", ".join(f"{number} {'true' if is_true else 'not yet'}" for number, is_true in enumerate(run_.reached, 1))
-    return [
-        *([f"goals     {goals}"] if goals else []),
-        *(f"mission   {item}" for item in run_.missions),
-        f"strategy  {run_.chosen or 'waits'}",
-    ]
+    lines = [*([f"goals     {goals}"] if goals else []), *(f"mission   {item}" for item in run_.missions)]
+    if isinstance(run_, CounterRun):
+        denied = "the turn: silent steps do not end" if run_.denied is None else f"{run_.denied}, whatever you do"
+        came = ", ".join(f"{number} came true {count} times" for number, count in enumerate(run_.came_true, 1))
+        return [*lines, *([f"assumed   {came}"] if came else []), f"denied    {denied}"]
+    return [*lines, f"strategy  {run_.chosen or 'waits'}"] if run_.has_strategy else []

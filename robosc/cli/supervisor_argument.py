@@ -31,7 +31,7 @@ def supervisor_of_arguments(arguments: argparse.Namespace, *, is_json: bool = Fa
         return decode(read_supervisor(arguments.model))
     bundle = read_bundle(arguments)
     deployment = arguments.deployment or str(Deployment.CONTROLLER)
-    # What it is held up to has happened, however it would have gone on.
+    # The log is of a run that has happened, however it would have gone on.
     outcome = synth.make(
         argparse.Namespace(**{**vars(arguments), "deployment": deployment}), bundle, allow_livelock=True
     )

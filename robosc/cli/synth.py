@@ -203,7 +203,9 @@ def report_reasons(outcome: Reasons, bundle: Bundle) -> None:
     if goals is not None:
         sys.stderr.write(f"{goals}\n")
         if goals.counter is not None:
-            sys.stderr.write("'robosc simulate' with '--counter-strategy' plays the surroundings, against you\n")
+            sys.stderr.write(
+                "'robosc simulate' and 'robosc view' with '--counter-strategy' play the surroundings, against you\n"
+            )
 
 
 def goals_explained(outcome: Reasons) -> "GoalExplanation | None":

@@ -32,7 +32,7 @@ _USAGE = """robosc verify [options] FILE.rsup MODEL
 _DESCRIPTION = """\
 With FILE.rsup: check a supervisor file against the texts of its model, believing nothing that the file says of itself:
 it must hold the model of the texts, its figures must be right, and the robot under it must be safe, controllable and
-nonblocking. That it forbids no more than it must is checked for systems of moderate size.
+nonblocking, and reach its goals. That it forbids no more than it must is checked for systems of moderate size.
 With --signed-by: the file must be signed by that key, too; without MODEL, nothing else is checked.
 With properties: verify them in the robot under its supervisor, which is synthesized unless a file is given and passes,
 with a run that shows why each of them holds or fails.
@@ -151,7 +151,7 @@ def _verify_supervisor(arguments: argparse.Namespace) -> int:
         progress.clear()
     is_right = has_passed(found, is_strict=arguments.strict)
     if is_right and (arguments.property or arguments.properties):
-        # Of a supervisor that passed only the verdicts are asked for.
+        # The user wants only the verdicts for a supervisor that has passed.
         return properties.verify(arguments, supervisor)
     return report_file_verification(
         arguments, file_verification_json(found, supervisor, is_strict=arguments.strict), found.diagnostics, bundle

@@ -110,7 +110,7 @@ class _Formulas:
     def shortest(self, node: Node) -> Expression | None:
         """The shortest of the formulas that are found; the first of several."""
         if node not in self._known:
-            # While it is looked for there is none: a form of it in terms of itself would not end.
+            # The node has no formula while one is sought: a formula in terms of itself would not end.
             self._known[node] = None
             try:
                 self._known[node] = self._searched(node)
@@ -122,7 +122,7 @@ class _Formulas:
     def _searched(self, node: Node) -> Expression | None:
         tested = self._support(node)
         if len(tested) > self._limit:
-            # Whatever a node tests matters, so it stands in every formula.
+            # Every variable that a node tests matters, so it stands in every formula.
             return None
         opposite = self._space.without(1, node)
         compared = self._relations.comparable(tested)
@@ -154,7 +154,7 @@ class _Formulas:
     def _of_sums(self, node: Node, opposite: Node, most: int) -> list[Expression]:
         """The formulas of a sum of at most so many products, and of the negation of such a sum."""
         found: list[Expression] = []
-        # What has fewer ways to true mostly has the shorter sum.
+        # A diagram with fewer ways to true mostly has the shorter sum.
         for is_negated in sorted((False, True), key=lambda negated: self._space.paths(opposite if negated else node)):
             wanted, forbidden = (opposite, node) if is_negated else (node, opposite)
             if wanted not in self._covers:
@@ -239,7 +239,7 @@ class _Formulas:
             if part is None:
                 return
             if outcome == 1 or (outcome and 1 in outcomes and len(outcomes) == 2):
-                # What is true for the other values needs no test of its own.
+                # A part that is true for the other values needs no test of its own.
                 terms.append(part if outcome > 1 else self._words.test(variable, mask))
             elif outcome:
                 terms.append(self._join("and", [self._words.test(variable, mask), part]))

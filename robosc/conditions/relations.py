@@ -139,7 +139,7 @@ class Relations:
                 if found.relations:
                     yield self._relaxed(found, forbidden)
                 if chosen == relations:
-                    # What was dropped may have spoilt the tests of single places.
+                    # The dropped relations may have spoilt the tests of single places.
                     todo += [found.relations, *((relation,) for relation in found.relations)]
 
     def _rests(self, wanted: Node, inside: Node, compared: tuple[int, ...], depth: int) -> Iterator[Description]:
@@ -206,7 +206,7 @@ class Relations:
         """Return the node that is true where each of some relations may be true."""
         return self._space.all_of(self._built(relation) for relation in relations)
 
-    # Which relations hold
+    # Relations that hold
 
     def _holding(self, node: Node, compared: tuple[int, ...]) -> tuple[Relation, ...]:
         """Relations that hold wherever a predicate is true and that the ranges of its single places do not imply."""
@@ -281,7 +281,7 @@ class Relations:
         # A bound is one of the sums or one more or less, and is added to a part of the sum.
         return 2 * widest + 2 <= MAXIMUM_INTEGER
 
-    # Which of them are needed
+    # Relations that are needed
 
     def _needed(self, description: Description, forbidden: Node) -> Description:
         """The description without the relations that the others and the rest make unnecessary, the longest first."""
@@ -314,7 +314,7 @@ class Relations:
     def _size(self, relation: Relation) -> Size:
         return size(self.expression(relation))
 
-    # As nodes and as words
+    # Their nodes and their words
 
     def _built(self, relation: Relation) -> Node:
         """Return the node that is true where a relation may be true."""

@@ -78,7 +78,7 @@ class Formulas:
         self.domains = domains
         self.vocabulary = Vocabulary(domains)
         self.effort = Effort(TOTAL_STEPS)
-        # With the operands that were allowed when they were looked for.
+        # Formulas, each with the number of operands that was allowed in its search.
         self._known: dict[DecisionDiagram, tuple[int, Expression | None]] = {}
 
     @contextmanager

@@ -104,7 +104,7 @@ class ConfluenceSearch:
     def _endless(self, start: Node, nodes: list[Node]) -> Order:
         """An order that does not end; `nodes` are all that silent steps reach, and some order does not end."""
         steps = {node: list(self._controller.silent_steps(node)) for node in nodes}
-        # What has no way on leads to no cycle, nor does what leads only there.
+        # Nodes without a step lead to no cycle, nor do those that lead only to such nodes.
         sources: dict[Node, list[Node]] = {node: [] for node in nodes}
         for node in nodes:
             for _, target in steps[node]:

@@ -282,7 +282,7 @@ class Controller:
                 for target in self._semantics.targets(before, event):
                     if target not in further or (is_whole and not further[target][1]):
                         further[target] = (*events, event), is_whole
-            # Without this event it is no whole batch.
+            # The batch is not whole without this event.
             for before, (events, _) in found.items():
                 further.setdefault(before, (events, False))
             found = further

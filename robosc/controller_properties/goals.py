@@ -42,10 +42,12 @@ class MissedGoal:
         goal: Number of the goal or visit, from 0; None where silent steps do not end, or a chosen request is not
             enabled.
         trace: Events that lead to where it begins.
+        state: The state there.
     """
 
     goal: int | None
     trace: tuple[str, ...]
+    state: State
 
 
 @dataclass(frozen=True, slots=True)
@@ -199,7 +201,7 @@ class _Search:
             return
         target = self._controller.after(state, event)
         if target is None:
-            self.lost = MissedGoal(None, self._trace(position))
+            self.lost = MissedGoal(None, self._trace(position), state)
             return
         # Bits that are held for goals of other actions stay.
         held = held if target == state else self._controller.forgotten(target, held)
@@ -212,7 +214,7 @@ class _Search:
     ) -> Position | None:
         run = self._controller.run(node)
         if run.end is None:
-            self.lost = MissedGoal(None, (*(() if before is None else self._trace(before)), *events))
+            self.lost = MissedGoal(None, (*(() if before is None else self._trace(before)), *events), node[0])
             return None
         return self._known(run.end, self._run.observed(run.end[0], memory), mode, before, (*events, *run.events))
 
@@ -250,5 +252,5 @@ class _Search:
                     met.setdefault(numbers[item], []).append(item)
             for found in met.values():
                 if all(any(holding) for holding in zip(*(owed[item] for item in found), strict=True)):
-                    return MissedGoal(goal, self._trace(found[0]))
+                    return MissedGoal(goal, self._trace(found[0]), found[0][0][0])
         return None

@@ -143,7 +143,7 @@ def search(
             continue
         if len(visited) >= limit or moves * controller.width > MAXIMUM_EFFORT:
             found.states = len(visited)
-            # What was not visited may lead to a marked state.
+            # Nodes that were not visited may lead to a marked state.
             found.blocking = None
             return found
         if len(visited) % STOP_INTERVAL == 0 and should_stop():

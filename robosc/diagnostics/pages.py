@@ -149,7 +149,7 @@ def page(code: str) -> Page:
     Raises:
         UnknownCodeError: No page is about it; the message names the nearest code.
     """
-    # As `check` prints it, a code stands in brackets.
+    # The command `check` prints codes in brackets.
     wanted = code.strip("[]").lower()
     if wanted not in codes():
         near = did_you_mean(wanted, codes())

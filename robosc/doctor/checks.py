@@ -363,7 +363,7 @@ def _browser(machine: Machine) -> Iterator[Finding]:
 
 
 def _server(machine: Machine, server: str) -> Iterator[Finding]:
-    """A synthesis server, as the client asks for its health; without the client's packages, its port alone."""
+    """Health of a synthesis server by the client; without the client's packages, its port alone."""
     requirements = machine.requirements() or ()
     has_client = all(machine.version(package) is not None for package, _ in _required(requirements, "client"))
     if requirements and has_client:

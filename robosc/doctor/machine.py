@@ -86,7 +86,7 @@ class Machine:
         except subprocess.TimeoutExpired:
             return None
         finally:
-            # Whatever it has started holds its output open.
+            # Processes that it has started hold its output open.
             if process.poll() is None:
                 os.killpg(process.pid, signal.SIGKILL)
                 process.wait()

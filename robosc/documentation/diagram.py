@@ -13,7 +13,7 @@ from robosc.model.structure import Behaviour, Transition
 from robosc.source import visible
 
 MAXIMUM_TRANSITIONS = 100
-"""Transitions in a diagram; with more of them nobody can read it (and viewers refuse 500)."""
+"""Transitions in a diagram; a larger one is unreadable (and viewers refuse 500)."""
 
 MAXIMUM_LABEL = 100
 """Characters of a transition's label."""

@@ -98,7 +98,7 @@ def complete(
     behind = _BEGUN.sub("", text[offset : offset + _AHEAD], count=1)
     names = list(_Names(place, behind, inspected, surroundings).candidates(expected))
     if place.last() == NOT and "an expression" in expected and all(item.text != NOT for item in names):
-        # With nothing of that name, it can only be the operator.
+        # The word can only be the operator where nothing has this name.
         expected = ("an expression",)
     found = [*names, *_words(place, expected)]
     chosen: dict[str, Candidate] = {}
@@ -177,7 +177,7 @@ class _Names:
         elif last == "in" or "an expression" in expected or "'true'" in expected:
             yield from self._values(self._required_type())
 
-    # Where it is
+    # The place of the cursor
 
     def _is_communication_wanted(self) -> bool:
         item = self._place.item
@@ -207,7 +207,7 @@ class _Names:
         updates = item[item.index("do") + 1 :]
         return self._place.last() in ("do", ",") and updates.count("(") == updates.count(")")
 
-    # What there is
+    # The names that exist
 
     @property
     def _own(self) -> ComponentNames | None:
@@ -436,7 +436,7 @@ class _Names:
         communication = self._inspected.communications.get(name_of(item[1])) if len(item) > 1 else None
         type_ = None if communication is None else communication.request
         if isinstance(type_, EnumType) and self._scope is not None:
-            # What is sent is of the type that the enum is made from.
+            # A sent value is of the type that the enum is made from.
             return self._scope.types.sources.get(type_.name)
         return type_
 

@@ -54,7 +54,7 @@ class Names:
             for place in self._by_line.get((file, line), ())
             if place.column <= column <= place.column + place.length
         ]
-        # Of two that meet here, the one that begins here is meant.
+        # The name that begins here is meant, not the one that ends here.
         for place in sorted(touched, key=lambda place: -place.column):
             found = self.definitions.get(self._uses.get(place, place))
             if found is not None:

@@ -8,7 +8,7 @@ from robosc.language import Parsed, syntax
 from robosc.language.tokens import Kind, tokenize_broken
 
 _INSIDE = frozenset({DefinitionKind.ELEMENT})
-"""Kinds of definitions that are no part of a text that anybody looks for."""
+"""Kinds of definitions that are no part of a text that users look for."""
 
 
 @dataclass(frozen=True, slots=True)

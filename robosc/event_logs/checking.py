@@ -125,7 +125,7 @@ class _Checking:
         self._violations: list[Violation] = []
         self._count = 0
         self._events = self._requests = self._blocked = self._unjudged = self._restarts = 0
-        # What keeps the robot at rest, by the texts of the log.
+        # Reasons that keep the robot at rest, by the texts of the log.
         self._stops: set[str] = set()
         # Actions that were requested: their goals may be under way for longer than the model knows.
         self._requested: set[str] = set()

@@ -69,7 +69,7 @@ class LogReader:
         self.dropped = 0
         self.torn_line: int | None = None
         if self._file.exists() and not (self._file.is_file() or self._file.is_dir()):
-            # A pipe would not even open before somebody writes.
+            # A pipe would not even open before its writer does.
             raise LogError(f"{path} is not a plain file")
 
     def __iter__(self) -> Iterator[LogEntry]:
@@ -86,7 +86,7 @@ class LineStream(Protocol):
     """A file or pipe that is read line by line, in bytes."""
 
     def readline(self, size: int, /) -> bytes:
-        """Return the next line, or as much of it as was asked for; nothing at the end."""
+        """Return the next line, or at most so much of it; nothing at the end."""
 
 
 def read_log_stream(stream: LineStream, name: str) -> LoggedRun:

@@ -97,7 +97,7 @@ class Replay:
             if not variable.is_synthesis
         }
 
-    # What the state allows.
+    # Conditions of the state.
 
     def has(self, event: str) -> bool:
         """Return True if the model has an event of that name."""
@@ -160,7 +160,7 @@ class Replay:
         found = {name: self._provided_value(part) for name, part in provided.properties}
         return all(is_known for is_known, _ in found.values()), {name: value for name, (_, value) in found.items()}
 
-    # What happens.
+    # Steps.
 
     def step(self, event: str, data: Any, logged: Mapping[str, Mapping[str, Any]]) -> tuple[str, ...]:
         """Take an event, whether it is allowed or not.

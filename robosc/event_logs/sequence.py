@@ -218,7 +218,7 @@ def _news(happened: Iterable[LogEntry]) -> list[LogEntry]:
 
 
 def _chosen(happened: Iterable[LogEntry], patterns: Sequence[str]) -> list[LogEntry]:
-    """The entries of the events that are asked for.
+    """The entries of the wanted events.
 
     Raises:
         PlotError: A pattern fits no event of the log.

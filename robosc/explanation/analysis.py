@@ -171,7 +171,7 @@ class Analysis:
         """The states that are trouble."""
         return ~self._fixed_point.nonblocking_ahead(self._problem, self.safe)
 
-    # Why events cannot happen
+    # Causes that block events
 
     def _behaviours(self, event: str) -> tuple[BlockingCause, ...]:
         """Return all causes by which the plants could block an event, each with the states where it applies."""

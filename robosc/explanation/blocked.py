@@ -302,7 +302,7 @@ class Requests:
             raise StateError(f"the value of {subject} is missing or is no {type_text(type_)}")
         return value
 
-    # Why
+    # Reasons
 
     def _why(self, rule: _Rule, state: State) -> Iterator[str]:
         if rule.moves is not None:

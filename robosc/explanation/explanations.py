@@ -240,7 +240,7 @@ class _Text:
         if item.trouble is not None:
             yield from _indented(self._trouble(item.trouble, "then", "it leads into trouble at once"))
 
-    # With a supervisor
+    # Reports about a supervisor
 
     def _event(self, item: EventReport) -> Iterator[str]:
         kind = "" if item.is_controllable else " (uncontrollable)"

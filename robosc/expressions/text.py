@@ -144,7 +144,7 @@ class _Printer:
         return text if part.low is None else f"{text}[{part.low}..{part.high}]"
 
     def _within(self, expression: Expression, level: int, depth: int) -> str:
-        """An operand, in parentheses where it binds less tightly than its place asks."""
+        """An operand, in parentheses where it binds less tightly than its place requires."""
         text, binds = self.print(expression, depth)
         return text if binds >= level else f"({text})"
 

@@ -114,7 +114,7 @@ static void split(DdManager *manager, DdNode *f, int level, DdNode **low, DdNode
     }
 }
 
-/* If-then-else by the variable of a level; it drops both branches, and fails if one of them has failed. */
+/* Return if-then-else by the variable of a level; it drops both branches, and fails if one of them has failed. */
 static DdNode *joined(DdManager *manager, int level, DdNode *low, DdNode *high) {
     DdNode *found = NULL;
     if (low != NULL && high != NULL) {

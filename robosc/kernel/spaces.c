@@ -277,7 +277,7 @@ static int is_in_cube(const Space *space, uint32_t variable, uint32_t place) {
     return (int)(space->cube[variable] >> place & 1);
 }
 
-/* Whether a node is true somewhere in the cube: 1, 0, or -1 for a failure. */
+/* Return 1 if a node is true somewhere in the cube, otherwise 0, or -1 for a failure. */
 static int meets(Space *space, uint32_t node) {
     if (node < 2) {
         return (int)node;
@@ -317,7 +317,8 @@ static int meets(Space *space, uint32_t node) {
     return found;
 }
 
-/* Whether a node is true somewhere in the cube. The result is kept for the round; `count` counts the kept results. */
+/* Return 1 if a node is true somewhere in the cube. The result is kept for the round; `count` counts the kept results.
+   */
 static uint32_t leads(Space *space, uint32_t node, long long *count) {
     if (node < 2) {
         return node;

@@ -28,7 +28,7 @@ def load_bundle(
 
     Libraries are looked for in the model's folder, its sibling `../shared` and `library_paths`. Only files
     that declare a library which is imported, directly or by another library, become part of the bundle: a
-    broken library that nothing imports is nobody's error. Definitions of middleware types are also looked for in the
+    broken library without an importer is no error. Definitions of middleware types are also looked for in the
     packages around the model.
 
     Args:
@@ -98,7 +98,7 @@ def _candidates(model: Path, folders: Iterable[Path], unsaved: Mapping[str, str]
     files: dict[str, _Candidate] = {}
     for folder in folders:
         here = Path(os.path.realpath(folder))
-        # What is new in an editor is not saved anywhere yet.
+        # New files of an editor are not saved yet.
         new = (folder / path.name for path in map(Path, unsaved) if path.parent == here)
         for path in sorted({*folder.iterdir(), *new}):
             real = os.path.realpath(path)
@@ -154,5 +154,5 @@ def _triples(text: str, word: str) -> Iterator[tuple[str, str, str]]:
         if token == word and kinds[index + 1] in (Kind.NAME, Kind.WORD):
             yield token, texts[index + 1].removeprefix("^"), texts[index + 2]
         elif kinds[index] == Kind.OTHER and is_open_comment(token):
-            # There is no end of a comment in it: without their begins, there are none.
+            # The text has no end of a comment, so it has no begin of one either.
             yield from _triples(token.replace("/*", "  "), word)

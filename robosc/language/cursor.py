@@ -317,7 +317,7 @@ class Cursor:
             self.place += 1
             return index
         fault = self.fault("'{'")
-        # With more ends than begins in the text, it is the '{' that was forgotten and not the whole list.
+        # A text with more ends than begins lacks the '{', and not the whole list.
         is_forgotten = self.texts.count("{") < self.texts.count("}")
         if is_forgotten and (self.texts[index] in words or self.texts[index] == "}"):
             return index
@@ -345,7 +345,7 @@ class Cursor:
                 fix = "Write '}' before it." if is_missing else misplaced(self.texts[index])
             self.fault(*expected, "'}'", related=related, fix=fix)
             self._recover(index)
-        # What an outer list can go on with ends this one.
+        # Words with which an outer list can go on end this one.
         index = self.place
         if self.kinds[index] == _END:
             return True
@@ -367,7 +367,7 @@ class Cursor:
             return False
         fix = advise(node, self._declared, place, self._quoted(index, end))
         message = f"there is no {shown(word)} in the language: {why(family)}"
-        # With states and requirements in it, it may be longer than what `report` lets pass.
+        # The message, with states and requirements in it, may be longer than `report` lets pass.
         self.diagnostics.append(Diagnostic(Severity.ERROR, "syntax-error", message, self.at(index), fix))
         self.reported_fault()
         self.place = end

@@ -137,7 +137,7 @@ class GoalParser(ExpressionParser):
             message = f"{shown(token)} does not fit here; expected 'leads'"
             raise self.unfit(message, f"Write 'leads to' instead of '{token}'.")
         if token == "}" or (token != "leads" and self._begins_item(self.place)):
-            # With nothing behind the expression, it is the words before it that are missing.
+            # The expression is the end, so the words before it are missing.
             self.place = begin
             message = (
                 f"{shown(self.texts[begin])} does not fit here; expected 'always eventually' before the expression, or "

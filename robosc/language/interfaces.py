@@ -81,7 +81,7 @@ def _nested(file: SourceFile) -> set[str]:
         found = set(nested_types(parse_definition(file.text, package)))
     except MalformedDefinitionError:
         return set()
-    # In ROS 1, `Header` alone is that of std_msgs.
+    # The name `Header` alone is that of std_msgs in ROS 1.
     return found | ({"std_msgs/Header"} if f"{package}/Header" in found else set())
 
 

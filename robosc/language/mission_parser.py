@@ -190,7 +190,7 @@ class MissionParser(GoalParser):
         begin = self.place
         token, following = self.texts[begin : begin + 2]
         if token == "visit":
-            # Nothing else can be meant, so that what follows is read on.
+            # The word can mean nothing else, so that the text behind it is read on.
             self.fault("'from'", fix="Write 'from anywhere' before it.")
         elif token == "from" and following == "visit":
             self.place += 1

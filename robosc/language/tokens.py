@@ -29,9 +29,9 @@ def _pattern(string: str, open_string: str) -> re.Pattern[str]:
         r"|(->|\.\.|:=|=>|!=|<=|>=|/(?!\*)|[{}()\[\],.:=<>+\-*!])"
         r"|([0-9]++(?:\.[0-9]++)?)"
         rf"|({string})"
-        # What is never closed takes the rest: no later quote of it needs to look for its end again.
+        # A text that is never closed takes the rest: no later quote of it needs to look for its end again.
         rf"|({open_string}|/\*[\s\S]*+|[\s\S])"
-        # Without the end as an alternative, blanks before it would be tried once more from each of them.
+        # The end is an alternative, so that blanks before it are not tried once more from each of them.
         r"|(\Z))"
     )
 

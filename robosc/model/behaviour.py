@@ -486,7 +486,7 @@ class BehaviourBuilder:
 
     def _check_graph(self, behaviour: Behaviour) -> None:
         """From every reachable state a marked state must be reachable."""
-        # What can happen in every state leaves from one more place, which every state leads to.
+        # Transitions of every state leave from one more place, which every state leads to.
         everywhere = ""
         steps: dict[str, set[str]] = {everywhere: set(), **{state.name: {everywhere} for state in behaviour.states}}
         for transition in behaviour.transitions:

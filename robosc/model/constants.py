@@ -161,7 +161,7 @@ class Constants:
 
 
 class VisibleConstants(Mapping[str, Typed | None]):
-    """The constants that a file can name; each is worked out when it is asked for.
+    """The constants that a file can name; each is worked out on first use.
 
     Attributes:
         ambiguous: Names that several libraries define, with the libraries' names.

@@ -191,7 +191,7 @@ class InterfaceChecker:
     def _note_missing(self, package: str, type_: str, location: Location) -> None:
         if any(catalogue.knows(package) for catalogue in self._catalogues):
             package = type_
-        # Where nothing was looked for, nothing was missed.
+        # Missing definitions are noted only if they were searched for.
         if self._are_searched and package not in self._noted:
             self._noted.add(package)
             self._findings.note(

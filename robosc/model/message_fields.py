@@ -118,7 +118,7 @@ class Comparison:
 
 
 class FieldChecker:
-    """Checker of data types against messages; of each pair, no matter how often it is asked for, once.
+    """Checker of data types against messages; each pair is checked once.
 
     Args:
         catalogue: The interfaces.
@@ -220,7 +220,7 @@ class FieldChecker:
             return is_ros1 or self._language is Language.CPP
         if self._language is Language.PYTHON:
             return False
-        # In C++, ROS 1 stores a bool in a byte, and a byte is a number.
+        # A bool of ROS 1 is stored in a byte in C++, and a byte is a number.
         if isinstance(type_, IntegerType):
             return is_ros1 and field_type == "bool"
         return isinstance(type_, BooleanType) and field_type in {"uint8", *(() if is_ros1 else ("byte", "char"))}

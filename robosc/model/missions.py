@@ -131,7 +131,7 @@ def _check_order(preferences: Sequence[Preference], findings: Findings, places: 
     if circle is None:
         return
     *others, last = sorted(set(circle.preferences))
-    # What the last of them says is shown first.
+    # The words of the last of them are shown first.
     begin = circle.preferences.index(last)
     names = (*circle.names[begin:], *circle.names[:begin], circle.names[begin])
     shown = names if len(names) <= _MOST_SHOWN else (*names[: _MOST_SHOWN - 1], "...", names[-1])

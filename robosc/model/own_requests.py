@@ -86,7 +86,7 @@ def _known_value(
 
 
 def _tests_knowledge(expression: Expression) -> bool:
-    """Return True if an expression asks what is known: here, that something is not known means something else."""
+    """Return True if an expression tests whether data are known: here, unknown data mean something else."""
     stack = [expression]
     while stack:
         node = stack.pop()

@@ -48,7 +48,7 @@ def narrowed(condition: Expression, ranges: Ranges) -> Ranges | None:
             ways = [way for choice in choices if (way := narrowed(Unary("not", choice), found)) is not None]
             if not ways:
                 return None
-            # What some way does not speak of can have any value there.
+            # A read that some way leaves out can have any value there.
             spoken_of = Counter(read for way in ways for read in way)
             common = [read for read, count in spoken_of.items() if count == len(ways)]
             found |= {read: reduce(_hull, (way[read] for way in ways)) for read in common}

@@ -289,7 +289,7 @@ class Goal(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     """A condition that the robot is to reach (language C.1); it is looked at in stable states.
 
     Attributes:
-        form: Form, which tells that it is to hold again and again, after each trigger, or at least once.
+        form: Form: it is to hold again and again, after each trigger, or at least once.
         condition: Condition that is to hold.
         trigger: The condition before `leads to`; None in the other forms.
     """
@@ -308,7 +308,7 @@ class Assumption(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     """A condition that the surroundings of the robot bring about (language C.2); it is looked at in stable states.
 
     Attributes:
-        form: Form, which tells that it holds again and again, or after each trigger; never `ONCE`.
+        form: Form: it holds again and again, or after each trigger; never `ONCE`.
         condition: Condition that holds then.
         trigger: The condition before `leads to`; None in the other form.
         is_allowed: True if the robot itself may keep it from coming true.

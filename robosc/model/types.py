@@ -44,7 +44,7 @@ def _misspelt_default(tree: syntax.EnumDefinition) -> syntax.Name | None:
 
 
 class Types:
-    """The data types that a model uses, in the order in which they were first asked for.
+    """The data types that a model uses, in the order of their first uses.
 
     Attributes:
         objects: Object definitions by model name.

@@ -101,7 +101,7 @@ def _free_name(name: str, taken: Collection[str]) -> str:
 
 
 class Libraries:
-    """The libraries of a bundle, parsed when they are asked for."""
+    """The libraries of a bundle, parsed on first use."""
 
     def __init__(self, bundle: Bundle, main: Unit, findings: Findings) -> None:
         self._bundle = bundle
@@ -117,7 +117,7 @@ class Libraries:
 
     @property
     def units(self) -> tuple[Unit, ...]:
-        """The libraries that were asked for and found."""
+        """The libraries that were used and found."""
         return tuple(self._units.values())
 
     def unit(self, name: syntax.Name) -> Unit | None:
@@ -270,7 +270,7 @@ def _follow(
         findings.bindings.bind(component.imported.library, library.tree.name.location)
         wanted = component.imported.component
         if wanted.text not in library.components:
-            # What a broken library would have is not known.
+            # The contents of a broken library are unknown.
             if not findings.is_broken(library.tree.name.location.file):
                 what = f"component of library '{library.tree.name.text}'"
                 findings.unknown(what, wanted.text, wanted.location, library.components)

@@ -63,7 +63,7 @@ def read_properties(
     """
     found: list[WrittenProperty] = []
     diagnostics: list[Diagnostic] = []
-    # Whoever works with the trees walks them recursively too.
+    # Later work on the trees is recursive, too.
     allow_depth(MAXIMUM_NESTING, FRAMES_PER_LEVEL)
     for file in files:
         places = Places(file)

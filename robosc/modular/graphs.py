@@ -1,7 +1,7 @@
 """Automata with numbered states and labels: composition, hiding of labels, and merging of classes of states."""
 
 from collections import defaultdict
-from collections.abc import Hashable, Iterator, Sequence
+from collections.abc import Hashable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 
 type Label = Hashable
@@ -89,28 +89,23 @@ def leading_to(edges: Edges, states: set[int]) -> set[int]:
     for state, steps in enumerate(edges):
         for _, target in steps:
             before[target].append(state)
-    found, waiting = set(states), list(states)
-    while waiting:
-        for state in before[waiting.pop()]:
-            if state not in found:
-                found.add(state)
-                waiting.append(state)
-    return found
+    return _reached(states, before)
 
 
 def is_nonblocking(graph: Graph) -> bool:
     """Return True if an automaton alone can always reach a marked state."""
-    alive = leading_to(graph.edges, graph.marked)
-    found, waiting = set(graph.initial), list(graph.initial)
+    after = [[target for _, target in steps] for steps in graph.edges]
+    return _reached(graph.initial, after) <= leading_to(graph.edges, graph.marked)
+
+
+def _reached(states: Iterable[int], after: Sequence[Sequence[int]]) -> set[int]:
+    found, waiting = set(states), list(states)
     while waiting:
-        state = waiting.pop()
-        if state not in alive:
-            return False
-        for _, target in graph.edges[state]:
-            if target not in found:
-                found.add(target)
-                waiting.append(target)
-    return True
+        for state in after[waiting.pop()]:
+            if state not in found:
+                found.add(state)
+                waiting.append(state)
+    return found
 
 
 def silent_components(graph: Graph) -> list[int]:

@@ -53,6 +53,10 @@ class ManualRun(ABC):
         """Location of each service and action, by its name; automata have none."""
         return {}
 
+    def actor(self, event: str) -> str:
+        """Return whose event it is, where two sides play; empty where a person plays both."""
+        return ""
+
     @property
     def has_strategy(self) -> bool:
         """True if the supervisor has a strategy, which reaches the goals and visits of its model."""

@@ -86,7 +86,7 @@ def visits_made(mission: Mission, before: MissionPlace, after: MissionPlace) -> 
     if not after.is_asked:
         return
     name, count = f"mission {mission.name}", len(mission.visits)
-    # Where every visit was true already, all of them were made then.
+    # All visits were made at once where every one was true already.
     if not before.is_round:
         made = count if after.is_round else (after.visit - before.visit) % count
         for number in range(before.visit, before.visit + made):

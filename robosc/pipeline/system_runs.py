@@ -300,7 +300,7 @@ def _read(
     if data is not None and not (is_array and isinstance(data, list | tuple)):
         wanted = "a list" if is_array else f"a mapping with {', '.join(map(str, steps))}"
         raise DataError(f"{place} is {data!r:.100}, and must be {wanted}")
-    # Nothing is known of what is unknown, nor beyond the end of a list.
+    # Elements of unknown lists are unknown, and so are those beyond the end of a list.
     elements: Sequence[object] = data if isinstance(data, list | tuple) else ()
     for step in steps:
         inside = elements[step] if isinstance(step, int) and step < len(elements) else None

@@ -319,7 +319,7 @@ def _empty(
     from robosc.explanation import explain_empty
 
     explanation: EmptyExplanation | NoSupervisor = NoSupervisor(reason, ())
-    # Whatever the limit of nodes, that there is no supervisor is known.
+    # The verdict, no supervisor, holds whatever the limit of nodes.
     with suppress(NodeLimitError):
         explanation = explain_empty(
             words,

@@ -166,7 +166,7 @@ class _Reader:
                     self._edge(draft, edge)
             elif part.tag == "LabelBlock":
                 draft.events += self._labels(part)
-                # In the alphabet it says that no other state is marked.
+                # The label in the alphabet means that no other state is marked.
                 has_accepting = has_accepting or _ACCEPTING in _names(part)
         if not has_accepting:
             draft.marked = list(draft.states)
@@ -251,7 +251,7 @@ def write_wmod(system: System) -> str:
         lines.append(f'  <SimpleComponent Kind="{kind}" Name={_quoted(automaton.name)}>')
         lines.append("   <Graph>")
         silent = sorted(automaton.alphabet - {edge.event for edge in automaton.edges})
-        # Without an accepting state all of them would be marked.
+        # All states would be marked without an accepting one.
         silent += [] if automaton.marked else [_ACCEPTING]
         if silent:
             lines += ["    <LabelBlock>", *(f"     {_identifier(event)}" for event in silent), "    </LabelBlock>"]

@@ -183,6 +183,11 @@ class CounterPlayer:
         """Return the number of the first stage of a position, or None if the counter-strategy knows none."""
         return next((number for number, item in enumerate(self._stages) if item.positions(state)), None)
 
+    def denied(self, state: State) -> int | None:
+        """Return the number of the goal that is denied in a position, or None where the counter-strategy knows none."""
+        stage = self.stage(state)
+        return None if stage is None else self._stages[stage].goal
+
     def rank(self, state: State, aim: int) -> Rank | None:
         """Return the rank of a position, or None if the counter-strategy does not know the position.
 

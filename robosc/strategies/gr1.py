@@ -84,7 +84,7 @@ def solve(
         false: The predicate that is true nowhere.
         check_stop: Function called before each step; it may end the work with an error.
     """
-    # Without an assumption there is one that never fails.
+    # The empty assumption is one that never fails.
     failing = [~item for item in assumptions] or [false]
     winning, rounds = arena.positions, 0
     approaches: list[tuple[Approach, ...]] = [()] * len(goals)

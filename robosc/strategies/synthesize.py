@@ -194,18 +194,22 @@ class StrategySynthesis:
 
     def can_be_reached(self, goals: Sequence[int]) -> bool:
         """Return True if both sides together can make goals true again and again."""
+        return self.arena.can_begin(self._possible([self.goals[item] for item in goals]))
+
+    def _possible(self, wanted: Sequence[Any]) -> Any:
+        """Return the positions from which both sides together can make conditions true again and again."""
         found = self.arena.positions
         before = None
         while found != before:
             before = found
-            for item in goals:
-                near = found & self.goals[item] & self.arena.together(found)
+            for item in wanted:
+                near = found & item & self.arena.together(found)
                 wider = None
                 while near != wider:
                     wider = near
                     near = near | (found & self.arena.together(near))
                 found = near
-        return self.arena.can_begin(found)
+        return found
 
     def _unneeded(self) -> tuple[int, ...]:
         """Return assumptions that can be left out together; of two that can replace each other, the later one."""
@@ -221,7 +225,11 @@ class StrategySynthesis:
         """Return assumptions that the robot can make false for ever, in a state that it can get to.
 
         A robot that does so reaches its goals in name alone. Such assumptions are not well separated from the goals:
-        U. Klein and A. Pnueli, "Revisiting synthesis of GR(1) specifications", HVC 2010, LNCS 6504, pp. 161-181.
+        U. Klein and A. Pnueli, "Revisiting synthesis of GR(1) specifications", HVC 2010, LNCS 6504, pp. 161-181. One by
+        one is enough: if each can be made true from every state, so can all in turn.
+
+        Where nobody can make an assumption true any more, as after a device has broken for good, the robot prevents
+        nothing, unless its own request leads there.
 
         Args:
             allowed: Numbers of assumptions that are not looked at.
@@ -230,7 +238,9 @@ class StrategySynthesis:
         for item, assumption in enumerate(self.assumptions):
             if item not in allowed:
                 prevented = self._solved([assumption], [self._manager.false]).winning
-                if self._is_met(prevented):
+                possible = self._possible([assumption])
+                prevented = prevented | self.arena.turn(self.arena.positions & ~possible)
+                if self._is_met(prevented & possible):
                     found.append(item)
         return tuple(found)
 

@@ -20,8 +20,8 @@ MAXIMUM_BYTES = 16 * 2**20
 MAXIMUM_EXPRESSION_DEPTH = 400
 """Deepest nesting of expressions: every later stage may recurse over them."""
 
-# What stands around the deepest expression: document, supervisor, model, component, behaviour, transition,
-# update, and the arrays between them.
+# Levels around the deepest expression: document, supervisor, model, component, behaviour, transition, update, and the
+# arrays between them.
 _MAXIMUM_NESTING = MAXIMUM_EXPRESSION_DEPTH + 14
 
 

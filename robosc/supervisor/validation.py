@@ -200,7 +200,7 @@ def _require_no_cycle(scope: Scope) -> None:
             if left[holder] == 0:
                 free.append(holder)
     if left:
-        # Whatever is left holds something that is left, so going on from there comes back at last.
+        # Each name that is left holds another one that is left, so the walk comes back at last.
         name, passed = min(left), set[str]()
         while name not in passed:
             passed.add(name)

@@ -134,7 +134,7 @@ def _operands(expression: Expression, event: str) -> list[Subject | Datum]:
                 found.append((event, path))
             case Binary(operator="+" | "-", left=left, right=right):
                 stack += [right, left]
-            # Of two factors each bit of one meets all of the other: no order helps.
+            # Each bit of a factor meets all bits of the other: no order helps.
             case (
                 Binary(operator="*", left=factor, right=Constant())
                 | Binary(operator="*", left=Constant(), right=factor)

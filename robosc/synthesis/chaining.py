@@ -57,7 +57,7 @@ class Chaining:
         while True:
             number = work.next()
             if number is None:
-                # What states have to keep to may read more than a step does, so each has the last word.
+                # The conditions of the states may read more than a step does, so each has the last word.
                 number = next((n for n, step in enumerate(self._steps) if self._grown(step, states) != states), None)
                 if number is None:
                     self._monitor.report(phase, reported + 1, states)

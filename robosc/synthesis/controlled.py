@@ -78,7 +78,7 @@ class ControlledSystem(SolvedProblem):
         """
         candidates = tuple(place for place, item in enumerate(restrictions) if not self._restricts(item))
         if not self._supervisor_disables():
-            # Nothing lies beyond: what can be reached is what plants and conditions let happen.
+            # The reachable states are those that plants and conditions allow, and no others.
             return candidates
         found = self._removable(restrictions, [item for item in candidates if not restrictions[item].invariants], [])
         for place in reversed(candidates):
@@ -92,7 +92,7 @@ class ControlledSystem(SolvedProblem):
         condition, broken = None, self._manager.false
         conditions = self.encoding.system.conditions
         for item in (*(conditions[place] for place in restriction.conditions), *restriction.watched):
-            # What one requirement brings is mostly one condition on many events.
+            # A requirement is mostly one condition on many events.
             if item.condition is not condition:
                 condition, broken = item.condition, self.reachable & ~self._holds(item.condition)
             if broken & self._steps[item.event].plant != self._manager.false:

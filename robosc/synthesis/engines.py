@@ -148,7 +148,8 @@ def resolve_engine(name: str) -> str:
     """
     if name == "auto":
         return "cudd" if _has_cudd() else "autoref"
-    # What other packages offer is looked up only if it is asked for: that reads the lists of all that is installed.
+    # The engines of other packages are looked up only for an unknown name: that reads the lists of all installed
+    # packages.
     if name not in _FACTORIES and name not in engine_names():
         raise UnknownEngineError(f"unknown engine '{name}'; there are auto, {', '.join(engine_names())}")
     if name == "cudd" and not _has_cudd():
@@ -215,7 +216,7 @@ def limited(manager: Manager, maximum_nodes: int | None) -> Iterator[None]:
     try:
         yield
     except ValueError as error:
-        # There is no error of its own for this.
+        # The library has no error of its own for this.
         has_failed = "NULL" in str(error)
         if not has_failed:
             raise

@@ -187,7 +187,7 @@ class ExpressionEncoder:
             self._encoding.any_of(predicate for value, predicate in found.cases if (int(value) >> place) & 1)
             for place in range(width_for(low, high))
         )
-        # Where it is unknown its bits are those of zero.
+        # The bits of an unknown number are those of zero.
         return Number(Vector(bits, min(low, 0), max(high, 0)), self._known(found))
 
     def _extreme(self, function: str, a: Number, b: Number) -> Number:
@@ -270,7 +270,7 @@ class ExpressionEncoder:
             return Number(self._arithmetic.constant(0), self._manager.false)
         if (low, high) == (vector.low, vector.high):
             return Number(vector, known)
-        # What lies beyond is unknown, so its bits do not matter; zero keeps the bounds true.
+        # Values beyond are unknown, so their bits do not matter; zero keeps the bounds true.
         kept = tuple(known & bit for bit in vector.bits)
         return Number(Vector(kept, min(low, 0), max(high, 0)), known)
 
@@ -332,7 +332,7 @@ class ExpressionEncoder:
         """Return the predicate that both are known and a < b: for each value of b, from below, where a is smaller."""
         cases = [(value, 0, predicate) for value, predicate in b.cases]
         cases += [(value, 1, predicate) for value, predicate in a.cases]
-        # Of equal values those of b come first, so that only smaller ones of a have been met.
+        # Equal values of b come first, so that only smaller ones of a have been met.
         smaller = outcome = self._manager.false
         for _, is_left, predicate in sorted(cases, key=lambda case: case[:2]):
             if is_left:
@@ -365,7 +365,7 @@ class ExpressionEncoder:
             "use integers, or smaller ranges"
         )
 
-    # What an update writes
+    # Values that an update writes
 
     def written(self, bits: Bits, expression: Expression) -> tuple[dict[str, Any], Any]:
         """For each bit of a variable its value after an update, and where the update leaves the range."""

@@ -270,7 +270,7 @@ def _shown(events: Sequence[str]) -> str:
     return shown + (f", ... ({len(events)} in all)" if len(events) > MAXIMUM_EVENTS else "")
 
 
-# Requests that nobody asks for
+# Requests that no message prompts
 
 
 def _unprompted(model: Model, places: Places, found: Unprompted) -> Diagnostic:

@@ -8,7 +8,7 @@ from robosc.synthesis.result import SynthesisProgress
 
 
 class ProgressMonitor:
-    """Monitor of a synthesis: it asks the waiting caller whether to stop, reports progress, and counts nodes.
+    """Monitor of a synthesis: it ends the work when its caller stops it, reports progress, and counts nodes.
 
     Args:
         should_stop: Asked before each step of the work with one event; once true, the work ends.
@@ -105,7 +105,7 @@ class BoundedMonitor(ProgressMonitor):
         self._monitor.report(phase, rounds, states)
 
     def result_of[T](self, work: Callable[[], T]) -> T | None:
-        """Return the result of some work that asks this monitor, or None if its limit has ended the work."""
+        """Return the result of some work under this monitor, or None if its limit has ended the work."""
         # No context manager: those of contextlib keep the frames of an error, and their predicates, in a cycle.
         try:
             return work()

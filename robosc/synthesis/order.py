@@ -57,7 +57,7 @@ def hyperedges(system: System) -> tuple[frozenset[Subject], ...]:
     on_events = (item.condition for item in (*system.conditions, *system.plant_conditions))
     for condition in (*on_events, *system.invariants, *system.plant_invariants):
         found[subjects_read(condition)] = None
-        # What is compared belongs closer together than what a long condition merely lists.
+        # Compared subjects belong closer together than those that a long condition merely lists.
         for part in simple_parts(condition):
             found[subjects_read(part)] = None
     return tuple(edge for edge in found if len(edge) > 1)
@@ -94,7 +94,7 @@ def force(count: int, edges: Sequence[Sequence[int]]) -> tuple[int, ...]:
         if now < best_span:
             best, best_span = order, now
         if tuple(order) in known:
-            break  # What follows has been seen.
+            break  # The following orders have been seen.
         known.add(tuple(order))
     return tuple(best)
 

@@ -124,7 +124,7 @@ class Simplifier:
             if not found[diagram][0]:
                 limit = min(limit, found[diagram][1][0])
         if all(length[0] for length in found.values()) or len(places) <= limit:
-            # What restricting gives needs a test of each of its places, and is mostly the longest: soon given up.
+            # The restricted form needs a test of each of its places, and is mostly the longest: soon given up.
             first = extract(self._encoding, simple)
             found = {first: self._length(first, limit), **found}
         best = min(found, key=lambda diagram: found[diagram])
@@ -264,7 +264,7 @@ class Simplifier:
             space = space_of(diagrams, self._domains, self._formulas.effort.part(STEPS))
             words = Words(space, self._formulas.vocabulary)
             sets = [space.of(diagram) for diagram in diagrams]
-            # What has fewer ways to true mostly has the shorter sum.
+            # A diagram with fewer ways to true mostly has the shorter sum.
             pairs = sorted((sets, sets[::-1]), key=lambda pair: space.paths(pair[0]))
         except EffortExceededError:
             return

@@ -63,7 +63,7 @@ def transition_of(encoding: Encoding, event: Event) -> Transition:
     manager, system = encoding.manager, encoding.system
     encoder = ExpressionEncoder(encoding, encoding.inputs_of(event.name))
     participants = [automaton for automaton in system.automata if event.name in automaton.alphabet]
-    # An event in no alphabet belongs to nobody, so it cannot happen.
+    # An event in no alphabet belongs to no automaton, so it cannot happen.
     possible = encoding.possible_inputs(event.name) if participants else manager.false
     possible = possible & _condition(encoding, encoder, system.plant_conditions, event.name)
     watched = manager.true
@@ -82,7 +82,7 @@ def transition_of(encoding: Encoding, event: Event) -> Transition:
             if not is_monitor:
                 watched = watched & is_taken
             possible = possible & (~is_taken | encoding.any_of(arc.taken for arc in arcs))
-            # Where it has no edge it stays as it is.
+            # The automaton stays where it is without an edge.
             arcs = [*arcs, _Arc(~is_taken, {}, manager.false)]
         out_of_range = out_of_range | encoding.any_of(arc.taken & arc.out_of_range for arc in arcs)
         functions |= _functions(encoding, arcs)
@@ -181,7 +181,7 @@ def _arc(
     manager = encoding.manager
     written: dict[str, Any] = {}
     out_of_range = manager.false
-    # Where all edges lead to one place each of them writes it, so that what is written is a constant.
+    # Edges to one place all write it, so that the written value is a constant.
     if leads is Leads.TO_ONE_PLACE or (leads is Leads.AWAY and edge.target != edge.source):
         location = encoding.subjects[Subject(automaton.name)]
         index = location.domain.index(edge.target)

@@ -159,10 +159,10 @@ def write_generated(files: GeneratedFiles, target: str, folder: Path, *, force: 
         files: The files.
         target: Name of their target, or `ALL`.
         folder: The folder.
-        force: True if files are replaced even where somebody has changed them.
+        force: True if files are replaced even where they were changed.
 
     Raises:
-        OverwriteError: A file was changed by somebody; nothing was written.
+        OverwriteError: A file was changed since it was generated; nothing was written.
         UnwritableError: The place cannot be written.
     """
     left_out = targets_left_out(files, target)

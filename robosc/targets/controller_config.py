@@ -53,7 +53,7 @@ class ControllerConfig:
     warnings: tuple[str, ...] = ()
 
     def options(self, package: str | None) -> GenerateOptions:
-        """Return the options that a target is asked for."""
+        """Return the options that a target is called with."""
         return GenerateOptions(
             package, self.publish_state, self.log_events, self.supervised, self.metadata, self.state_message
         )

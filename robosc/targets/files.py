@@ -117,7 +117,7 @@ def write_files(files: GeneratedFiles, directory: Path, force: bool = False) -> 
         The path of every generated file, sorted.
 
     Raises:
-        OverwriteError: A file was changed by somebody; nothing was written.
+        OverwriteError: A file was changed since it was generated; nothing was written.
         UnwritableError: The place cannot be written.
     """
     try:
@@ -168,7 +168,7 @@ def remove_earlier(directory: Path, folders: Iterable[str]) -> Removal:
 def _remove_empty_folders(removed: Iterable[Path], directory: Path) -> None:
     folders = {folder for place in removed for folder in place.parents if directory in folder.parents}
     for folder in sorted(folders, key=lambda folder: len(folder.parts), reverse=True):
-        with contextlib.suppress(OSError):  # Something else is in it.
+        with contextlib.suppress(OSError):  # The folder has other files.
             folder.rmdir()
 
 

@@ -26,9 +26,9 @@ ENTRY_POINT_GROUP = "robosc.targets"
 _PACKAGE = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,199}\Z")
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,199}\Z")
 _MAINTAINER = re.compile(r"(.*\S)\s*<([^<>]*)>\s*\Z")
-# As catkin_pkg, which reads package.xml, takes it.
+# The address is one that catkin_pkg, which reads package.xml, takes.
 _EMAIL = re.compile(r"[-A-Za-z0-9_%+]+(\.[-A-Za-z0-9_%+]+)*@([-A-Za-z0-9]+\.)+[A-Za-z]{2,}\Z")
-# As ament_copyright takes it, after the word Copyright.
+# The line is one that ament_copyright takes after the word Copyright.
 _COPYRIGHT = re.compile(r"\d{4}(-\d{4})?(, *\d{4}(-\d{4})?)*,? +\S.*\Z", re.ASCII)
 _VERSION = re.compile(r"(0|[1-9][0-9]{0,8})(\.(0|[1-9][0-9]{0,8})){2}\Z")
 _MAXIMUM_TEXT = 200
@@ -269,7 +269,8 @@ def require_target(name: str) -> None:
     Raises:
         UnknownTargetError: There is none; the message says what there is.
     """
-    # What other packages offer is looked up only if it is asked for: that reads the lists of all that is installed.
+    # The targets of other packages are looked up only for an unknown name: that reads the lists of all installed
+    # packages.
     if name in _BUILT_IN or name in _registered:
         return
     names = [info.name for info in available_targets()]

@@ -203,5 +203,5 @@ class EventTable:
         return self._semantics.enabled(self._packing.decode(code), self.event.name)
 
     def is_bad(self, code: int) -> bool:
-        """Return True if the event makes a state bad whose changes have been asked for."""
+        """Return True if the event makes a state bad whose changes were computed."""
         return code & self.field in self.bad

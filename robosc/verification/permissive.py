@@ -87,7 +87,8 @@ def _explore(found: Allowed, codes: list[int], packing: Packing, tables: list[Ev
         for place, table in enumerate(tables if not is_bad else ()):
             changes = table.changes(code)
             if changes:
-                # As in `search`, which keeps causes beside: a call for each transition would take most of the time.
+                # The loop stands in `search`, too, which keeps causes beside: a call for each transition would take
+                # most of the time.
                 for change in changes:
                     target = code ^ change
                     reached = numbers.get(target)

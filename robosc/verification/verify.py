@@ -21,16 +21,18 @@ class Limits:
         states: States up to which the controlled system is searched one by one.
         recomputed: States of the uncontrolled system up to which the supervisor is recomputed.
         work: Nodes of decision diagrams up to which larger systems are searched symbolically.
+        positions: Positions under a strategy up to which they are searched one by one.
     """
 
     states: int
     recomputed: int
     work: int
+    positions: int = 0
 
     @classmethod
     def of(cls, states: int) -> "Limits":
         """Limits under which each part takes about as long as searching so many states."""
-        return cls(states, states // 4, 25 * states)
+        return cls(states, states // 4, 25 * states, states // 10)
 
 
 @dataclass(frozen=True, slots=True)

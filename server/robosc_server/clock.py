@@ -6,6 +6,7 @@ Durations are measured with the clock of the running event loop, which asyncio's
 
 import sys
 import time
+from collections.abc import Callable
 
 
 def monotonic() -> float:
@@ -19,6 +20,12 @@ def monotonic() -> float:
         return time.monotonic() if asyncio is None else asyncio.get_running_loop().time()
     except RuntimeError:
         return time.monotonic()
+
+
+def running_clock() -> Callable[[], float]:
+    """Return the clock of the running event loop, for several looks at it."""
+    clock: Callable[[], float] = sys.modules["asyncio"].get_running_loop().time
+    return clock
 
 
 def wall_clock_s() -> float:

@@ -90,7 +90,7 @@ class ResultSender:
                 if not self._unread[caller]:
                     del self._unread[caller]
 
-        # When the call has ended for gRPC, too: a handler that has ended has only handed its messages over.
+        # The call must have ended for gRPC, too: a handler that has ended has only handed its messages over.
         context.add_done_callback(forget)
         return forget
 

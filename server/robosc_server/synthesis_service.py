@@ -6,7 +6,6 @@ response is sent as it is. Parsing and serializing with the generated bindings w
 
 import asyncio
 from collections.abc import Awaitable, Callable
-from dataclasses import replace
 from typing import Any, Protocol, Self
 
 import grpc
@@ -80,9 +79,9 @@ class SynthesisService:
         keys: Callable[[str, str], str] = own_key,
         identify: Callable[[Any], str] = caller_of,
     ) -> None:
-        self._provider, self._keys, self._identify = provider, keys, identify
+        self._provider, self._identify = provider, identify
         self._sender = sender
-        self._requests = RequestCache(limits)
+        self._requests = RequestCache(limits, keys)
         self._fixed = {"ListTargets": (pb.ListTargetsRequest, targets), "GetVersion": (pb.GetVersionRequest, version)}
 
     def handler(self) -> grpc.GenericRpcHandler:
@@ -104,8 +103,8 @@ class SynthesisService:
         Raises:
             RefusedError: There is none.
         """
-        task, caller = self._requests.accept(kind, request), self._identify(context)
-        return replace(task, key=self._keys(task.key, caller)), caller
+        caller = self._identify(context)
+        return self._requests.accept(kind, caller, request), caller
 
     def _unary(self, kind: TaskKind) -> Any:
         async def answer(request: bytes, context: Context) -> bytes:

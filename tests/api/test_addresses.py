@@ -54,7 +54,7 @@ def test_an_address_without_a_port_has_the_services_own(given: str, whole: str) 
     assert with_port(given, 50051) == whole
 
 
-# A number alone is more likely a port than a host; without brackets nobody knows where an IPv6 address ends.
+# A number alone is more likely a port than a host; without brackets the end of an IPv6 address is unknown.
 @pytest.mark.parametrize(
     "wrong", ["", ":1", "50051", "::1", "a b", "robot:", "robot:x", "robot:0", "robot:70000", "robot\n", "a:1\n", "x/y"]
 )

@@ -1,8 +1,9 @@
 """Tests of the watch over connections: its decisions on numbers, and a real server that is flooded."""
 
 import asyncio
-from collections.abc import AsyncIterator, Sequence
+from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
+from threading import Semaphore
 from typing import Any
 
 import grpc
@@ -12,13 +13,14 @@ from robosc_api.connection_watch import (
     Arrivals,
     CallsByConnection,
     CallsSince,
+    CloseReason,
     ConnectionLimits,
     ConnectionWatch,
     Ledger,
     Peer,
     Traffic,
+    address_of,
     can_watch,
-    peer_of,
 )
 from robosc_api.layers import Layer, Layers, behaviour_of, with_behaviour
 from robosc_api.request_timeouts import RequestTimeouts
@@ -48,7 +50,7 @@ def look(
     now_s: float,
     ended: dict[Peer, int] | None = None,
     acknowledged: dict[Peer, int] | None = None,
-) -> dict[Peer, str]:
+) -> Mapping[Peer, str]:
     """The connections that a ledger closes, without answers if nothing else is said."""
     traffic = {peer: Traffic(count, (acknowledged or {}).get(peer, 0)) for peer, count in received.items()}
     return ledger.look(traffic, CallsSince(frozenset(asked), ended or {}, open_calls), now_s)
@@ -176,7 +178,7 @@ def test_what_is_sent_explains_nothing_without_calls() -> None:
     ],
 )
 def test_the_other_end_in_the_words_of_grpc(text: str, expected: Any) -> None:
-    assert peer_of(text) == expected
+    assert address_of(text) == expected
 
 
 LARGEST_BYTES = 128 * KIB
@@ -225,7 +227,7 @@ def test_an_endless_header_block_is_cut_off_and_other_callers_are_answered() -> 
             sent = await asyncio.to_thread(endless_headers, port, watch.look)
             assert sent < MOST_BYTES
             # Until gRPC has noticed, it may be counted again.
-            assert sum(watch.closed.values()) >= 1
+            assert watch.closed.total() >= 1
             assert (await call(channel, b"after")).answer == b"after"
 
     asyncio.run(flooded())
@@ -242,7 +244,7 @@ def test_requests_that_are_too_large_are_refused_each_and_their_connection_stays
                 ended = await call(channel, bytes(4 * LARGEST_BYTES))
                 assert ended.code is grpc.StatusCode.RESOURCE_EXHAUSTED
                 await asyncio.to_thread(watch.look)
-            assert not watch.closed
+            assert not watch.closed.total()
 
     asyncio.run(refused())
 
@@ -255,7 +257,7 @@ def test_calls_that_are_reset_at_once_are_cut_off() -> None:
             watch = ConnectionWatch(port, ConnectionLimits(resets=500), arrivals)
             with watch:
                 assert await asyncio.to_thread(resets, port, f"/{SERVICE}/Unary", lambda: None) < MOST_BYTES
-            assert sum(watch.closed.values()) >= 1
+            assert watch.closed.total() >= 1
 
     asyncio.run(flooded())
 
@@ -263,7 +265,7 @@ def test_calls_that_are_reset_at_once_are_cut_off() -> None:
 @needs_counts
 def test_each_request_of_a_stream_counts_and_not_its_beginning() -> None:
     async def counted() -> None:
-        arrivals, told = Arrivals(), asyncio.Queue[str]()
+        arrivals, words = Arrivals(), asyncio.Queue[str]()
 
         async def stream(requests: AsyncIterator[bytes], context: Any) -> AsyncIterator[bytes]:
             async for request in requests:
@@ -279,13 +281,13 @@ def test_each_request_of_a_stream_counts_and_not_its_beginning() -> None:
                 return "ipv4:10.0.0.1:1"
 
         async def requests() -> AsyncIterator[bytes]:
-            while request := await told.get():
+            while request := await words.get():
                 yield request.encode()
 
         responses = noted(requests(), Context())
         assert arrivals.take().asked == frozenset()
         for word in ("one", "two"):
-            told.put_nowait(word)
+            words.put_nowait(word)
             assert await anext(responses) == word.encode()
             assert arrivals.take().asked == {"ipv4:10.0.0.1:1"}
             assert arrivals.take().asked == frozenset()
@@ -303,13 +305,34 @@ def test_open_calls_keep_their_connection() -> None:
             watch = ConnectionWatch(port, ConnectionLimits(connections=1), arrivals)
             arrivals.begun(peer)
             watch.look()
-            assert not watch.closed
+            assert not watch.closed.total()
             arrivals.ended(peer)
             assert arrivals.take() == CallsSince(ended={peer: 1})
             await asyncio.to_thread(watch.look)
-            assert watch.closed
+            assert watch.closed[CloseReason.UNUSED] == 1
             # A call that is sent before its channel has seen the end fails; later ones get a new connection.
             await asyncio.wait_for(channel.wait_for_state_change(grpc.ChannelConnectivity.READY), PATIENCE_S)
             assert (await call(channel, b"again")).answer == b"again"
 
     asyncio.run(watched())
+
+
+@needs_counts
+def test_failures_of_the_watch_are_logged_now_and_then(
+    monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    now_s = [0.0]
+    looks = Semaphore(0)
+
+    def failing(watch: ConnectionWatch) -> None:
+        # The next look is due, and after the fourth one the next line.
+        now_s.append(now_s[-1] + (10.0 if len(now_s) == 5 else 0.2))
+        looks.release()
+        raise RuntimeError("broken")
+
+    monkeypatch.setattr(ConnectionWatch, "look", failing)
+    with ConnectionWatch(1, LIMITS, Arrivals(), clock=lambda: now_s[-1]):
+        for _ in range(6):
+            assert looks.acquire(timeout=PATIENCE_S)
+    lines = [record.getMessage() for record in caplog.records]
+    assert lines == [f"watching the connections failed ({count} times since the last such line)" for count in (1, 4)]

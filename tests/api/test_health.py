@@ -97,7 +97,7 @@ def test_a_file_that_is_no_certificate_is_one_clear_error(secure: ServerSecurity
     file.write_text("no certificate\n")
     with pytest.raises(SecurityError, match=r"server\.pem"):
         ask_health("127.0.0.1:1", timeout_s=1, certificate=file)
-    # Whoever listens has read another one, and goes on with it.
+    # The listening server has read another file, and goes on with it.
     with answering(Status.SERVING, secure) as address:
         condition = ask_alive(address, timeout_s=10, certificate=file)
     assert (condition.is_alive, condition.is_serving) == (True, False) and "server.pem" in condition.message

@@ -54,7 +54,7 @@ def _named_in(message: DescriptorProto, path: tuple[int, ...], name: str) -> Ite
 
 
 def written_oneofs(message: DescriptorProto) -> list[str]:
-    """Names of the oneofs that somebody wrote: the compiler adds one for each optional field, behind them."""
+    """Names of the oneofs of the source: the compiler adds one for each optional field, behind them."""
     made = {field.oneof_index for field in message.field if field.proto3_optional}
     return [group.name for place, group in enumerate(message.oneof_decl) if place not in made]
 

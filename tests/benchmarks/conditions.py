@@ -77,7 +77,7 @@ def table() -> str:
     from robosc.synthesis import synthesize
     from support.families import FAMILIES
 
-    synthesize(FAMILIES["token ring"](2))  # What is imported on first use is no part of it.
+    synthesize(FAMILIES["token ring"](2))  # The first use imports modules, outside the measurement.
     rows = [_row(family, size) for family, sizes in SIZES.items() for size in sizes]
     return text_table(
         "conditions in words: operands of the longest formula, nodes of the largest diagram", HEADER, rows

@@ -3,9 +3,9 @@
 Usage: run.py [NAME...]                       (all of them without an argument)
        run.py cif DIR [--against FILE]    (a folder of CIF models: see cif.py)
 
-Names: cold-start, conditions, editor, execution, gr1, language, strategies, synthesis; of the service: service-load,
-isolation, task-cpu; of the bridge: decoders, drive-bases, live-view, live-view-pixels, loop-period, maze, reaction,
-endurance, shipped, twin.
+Names: cold-start, conditions, editor, execution, goals, gr1, language, strategies, synthesis; of the service:
+service-load, call-cpu, isolation, task-cpu; of the bridge: decoders, drive-bases, live-view, live-view-pixels,
+loop-period, maze, reaction, endurance, shipped, twin.
 """
 
 import sys
@@ -31,13 +31,15 @@ import cold_start
 import conditions
 import editor
 import execution
+import goals
 import gr1
 import language
 import strategies
 import synthesis
-from service import isolation, load, task_cpu
+from service import call_cpu, isolation, load, task_cpu
 
 TABLES: dict[str, Callable[[], str]] = {
+    "call-cpu": call_cpu.table,
     "cold-start": cold_start.table,
     "conditions": conditions.table,
     "decoders": decoders.table,
@@ -45,6 +47,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "editor": editor.table,
     "endurance": endurance.table,
     "execution": execution.table,
+    "goals": goals.table,
     "gr1": gr1.table,
     "isolation": isolation.table,
     "language": language.table,

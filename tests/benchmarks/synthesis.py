@@ -47,7 +47,7 @@ def measured(family: str, size: int, engine: str) -> dict[str, object]:
     from support.families import FAMILIES
 
     system = FAMILIES[family](size)
-    synthesize(FAMILIES["token ring"](2))  # What is imported on first use is no part of it.
+    synthesize(FAMILIES["token ring"](2))  # The first use imports modules, outside the measurement.
     begin = time.perf_counter()
 
     def is_late() -> bool:

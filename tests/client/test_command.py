@@ -19,7 +19,7 @@ entry()
 
 
 def test_ctrl_c_while_a_call_begins() -> None:
-    """The interrupt comes when gRPC knows of the call, and nobody is there yet who would see its end."""
+    """The interrupt comes when gRPC knows of the call, and its end would not be seen yet."""
     with scripted(WatchJob=[watched(job(1))]) as (address, _):
         result = subprocess.run(
             [sys.executable, "-c", BEGINNING.format(address=address)],

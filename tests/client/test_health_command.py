@@ -50,7 +50,7 @@ def test_with_tls_as_a_profile_says(asked: Run, tmp_path: Path) -> None:
         assert main(["profile", "add", "lab", "--server", address, "--ca", str(authority.file)]) == 0
         status, out, _ = asked()
         assert (status, out.splitlines()[-1]) == (0, "SERVING")
-        # In the clear, and believing others.
+        # Questions in the clear, and with trust in other certificates.
         for wrong in ([], ["--tls"]):
             assert asked("--server", address, *wrong)[0] == 3
         assert asked("--server", address, "--ca", tmp_path / "none.pem")[0] == 2

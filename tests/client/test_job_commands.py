@@ -202,7 +202,7 @@ class TestWatch:
             assert json.loads(out)["job"]["failure"] == {"reason": "CPU_LIMIT", "message": "too long"}
 
     def test_a_line_moves_on_a_terminal(self, tmp_path: Path) -> None:
-        """And it is markup to nobody, and gone at the end."""
+        """The text is no markup, and gone at the end."""
         states = [job(number, progress=pb.Progress(stage="check", message=f"[bold]step {number}")) for number in (1, 2)]
 
         is_shown = threading.Event()
@@ -378,7 +378,7 @@ class TestGet:
             subprocess.run(command, stdout=other_end, timeout=PATIENCE_S, check=True)
             os.close(other_end)
             shown = b""
-            # It comes in parts, and an end of Linux's own when nobody has the other end any more.
+            # It comes in parts, and an end of Linux's own when the other end is closed.
             with suppress(OSError):
                 while part := os.read(main_end, 4096):
                     shown += part

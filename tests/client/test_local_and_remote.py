@@ -56,7 +56,7 @@ def require_alike(local: Any, remote: Any, *, is_made: bool) -> None:
 def test_check(client: Client, model: robosc.LoadedModel) -> None:
     local, remote = robosc.check(model), client.check(model)
     assert local == remote
-    # With the lines of the text, which the server did not send back.
+    # The texts have their lines, which the server did not send back.
     assert str(local) == str(remote)
     assert isinstance(remote, robosc.Findings)
 

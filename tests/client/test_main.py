@@ -419,7 +419,7 @@ class TestExitCodes:
         with answering(
             health_pb2.HealthCheckResponse.SERVING, ServerSecurity(certificate=certificate, key=key)
         ) as address:
-            # Long enough for a handshake: on this machine, now, that shows. Nobody tries again beyond it.
+            # Long enough for a handshake: on this machine, now, that shows. There is no retry beyond it.
             for deadline_s in (1, 4, 16, 64):
                 given = ["--server", address, "--ca", mine, "--deadline", deadline_s]
                 status, _, error = run(*command, *given)

@@ -34,7 +34,7 @@ def test_the_bar_goes_on_with_the_stages(bars: list[Any], monkeypatch: pytest.Mo
     seen: list[tuple[float, float | None]] = []
     with ProgressLine() as line:
         (task,) = bars[0].tasks
-        # Nothing is known yet.
+        # The total is not known yet.
         assert task.total is None
         for stage in ("check", "synthesis", "synthesis", "verification", "controller", "generation"):
             line.report(Progress(stage, "[bold]words"))

@@ -50,7 +50,7 @@ class TestSignatures:
         assert asked(supervisor(content, signature=signature), *trusted)[0] == 0
         assert (place.read_bytes(), beside.read_bytes()) == (content, signature)
         assert robosc(["verify", str(place), "--signed-by", str(tmp_path / "right.pub")]) == 0
-        # The same bytes again, unsigned: whoever has signed them vouches for them still.
+        # The same bytes again, unsigned: their signer vouches for them still.
         assert asked(supervisor(content))[0] == 0
         assert (place.read_bytes(), beside.read_bytes()) == (content, signature)
         # That of another supervisor must not stay.
@@ -155,7 +155,7 @@ class TestSignatures:
             assert err.count("\n") == 1
 
     def test_no_supervisor_to_be_signed(self, run: Run, tmp_path: Path, made: Any) -> None:
-        """Is about the model: nothing that anybody could have signed is taken."""
+        """A wrong model: no signed data are taken."""
         answer = synthesis(reason="no supervisor exists")
         with scripted(Synthesize=[[answer]]) as (address, _):
             options = ["-o", tmp_path / "there.rsup", "--signed-by", tmp_path / "right.pub", "--server", address]

@@ -56,7 +56,7 @@ class World:
         self._constants = {item.name: _constants(item) for item in model.enums}
 
     def stimuli(self, run: Run) -> Iterator[Stimulus]:
-        """A start, then `STEPS` random stimuli; the run is told each before the next is asked for."""
+        """A start, then `STEPS` random stimuli; the run takes each before the next is drawn."""
         yield ["start"]
         for _ in range(STEPS):
             choices = [["tick"]] * 4 + [["receive"]] * 5 + self._replies(run)
@@ -157,7 +157,7 @@ def new_stimuli(case: str) -> tuple[Stimulus, ...]:
     found: list[Stimulus] = []
     for stimulus in World(model, Random(crc32(case.encode()))).stimuli(run):
         if "fault" in run.apply(stimulus)["log"]:
-            # How far silent steps go that never end is no matter of the language.
+            # The length of silent steps that never end is no matter of the language.
             break
         found.append(stimulus)
     return tuple(found)

@@ -1,4 +1,4 @@
-"""The rule for the first words of docstrings."""
+"""The rule for the first words of docstrings and comments."""
 
 import subprocess
 import sys
@@ -10,7 +10,7 @@ PROGRAM = Path(__file__).parents[2] / "deploy" / "check_docstrings.py"
 
 GOOD = '''"""Jobs."""
 
-LIMIT = 3
+LIMIT = 3  # Jobs of all callers.
 """Number of jobs. What waits beyond it is refused."""
 
 
@@ -29,6 +29,9 @@ class Job:
 
         Whether it was tried before does not count.
         """
+        # The state of a job is known here,
+        # whether it runs or not.
+        return "# Whether it runs"
 '''
 
 
@@ -56,6 +59,8 @@ def test_what_names_its_thing_first_passes(tmp_path: Path) -> None:
         ("name: Name of the job", "name: What it is called", 11, "What"),
         ("is_over: True if", "is_over: Whether", 12, "Whether"),
         ("Return True if", "Whether", 18, "Whether"),
+        ("Jobs of all callers", "Of all callers", 3, "Of"),
+        ("The state of a job", "What a job does", 22, "What"),
     ],
 )
 def test_an_opening_without_subject_is_found_in_its_line(

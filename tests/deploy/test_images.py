@@ -54,7 +54,7 @@ def test_an_image_is_as_it_should_be(file: Path) -> None:
     # No shell stands between the engine's signals and the program, or a health check and its answer.
     assert last.words("ENTRYPOINT") and last.health_check[1] == "health"
     assert [item.text for item in last.all("STOPSIGNAL")] == ["SIGTERM"]
-    # Nothing of what builds it is in it.
+    # Tools that build it are not in it.
     assert [(item.flags, item.text) for item in last.all("COPY")] == [({"from": "build"}, "/opt/robosc /opt/robosc")]
     (volume,) = last.last("VOLUME").words  # type: ignore[union-attr]
     assert last.last("WORKDIR").text == volume  # type: ignore[union-attr]

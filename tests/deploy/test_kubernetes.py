@@ -17,7 +17,7 @@ from support.manifests import VARIANTS, Manifest, container_of, has_kustomize, m
 
 pytestmark = pytest.mark.skipif(not has_kustomize(), reason="there is no kubectl, which knows Kustomize")
 
-# The oldest one that somebody may still have, and the newest.
+# The oldest version in use, and the newest.
 VERSIONS = ("1.29.0", "1.34.0")
 
 
@@ -60,7 +60,7 @@ def test_pods_keep_to_the_strictest_standard(variant: str) -> None:
         assert all({"startupProbe", "readinessProbe", "livenessProbe"} <= set(one) for one in spec["containers"])
         mounted = {mount["name"] for container in containers for mount in container["volumeMounts"]}
         assert mounted == {volume["name"] for volume in spec["volumes"]}
-        # Without a limit, a disk of the node would fill.
+        # A disk of the node would fill without a limit.
         assert all("sizeLimit" in volume.get("emptyDir", {"sizeLimit": ""}) for volume in spec["volumes"])
     (namespace,) = of_kind(variant, "Namespace")
     assert namespace["metadata"]["labels"]["pod-security.kubernetes.io/enforce"] == "restricted"

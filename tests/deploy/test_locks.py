@@ -83,7 +83,7 @@ def test_every_installation_takes_a_whole_lock_or_one_file() -> None:
         # A lock, or what was made of one (a wheel, the source of a package that was fetched by its hash), or our own.
         own = (".whl", "--editable .", " .", '"$source"')
         assert "--require-hashes" in command or command.endswith(own), command
-        # Nothing is built by tools that are chosen on that day.
+        # Builds use locked tools, not those of the day.
         assert not {"--no-build-isolation", "--no-build", "--only-binary", "--no-index", '"$@"'}.isdisjoint(
             command.split()
         ), command

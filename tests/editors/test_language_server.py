@@ -14,7 +14,7 @@ from robosc_lsp.project import Project
 from support.editor import Editor, part_of, position_of, with_edits
 from support.editor_models import LIBRARY, ROBOT, write_definitions
 
-# Nothing can keep it from getting to where nothing leads back from.
+# The robot cannot be kept from getting to a state without a way back.
 FALL = """robot Fall {
     component Base {
         outgoing message fallen with type: none
@@ -345,7 +345,7 @@ def test_nothing_is_renamed_while_a_use_may_be_hidden(editor: Editor, tmp_path: 
     )
     with pytest.raises(JsonRpcException, match=r"'on_' occurs in line 17 of walker\.rscd"):
         rename(editor, "walker.rscd", "goto |on_", "running")
-    # Nothing of another name is hidden.
+    # Names of other things are not hidden.
     assert "^state" in rename(editor, "walker.rscd", "goto |off", "state")["walker.rscd"]
     editor.replace("walker.rscd", ROBOT)
     (tmp_path / "latin.rscd").write_bytes(
@@ -731,7 +731,7 @@ def test_what_is_offered_replaces_what_is_typed(editor: Editor) -> None:
     assert with_edits(editor.texts["walker.rscd"], [item.text_edit]) == ROBOT
 
 
-# In the middle of being typed
+# Texts in the middle of being typed
 
 
 @pytest.mark.parametrize(

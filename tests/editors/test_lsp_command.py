@@ -27,7 +27,7 @@ from support.waiting import eventually, wait_until
 COMMAND = (sys.executable, "-m", "robosc_lsp.command")
 
 LONG = products()
-"""Synthesis of it takes longer than anybody waits."""
+"""Synthesis of it takes longer than users wait."""
 
 
 def run(*arguments: str, given: bytes = b"") -> subprocess.CompletedProcess[bytes]:

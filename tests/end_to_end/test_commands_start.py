@@ -92,10 +92,10 @@ def test_a_program_without_its_extra_says_what_it_needs(program: str, words: str
     module, extra = SCRIPTS[program].partition(":")[0], program.removeprefix("robosc-")
     code = MISSING.format(package=package, program=program, words=words.split(), module=module)
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, timeout=240, check=False)
-    told = (
+    message = (
         f"{program}: the package {package} is not installed; the extra {extra} has it: pip install 'robosc[{extra}]'\n"
     )
-    assert (done.returncode, done.stdout, done.stderr) == (2, "", told)
+    assert (done.returncode, done.stdout, done.stderr) == (2, "", message)
 
 
 @pytest.mark.parametrize(

@@ -45,8 +45,8 @@ def test_it_makes_its_rounds_for_ever(tmp_path: Path) -> None:
 def test_an_order_is_answered_before_the_rounds_go_on(tmp_path: Path, room: str) -> None:
     with courier(tmp_path, drain_v_s=0.0) as twin:
         assert visits(twin, 1) == ["kitchen"]
-        twin.tell("/order", room)
-        twin.tell("/order", "office")  # Nobody can order while somebody waits.
+        twin.receive("/order", room)
+        twin.receive("/order", "office")  # An order does not count while another one waits.
         twin.until(lambda: at(twin) != "hall", "the next room", LIMIT_S)
         assert at(twin) == room
         twin.until(lambda: twin.state["Tray"]["state"] == "offered", "the tray", LIMIT_S)
@@ -63,7 +63,7 @@ def test_an_order_is_answered_before_the_rounds_go_on(tmp_path: Path, room: str)
 
 def test_an_order_to_nowhere_changes_nothing(tmp_path: Path) -> None:
     with courier(tmp_path) as twin:
-        twin.tell("/order", "moon")
+        twin.receive("/order", "moon")
         assert twin.state["Caller"]["state"] == "quiet"
 
 
@@ -102,7 +102,7 @@ def test_before_a_door_that_never_opens_it_waits_and_says_so(tmp_path: Path) -> 
         assert rounds.visit == 2
         # Once it opens after all, the robot goes on.
         twin.house.is_door_open = True
-        twin.tell("/door/opened")
+        twin.receive("/door/opened")
         twin.until(lambda: at(twin) == "lab", "the lab", LIMIT_S)
         motion, wrong = twin.finish()
     assert wrong == ()

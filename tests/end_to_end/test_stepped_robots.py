@@ -42,9 +42,9 @@ def follow_the_line(twin: SteppedTwin) -> Judge:
     halts.append(Halt(*twin.stand("the robot to stand before the box"), "for the box"))
     twin.world.put_obstacle(BOX, False)
     twin.drive(0.3, "the robot to go on without the box")
-    twin.tell("/emergency_stop/stop")
+    twin.receive("/emergency_stop/stop")
     halts.append(Halt(*twin.stand("the robot to stand after the stop button"), "after the stop button"))
-    twin.tell("/emergency_stop/resume")
+    twin.receive("/emergency_stop/resume")
     twin.drive(0.3, "the robot to go on after the other button")
     return lambda motion: check_line(twin.world.scene, motion, halts, lateral_m=0.025, least_m=1.0)
 
@@ -57,7 +57,7 @@ def follow_the_line_without_care(twin: SteppedTwin) -> Judge:
 
 
 def follow_the_person(twin: SteppedTwin) -> Judge:
-    """Follow: the robot catches up, backs off, faces, pauses by its button, and stands where nobody is."""
+    """Follow: the robot catches up, backs off, faces, pauses by its button, and stands without a person."""
 
     def gap_m() -> float:
         (person,) = twin.world.obstacles
@@ -69,9 +69,9 @@ def follow_the_person(twin: SteppedTwin) -> Judge:
     x_m, y_m = twin.place
     twin.world.move_obstacle(PERSON, x_m + 0.7, y_m)
     twin.drive(0.05, "the robot to back off")
-    twin.tell("/button")
+    twin.receive("/button")
     twin.stand("the button to pause it")
-    twin.tell("/button")
+    twin.receive("/button")
     twin.drive(0.03, "the robot to back off on")
     twin.stand("the robot to be far enough away")
     # From the LiDAR, which is behind its middle, to the middle of the arc that it sees of the person: 0.8 m; more with
@@ -85,7 +85,7 @@ def follow_the_person(twin: SteppedTwin) -> Judge:
 
 
 def navigate(twin: SteppedTwin) -> Judge:
-    """Navigate: the robot waits until nobody is near, is calibrated and drives to its goal."""
+    """Navigate: the robot waits until no person is near, is calibrated and drives to its goal."""
     twin.go_on(3.0)
     assert twin.place == (0.0, 0.0)
     assert twin.called == ["calibrate"]

@@ -133,7 +133,7 @@ def _strategic(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
     porter = porter_supervisor()
     scenario = random_scenario(porter, first, 400)
     yield porter, replace(scenario, settings={**scenario.settings, "assumption_timeout_s": 0.25})
-    for seed in range(first, first + 1_500):
+    for seed in range(first, first + 60):
         supervisor = strategic_controller(seed)
         if supervisor is not None and supervisor.strategy and any(supervisor.strategy.modes):
             yield supervisor, random_scenario(supervisor, seed, 80)

@@ -4,8 +4,6 @@ from pathlib import Path
 
 import pytest
 
-from robosc.model.structure import Deployment
-from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from support.c99 import GCC
 from support.equivalence.c99_target import C99Target
@@ -13,24 +11,17 @@ from support.equivalence.python_targets import generated_python, observe
 from support.equivalence.random_scenarios import random_scenario
 from support.equivalence.targets import compare
 from support.generated import loaded_file
-from support.hostile import hostile_text
-from support.models import model_of
-from support.random_supervisors import CERTIFICATE
+from support.hostile import hostile_supervisor
 
 SEEDS = range(8)
 
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
 
 
-def hostile(seed: int, canary: Path, *, is_on_ros: bool = True) -> Supervisor:
-    text = hostile_text(seed, canary, is_on_ros=is_on_ros)
-    return Supervisor(model_of(text), Deployment.CONTROLLER, (), CERTIFICATE)
-
-
 @pytest.mark.parametrize("seed", SEEDS)
 def test_python_does_what_the_model_says(seed: int, tmp_path: Path) -> None:
     canary = tmp_path / "canary"
-    supervisor = hostile(seed, canary, is_on_ros=False)
+    supervisor = hostile_supervisor(seed, canary, is_on_ros=False)
     scenario = random_scenario(supervisor, seed, 150)
     seen = observe(supervisor, scenario)
     assert sum(len(item.log) for item in seen) > 30
@@ -42,7 +33,7 @@ def test_python_does_what_the_model_says(seed: int, tmp_path: Path) -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_c_does_what_the_model_says(seed: int, tmp_path: Path) -> None:
     canary = tmp_path / "canary"
-    supervisor = hostile(seed, canary, is_on_ros=False)
+    supervisor = hostile_supervisor(seed, canary, is_on_ros=False)
     scenario = random_scenario(supervisor, seed, 150)
     # Some with sanitizers, which take the compiler three times as long.
     options = () if seed % 4 == 0 else ("-O0",)

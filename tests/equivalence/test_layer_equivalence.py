@@ -35,7 +35,7 @@ def some_layer(seed: int) -> Supervisor:
     """A random robot, of one kind or another."""
     supervisor = msgspec.structs.replace(random_supervisor(seed), deployment=Deployment.LAYER)
     incoming = [i for i in supervisor.model.communications if i.kind is CommunicationKind.INCOMING_MESSAGE]
-    # What shares an identifier there is not told apart by conditions.
+    # Messages that share an identifier there are not distinguished by conditions.
     if seed % 2 or len(incoming) > len({item.identifier for item in incoming}):
         return random_layer(Random(seed))
     return supervisor
@@ -87,5 +87,5 @@ def test_the_random_runs_show_everything_that_a_layer_does() -> None:
             seen.update(f"log {entry['kind']}" for entry in item.log)
     for kind in ("publish", "default", "call", "goal", "cancel", "pass", "blocked", "answer", "no answer"):
         assert seen[kind] > 5, kind
-    for kind in ("accept", "reject", "told", "ended", "log release", "log stop", "log fault", "log unexpected"):
+    for kind in ("accept", "reject", "feedback", "ended", "log release", "log stop", "log fault", "log unexpected"):
         assert seen[kind] > 5, kind

@@ -18,7 +18,7 @@ ROBOTS = sorted({path.parent.name for path in EXAMPLES.glob("*/*.rscd")})
 HELPERS = EXAMPLES / "robosc_examples"
 ROOT = EXAMPLES.parent
 
-# What a robot has of itself.
+# Topics of the robot itself.
 OWN = {"/cmd_vel", "/scan", "/odom", "/image", "/bumper"}
 
 

@@ -43,7 +43,7 @@ ROBOT = """robot R {
     }
     requirement never Arm.lost
 }"""
-"""The supervisor lets nobody go while an answer of a service may come."""
+"""The supervisor blocks leaving while an answer of a service may come."""
 
 NAMES = frozenset({"Drive", "Arm"})
 

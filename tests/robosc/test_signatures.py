@@ -126,7 +126,7 @@ def test_another_key_is_unknown_and_a_wrong_name_does_not_make_it_ours(
 
 
 def test_a_signature_of_the_bytes_alone_means_something_else(signed: tuple[bytes, PublicKey], tmp_path: Path) -> None:
-    """Check that data that somebody signs with the same key for another purpose is no supervisor."""
+    """Check that data signed with the same key for another purpose is no supervisor."""
     import base64
 
     private, key = pair(tmp_path)

@@ -1,4 +1,4 @@
-"""Tests of callers that a proxy names, over a Unix socket and with a client certificate, and of who may name nobody."""
+"""Tests of callers that a proxy names, over a Unix socket and with a client certificate; not all may name them."""
 
 import socket
 from collections.abc import Sequence

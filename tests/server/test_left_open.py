@@ -43,7 +43,7 @@ def test_whatever_is_called_the_request_comes_in_time() -> None:
         for place, method in enumerate(METHODS):
             stranger.call(2 * place + 1, method)
         assert eventually(lambda: stranger.ended == len(METHODS))
-        assert stranger.was_told(b"request did not arrive within 0.3 seconds")
+        assert stranger.has_received(b"request did not arrive within 0.3 seconds")
         # The first has its request at once: its end.
         stranger.call(2 * len(METHODS) + 1, METHODS[0], flags=END_OF_HEADERS | END_OF_STREAM)
         assert eventually(lambda: stranger.ended == len(METHODS) + 1)
@@ -54,7 +54,7 @@ def test_reflection_is_not_left_open(monkeypatch: pytest.MonkeyPatch) -> None:
     with served(given_workers=StartedWorkers()) as address, strangers(address, 1) as (stranger,):
         stranger.call(1, REFLECTION_METHODS[-1])
         stranger.message(1, reflection_pb2.ServerReflectionRequest(list_services="").SerializeToString())
-        assert eventually(lambda: stranger.was_told(b"each further one within 0.3"))
+        assert eventually(lambda: stranger.has_received(b"each further one within 0.3"))
 
 
 def test_connections_without_a_word_are_ended(monkeypatch: pytest.MonkeyPatch) -> None:

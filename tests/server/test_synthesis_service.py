@@ -297,13 +297,13 @@ class TestEnding:
             assert ended.get(timeout=PATIENCE_S).result().diagnostics[0].message == "done"
 
     def test_who_does_not_read_holds_no_worker_up(self, one: Any) -> None:
-        # Far more than fits on the way; nobody reads it.
+        # Far more than fits on the way; it is not read.
         unread = STUB(one).Synthesize(pb.SynthesizeRequest(bundle=bundle("long reports 900\necho done")))
         assert check(one, "echo others") == "others"
         unread.cancel()
 
     def test_who_reads_no_results_gets_no_more_of_them(self) -> None:
-        # Frames that nobody takes stop the server's end of the connection at this much.
+        # Frames that are not read stop the server's end of the connection at this much.
         options = [("grpc.http2.lookahead_bytes", 65535), ("grpc.http2.bdp_probe", 0)]
         with served(FAKE, result_bytes=3_000_000) as address, grpc.insecure_channel(address, options) as channel:
             request = pb.SynthesizeRequest(bundle=bundle("size 2900000")).SerializeToString()
@@ -329,7 +329,7 @@ class TestEnding:
                 for number in range(1, 12, 2):
                     deaf.call(number, "/robosc_api.v1.SynthesisService/Check")
                     deaf.message(number, pb.CheckRequest(bundle=bundle("size 2900000")).SerializeToString())
-                assert eventually(lambda: deaf.was_told(b"not read its earlier results"))
+                assert eventually(lambda: deaf.has_received(b"not read its earlier results"))
             # The line is gone, and with it what was unread, as soon as the server has seen it.
             with grpc.insecure_channel(address) as channel:
                 assert eventually(lambda: is_taken(lambda: check(channel, "size 2900000")))
@@ -356,7 +356,7 @@ def is_taken(call: Callable[[], object]) -> bool:
 
 @contextmanager
 def line_that_dies(address: str) -> Iterator[tuple[str, threading.Event]]:
-    """A line to a server that carries nothing any more, and notifies nobody, once the event is set; its address."""
+    """A line to a server that carries nothing any more, without a notice, once the event is set; its address."""
     host, _, port = address.rpartition(":")
     is_dead = threading.Event()
     with socket.create_server(("127.0.0.1", 0)) as listener:

@@ -141,7 +141,7 @@ def test_damaged_messages(made: tuple[Any, bytes], data: st.DataObject) -> None:
     width = data.draw(st.integers(0, 3))
     damaged = content[:place] + data.draw(BYTES) + content[place + width :]
     is_message = agrees(damaged, nested_of(kind))
-    # Whatever the parser of the type accepts, texts apart, its twin accepts, too.
+    # The twin accepts all that the parser of the type accepts, apart from texts.
     try:
         kind.FromString(damaged)
     except DecodeError:

@@ -3,6 +3,7 @@
 import random
 import re
 from collections.abc import Callable
+from dataclasses import replace
 from functools import partial
 from pathlib import PurePosixPath, PureWindowsPath
 from typing import Any
@@ -15,7 +16,7 @@ import robosc_server.tasks.requests as requests_module
 from robosc.verification import DEFAULT_STATES
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.requests import NOT_A_MESSAGE, RequestCache, RequestLimits, accept_request
-from robosc_server.tasks.task import Reason, RefusedError, Task, TaskKind
+from robosc_server.tasks.task import Reason, RefusedError, Task, TaskKind, own_key
 from support.effort import examples
 from support.models import EXAMPLES
 from support.requests import MESSAGES, bundle_at, small_request, varint
@@ -511,16 +512,31 @@ class TestRecentRequests:
         for _ in range(2):
             for kind in MESSAGES:
                 for content in contents:
-                    assert outcome(cache.accept, kind, content) == outcome(
-                        partial(accept_request, limits=LIMITS), kind, content
+                    assert outcome(partial(accept_as, cache, "me"), kind, content) == outcome(
+                        partial(accepted_by, "me"), kind, content
                     )
+
+    def test_a_caller_never_gets_the_task_of_another_one(self) -> None:
+        cache = RequestCache(LIMITS)
+        content = small_request(TaskKind.CHECK).SerializeToString()
+        tasks = {name: cache.accept(TaskKind.CHECK, name, content) for name in ("me", "you")}
+        key = accept_request(TaskKind.CHECK, content, LIMITS).key
+        for _ in range(2):
+            for name, task in tasks.items():
+                assert cache.accept(TaskKind.CHECK, name, content) is task
+                assert task.key == own_key(key, name)
+
+    def test_callers_share_where_results_are_shared(self) -> None:
+        cache = RequestCache(LIMITS, lambda key, caller: key)
+        content = small_request(TaskKind.CHECK).SerializeToString()
+        assert cache.accept(TaskKind.CHECK, "me", content).key == cache.accept(TaskKind.CHECK, "you", content).key
 
     def test_one_that_came_before_is_not_looked_at_again(self, monkeypatch: pytest.MonkeyPatch) -> None:
         cache = RequestCache(LIMITS)
         content = small_request(TaskKind.CHECK).SerializeToString()
-        task = cache.accept(TaskKind.CHECK, content)
+        task = cache.accept(TaskKind.CHECK, "me", content)
         monkeypatch.setattr(requests_module, "accept_request", None)
-        assert cache.accept(TaskKind.CHECK, bytes(bytearray(content))) is task
+        assert cache.accept(TaskKind.CHECK, "me", bytes(bytearray(content))) is task
 
     def test_is_bounded_and_forgets_what_was_asked_for_longest_ago(self, monkeypatch: pytest.MonkeyPatch) -> None:
         cache = RequestCache(LIMITS)
@@ -529,19 +545,19 @@ class TestRecentRequests:
             for number in range(100)
         ]
         first, *others = requests
-        tasks = [cache.accept(TaskKind.CHECK, first)]
+        tasks = [cache.accept(TaskKind.CHECK, "me", first)]
         for request in others:
-            tasks.append(cache.accept(TaskKind.CHECK, request))
-            assert cache.accept(TaskKind.CHECK, first) is tasks[0]
+            tasks.append(cache.accept(TaskKind.CHECK, "me", request))
+            assert cache.accept(TaskKind.CHECK, "me", first) is tasks[0]
         assert sum(map(len, cached_contents(cache))) <= 4 * 2**20
-        assert cache.accept(TaskKind.CHECK, requests[1]) is not tasks[1]
-        assert cache.accept(TaskKind.CHECK, requests[-1]) is tasks[-1]
+        assert cache.accept(TaskKind.CHECK, "me", requests[1]) is not tasks[1]
+        assert cache.accept(TaskKind.CHECK, "me", requests[-1]) is tasks[-1]
 
     def test_many_small_ones_are_bounded_too(self) -> None:
         cache = RequestCache(LIMITS)
         for number in range(10_000):
             file = pb.SourceFile(name="m", text=str(number))
-            cache.accept(TaskKind.CHECK, pb.CheckRequest(bundle=pb.Bundle(main=file)).SerializeToString())
+            cache.accept(TaskKind.CHECK, "me", pb.CheckRequest(bundle=pb.Bundle(main=file)).SerializeToString())
         # Each takes some four hundred bytes beside its own.
         assert len(cached_contents(cache)) < 8500
 
@@ -549,7 +565,7 @@ class TestRecentRequests:
         cache = RequestCache(LIMITS)
         bundle = pb.Bundle(main=pb.SourceFile(name="m", text="x" * 70_000))
         content = pb.CheckRequest(bundle=bundle).SerializeToString()
-        assert cache.accept(TaskKind.CHECK, content) is not cache.accept(TaskKind.CHECK, content)
+        assert cache.accept(TaskKind.CHECK, "me", content) is not cache.accept(TaskKind.CHECK, "me", content)
         assert not cached_contents(cache)
 
 
@@ -561,6 +577,17 @@ def outcome(accept: Callable[[TaskKind, bytes], Task], kind: TaskKind, content: 
         return error.reason, error.message
 
 
+def accept_as(cache: RequestCache, caller: str, kind: TaskKind, content: bytes) -> Task:
+    """Return the task of a caller, from a cache."""
+    return cache.accept(kind, caller, content)
+
+
+def accepted_by(caller: str, kind: TaskKind, content: bytes) -> Task:
+    """Return the same without a cache."""
+    task = accept_request(kind, content, LIMITS)
+    return replace(task, key=own_key(task.key, caller))
+
+
 def cached_contents(recent: RequestCache) -> list[bytes]:
     """The requests that are remembered."""
-    return [content for _, content in recent._tasks]
+    return [content for _, _, content in recent._tasks]

@@ -102,7 +102,7 @@ class Reference:
         self.layout: Layout = make_layout(supervisor)
         self.system = InterpretedSystem(supervisor)
         self.dice = dice
-        # In half of the runs nothing stops the executor, so that it comes far.
+        # Half of the runs have no stop, so that the executor comes far.
         self.is_calm = dice.random() < 0.5
         self.clock = ManualClock()
         self.failing: set[str] = set()

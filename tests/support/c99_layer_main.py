@@ -11,7 +11,7 @@ from robosc.targets.code.c.layout import Layout, event_data
 from support.c99_main import _TOP, BEGIN, END, LOG, _Program, batch_types, events_back
 
 TOKENS = 4096
-"""Messages are told apart by their address in an array of this length."""
+"""Messages are distinguished by their address in an array of this length."""
 
 CALLBACKS = (
     *("publish", "default", "call", "goal", "cancel", "pass", "blocked"),

@@ -13,7 +13,7 @@ GRAMMAR = Path(__file__).with_name("cif_language.tx")
 
 @cache
 def _grammar() -> Any:
-    # Without its memory the grammar goes back over nested braces again and again.
+    # The grammar goes back over nested braces again and again without its memory.
     return metamodel_from_file(GRAMMAR, memoization=True)
 
 

@@ -64,7 +64,7 @@ class Scope:
             self._locals[automaton.name] = self._local(automaton)
         self._algebraics: dict[str, Typed] = {}
         for name, node in specification.algebraics:
-            # In our files a node uses earlier ones only, so there is no circle.
+            # The nodes of our files use earlier ones only, so there is no circle.
             self._algebraics[name] = self._boolean(node, None)
             _require(not self._algebraics[name].inputs, f"{name} reads an input")
 

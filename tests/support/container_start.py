@@ -21,7 +21,7 @@ def main(plan: dict[str, Any]) -> None:
     """Never returns."""
     root = Path(plan["root"])
     _mount("--bind", root, root)
-    # What the base image would have.
+    # Folders of the base image.
     _mount("--rbind", "/usr", root / "usr")
     _mount("--bind", plan["python"], root / "usr/local")
     for source, target in plan["binds"]:

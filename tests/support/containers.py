@@ -182,7 +182,7 @@ def _inside(root: Path, place: str) -> Path:
 
 
 def _link(source: str, target: str) -> None:
-    """Link a file: nobody writes into files that are there, so that they need not be copied."""
+    """Link a file: existing files are not written, so that they need not be copied."""
     with contextlib.suppress(FileExistsError):
         os.link(source, target, follow_symlinks=False)
 

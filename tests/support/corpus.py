@@ -265,7 +265,7 @@ def _entry(entry: Entry) -> str:
     if kind == "event":
         kind = "controllable" if entry["controllable"] else "uncontrollable"
     data = kept.pop("data", None)
-    # What a request sends stands among the things sent; why something failed is wording.
+    # Data of a request stand among the things sent; the reason of a failure is wording.
     shown = json.dumps(data, sort_keys=True) if isinstance(data, dict) and kind == "uncontrollable" else ""
     return " ".join(filter(None, (kind, name, shown)))
 

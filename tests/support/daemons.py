@@ -193,8 +193,8 @@ class Connected:
 
     def __init__(self, scene: Scene, name: str, serves: tuple[str, ...] = (), *, may_request: bool = True) -> None:
         self.scene = scene
-        self.told: list[ToProgram] = []
-        self.program = Program(name, self.told.append, frozenset(serves), may_request)
+        self.received: list[ToProgram] = []
+        self.program = Program(name, self.received.append, frozenset(serves), may_request)
         scene.daemon.post(Attached(self.program))
 
     def say(self, make: Callable[..., FromProgram], *arguments: Any) -> list[ToProgram]:
@@ -204,13 +204,13 @@ class Connected:
 
     def cycle(self) -> list[ToProgram]:
         """Run a turn of the loop, and return the messages to the program."""
-        self.told.clear()
+        self.received.clear()
         self.scene.daemon.cycle()
-        return list(self.told)
+        return list(self.received)
 
     def of[Kind](self, kind: type[Kind]) -> list[Kind]:
         """Return the messages of a kind among those to the program since its last message."""
-        return [item for item in self.told if isinstance(item, kind)]
+        return [item for item in self.received if isinstance(item, kind)]
 
     def leave(self) -> None:
         """The connection ends."""

@@ -39,7 +39,7 @@ class Tap:
         return self.device.baud
 
     def receive(self, data: bytes, baud: int) -> Iterable[Sending]:
-        # Without zeros that fill what a device may wait for.
+        # Zeros that fill what a device may wait for are dropped.
         self._rest = (self._rest + data).lstrip(b"\0")
         while len(self._rest) >= 7 and len(self._rest) >= (length := 7 + int.from_bytes(self._rest[5:7], "little")):
             self.packets.append(self._rest[:length].hex(" "))

@@ -65,7 +65,7 @@ class Recorded:
         robot: Robot with these wheels.
 
     Attributes:
-        told: Time, and speeds of the left and the right wheel in m/s; each entry differs from the one before.
+        commanded: Time, and speeds of the left and the right wheel in m/s; each entry differs from the one before.
         heard_s: Times at which the host was heard.
         heard: Bytes that were heard at these times.
     """
@@ -73,7 +73,7 @@ class Recorded:
     def __init__(self, device: Device, robot: SimulatedTurtleBot3) -> None:
         self._device = device
         self._robot = robot
-        self.told: list[tuple[float, float, float]] = [(robot.time.now_s(), 0.0, 0.0)]
+        self.commanded: list[tuple[float, float, float]] = [(robot.time.now_s(), 0.0, 0.0)]
         self.heard_s: list[float] = []
         self.heard: list[bytes] = []
 
@@ -101,8 +101,8 @@ class Recorded:
             world = self._robot.world
             radius_m = world.body.wheel_radius_m
             speeds = [radius_m * wheel.goal_rad_s if wheel.is_driven else 0.0 for wheel in (world.left, world.right)]
-            if tuple(speeds) != self.told[-1][1:]:
-                self.told.append((self._robot.time.now_s(), speeds[0], speeds[1]))
+            if tuple(speeds) != self.commanded[-1][1:]:
+                self.commanded.append((self._robot.time.now_s(), speeds[0], speeds[1]))
 
     def _watched(self, sendings: list[Sending]) -> list[Sending]:
         self.look()
@@ -177,14 +177,14 @@ class Driven:
         """Wait for something."""
         end_s = self.host.monotonic() + limit_s
         while not condition():
-            assert self.host.monotonic() < end_s, f"waited {limit_s} s in vain for {what}; told: {self.messages}"
+            assert self.host.monotonic() < end_s, f"waited {limit_s} s in vain for {what}; received: {self.messages}"
             self.host.sleep(0.002)
 
     @property
     def wheels_m_s(self) -> tuple[float, float]:
         """Current commanded speeds of the motors, in m/s."""
         self.trace.look()
-        return self.trace.told[-1][1:]
+        return self.trace.commanded[-1][1:]
 
     def moves(self) -> None:
         """Wait until it moves."""
@@ -193,7 +193,7 @@ class Driven:
     def steady(self) -> None:
         """Wait until it moves with the velocity that is wanted: nothing changes any more."""
         self.until(
-            lambda: self.wheels_m_s != (0.0, 0.0) and self.host.monotonic() - self.trace.told[-1][0] > 0.3,
+            lambda: self.wheels_m_s != (0.0, 0.0) and self.host.monotonic() - self.trace.commanded[-1][0] > 0.3,
             "a steady motion",
         )
 
@@ -210,27 +210,27 @@ class Driven:
             cause()
             self.until(lambda: self._is_still(begin_s), "the wheels to be commanded to stop")
         self.trace.look()
-        told = self.trace.told
-        assert told[-1][1:] == (0.0, 0.0)
-        took_s = told[-1][0] - begin_s
+        commanded = self.trace.commanded
+        assert commanded[-1][1:] == (0.0, 0.0)
+        took_s = commanded[-1][0] - begin_s
         most_s = limit_s if lateness is None else limit_s + HANDOVERS * lateness.worst_s
         assert took_s <= most_s, f"{took_s:.3f} s instead of {limit_s:.3f} s, on this machine {most_s:.3f} s"
         return took_s
 
     def _is_still(self, begin_s: float) -> bool:
         """Return True if the wheels have been commanded to stand still, and nothing else since then."""
-        at_s, *wheels = self.trace.told[-1]
+        at_s, *wheels = self.trace.commanded[-1]
         return at_s >= begin_s and wheels == [0.0, 0.0] and self.robot.time.now_s() - at_s > 0.15
 
     def stays(self, seconds: float) -> None:
         """See that nothing is set in motion for so long."""
-        before = len(self.trace.told)
+        before = len(self.trace.commanded)
         assert self.wheels_m_s == (0.0, 0.0)
         self.host.sleep(seconds)
         self.trace.look()
-        assert all(wheels == [0.0, 0.0] for _, *wheels in self.trace.told[before:])
+        assert all(wheels == [0.0, 0.0] for _, *wheels in self.trace.commanded[before:])
 
-    def was_told(self, text: str) -> None:
+    def reports(self, text: str) -> None:
         """See that a person received this text, once; waits for it."""
         self.until(lambda: any(text in message for message in self.messages), f"the message {text!r}")
         found = [message for message in self.messages if text in message]

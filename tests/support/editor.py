@@ -87,7 +87,7 @@ class Editor:
     ) -> None:
         self.folder = folder
         self.texts: dict[str, str] = {}
-        self.told: dict[str, lsp.PublishDiagnosticsParams] = {}
+        self.reports: dict[str, lsp.PublishDiagnosticsParams] = {}
         self.faults: list[str] = []
         self.logged: list[str] = []
         self._resolves_edits = resolves_edits
@@ -105,8 +105,8 @@ class Editor:
 
     def _listen(self) -> None:
         @self.client.feature(lsp.TEXT_DOCUMENT_PUBLISH_DIAGNOSTICS)  # type: ignore[untyped-decorator]
-        def findings(told: lsp.PublishDiagnosticsParams) -> None:
-            self.told[told.uri] = told
+        def findings(report: lsp.PublishDiagnosticsParams) -> None:
+            self.reports[report.uri] = report
             self._news.set()
 
         @self.client.feature(lsp.WORKSPACE_CODE_LENS_REFRESH)  # type: ignore[untyped-decorator]
@@ -120,12 +120,12 @@ class Editor:
             self._news.set()
 
         @self.client.feature(lsp.WINDOW_SHOW_MESSAGE)  # type: ignore[untyped-decorator]
-        def fault(told: lsp.ShowMessageParams) -> None:
-            self.faults.append(told.message)
+        def fault(message: lsp.ShowMessageParams) -> None:
+            self.faults.append(message.message)
 
         @self.client.feature(lsp.WINDOW_LOG_MESSAGE)  # type: ignore[untyped-decorator]
-        def log(told: lsp.LogMessageParams) -> None:
-            self.logged.append(told.message)
+        def log(message: lsp.LogMessageParams) -> None:
+            self.logged.append(message.message)
 
     def run(self, coroutine: Any) -> Any:
         """Wait for something, at most `LIMIT_S`."""
@@ -285,7 +285,7 @@ class Editor:
         where = lsp.Range(self.position(text, at + begin), self.position(text, at + end))
         return lsp.Location(self.uri(name), where)
 
-    # What it receives
+    # Messages that it receives
 
     def until(self, condition: Callable[[], bool]) -> None:
         """Wait until the server has sent something."""
@@ -303,12 +303,12 @@ class Editor:
         """Return the findings in the text as it is shown, once they are reported and as wanted."""
         uri = self.uri(name)
 
-        def is_told() -> bool:
-            told = self.told.get(uri)
-            return told is not None and told.version == self._versions[name] and such(list(told.diagnostics))
+        def is_reported() -> bool:
+            report = self.reports.get(uri)
+            return report is not None and report.version == self._versions[name] and such(list(report.diagnostics))
 
-        self.until(is_told)
-        return list(self.told[uri].diagnostics)
+        self.until(is_reported)
+        return list(self.reports[uri].diagnostics)
 
     def codes(self, name: str, such: Callable[[list[str]], bool] = lambda codes: True) -> list[str]:
         """The codes of what is found; see `findings`."""

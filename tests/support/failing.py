@@ -74,7 +74,7 @@ def _written(test: str, maker: str, seed: int | None, files: Callable[[], Files]
     place.mkdir(parents=True)
     report = [f"What {maker}({'' if seed is None else seed}) made is in {place}:"]
     for name, text in texts.items():
-        # As it is, with its line ends; hostile texts may hold what is no character.
+        # The text is written as it is, with its line ends; hostile texts may hold what is no character.
         (place / name).write_bytes(text.encode("utf-8", "backslashreplace"))
         lines = text.splitlines()
         report += [f"--- {name}", *lines[:_LINES], *(["..."] if len(lines) > _LINES else [])]

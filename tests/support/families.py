@@ -67,7 +67,7 @@ def transfer_line(sections: int) -> System:
             _counter(f"b{number}b", 1, 0, [f"u_{second}_end"], [f"{unit}_start"]),
         ]
         if number:
-            # What the section before has passed waits for this one.
+            # Items that have passed the section before wait for this one.
             automata.append(_counter(f"c{number}", 2, 0, [f"u_t{number - 1}_passes"], [f"{first}_start"]))
     return system(*automata)
 

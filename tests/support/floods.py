@@ -9,7 +9,7 @@ from support.strangers import END_OF_HEADERS, HEADERS, RST_STREAM, frame, header
 from support.waiting import PATIENCE_S
 
 MOST_BYTES = 512 * 2**20
-"""Bytes after which a flood gives up: nobody cuts it off."""
+"""Bytes after which a flood gives up: it is not cut off."""
 
 _PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n" + bytes([0, 0, 0, 4, 0, 0, 0, 0, 0])
 _CONTINUATION = bytes([0, 0x40, 0, 9, 0, 0, 0, 0, 1]) + b"v" * 0x4000

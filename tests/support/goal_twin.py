@@ -12,11 +12,13 @@ from typing import Any
 
 from robosc.automata import ExecutableSystem
 from robosc.automata.compile import NO_DATA, Function, compile_expression
+from robosc.automata.goal_memory import Obligations
 from robosc.automata.state import subjects
 from robosc.controller_properties.controller import Controller, Node
 from robosc.expressions import Expression
 from robosc.model.structure import Assumption, Goal, GoalForm
-from robosc.supervisor import AddedCondition
+from robosc.supervisor import AddedCondition, Strategy
+from robosc.supervisor.predicates import state_predicate
 from support.mission_twin import Mark, MissionTwin, mission_twin
 
 Marks = tuple[Any, ...]
@@ -126,6 +128,18 @@ class Game:
         found: dict[str, bool] = {}
         for item, mark in zip((*self.assumptions, *self.goals), position[1], strict=True):
             found |= item.memory(mark)
+        return found
+
+    def possible(self, item: Item | _Visit) -> set[Position]:
+        """Return the positions from which both sides together can make an assumption or a goal true again and again."""
+        following = {
+            position: {*self.successors[position], *self.choices[position].values(), position} - {LOST}
+            for position in self.choices
+        }
+        groups = components(list(following), following.__getitem__)
+        found = {at for group in groups if any(self.holds(one, item) for one in group) for at in group}
+        while wider := {position for position, targets in following.items() if targets & found} - found:
+            found |= wider
         return found
 
     def holding(self, position: Position, items: Sequence[Item | _Visit]) -> tuple[bool, ...]:
@@ -270,12 +284,44 @@ def _attractor(
     return found
 
 
-def unfair_goal(game: Game, decide: Callable[[Position, int], tuple[str | None, int]]) -> tuple[int, Any] | None:
+Decide = Callable[[Position, int], tuple[str | None, int]]
+"""Function that returns the request for a position and a mode, None for none, and the mode after it."""
+
+
+def deciding(game: Game, executable: ExecutableSystem, strategy: Strategy) -> Decide:
+    """Return what a strategy decides in the positions of a game."""
+    owed, system = executable.obligations, executable.remembering_automata
+    modes = [[(item.event, state_predicate(system, item.condition)) for item in mode] for mode in strategy.modes]
+
+    def decide(position: Position, mode: int) -> tuple[str | None, int]:
+        holding = game.holding(position, game.goals)
+        following = [(mode + step) % len(holding) for step in range(len(holding))]
+        number = next((number for number in following if not holding[number]), None)
+        if number is None:
+            return None, mode
+        values = values_of(game, position, owed)
+        return next((event for event, condition in modes[number] if condition(values)), None), number
+
+    return decide
+
+
+def values_of(game: Game, position: Position, owed: Obligations) -> tuple[Any, ...]:
+    """Return a position of the explicit game as a state of the automata with their memory."""
+    state, held = position[0]
+    memory = game.memory(position)
+    for cancel, mask in zip(owed.cancels, held, strict=True):
+        memory |= {place.name: bool(mask >> bit & 1) for bit, place in enumerate(cancel.places)}
+    return (*state, "only", *(memory[place.name] for place in owed.places))
+
+
+def unfair_goal(game: Game, decide: Decide) -> tuple[int, Any] | None:
     """Return a goal that a strategy may miss for ever although all assumptions come true again and again, with where.
+
+    A request that is not enabled where it is chosen misses the first one.
 
     Args:
         game: The game.
-        decide: Function that returns the request for a position and a mode, None for none, and the mode after it.
+        decide: Decisions of the strategy.
     """
     moves: dict[Any, set[Any]] = {}
     turns: dict[Any, Any] = {}
@@ -287,6 +333,8 @@ def unfair_goal(game: Game, decide: Callable[[Position, int], tuple[str | None, 
         if position == LOST:
             return 0, vertex
         event, after = decide(position, mode)
+        if event is not None and event not in game.choices[position]:
+            return 0, vertex
         turns[vertex] = (position if event is None else game.choices[position][event], after)
         moves[vertex] = {(target, mode) for target in game.successors[position]}
         queue += [turns[vertex], *moves[vertex]]
@@ -364,7 +412,7 @@ def distances(game: Game, won: set[Position], goal: int) -> dict[Position, int]:
     while True:
         progress = {position for position in won if position in reached or turns(position) & found.keys()}
         near = set[Position]()
-        # Without an assumption there is one that never fails.
+        # The empty assumption is one that never fails.
         for failed in failing or [set[Position]()]:
             staying = set(won)
             while True:

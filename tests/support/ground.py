@@ -68,8 +68,8 @@ def scan_of(ranges_m: Mapping[int, float], time_s: float = 100.0) -> Scan:
 
 def reading_of(time_s: float = 100.0, **values: Any) -> DriveReading:
     """Return a reading of a drive base."""
-    told: dict[str, Any] = {"pose": Pose(), "velocity": Velocity(), "wheels_m_s": (0.0, 0.0), "is_torque_on": False}
-    return DriveReading(time_s=time_s, **{**told, **values})
+    usual: dict[str, Any] = {"pose": Pose(), "velocity": Velocity(), "wheels_m_s": (0.0, 0.0), "is_torque_on": False}
+    return DriveReading(time_s=time_s, **{**usual, **values})
 
 
 STANDBY = Snapshot(
@@ -95,7 +95,7 @@ class PlayedDaemon:
 
     Attributes:
         orders: Orders that came, oldest first.
-        told: Messages that programs sent to it.
+        received: Messages that programs sent to it.
         seen: Number of times that the operator was seen.
         answers: Immediate answers to orders, by command; others wait for `answer`.
     """
@@ -104,7 +104,7 @@ class PlayedDaemon:
     model: str = MODEL
     configuration: str = CONFIGURATION
     orders: list[Order] = field(default_factory=list)
-    told: list[FromProgram] = field(default_factory=list)
+    received: list[FromProgram] = field(default_factory=list)
     seen: int = 0
     answers: dict[OperatorCommand, str] = field(default_factory=dict)
 
@@ -125,7 +125,7 @@ class PlayedDaemon:
 
     def _post(self, item: Order | FromProgram) -> None:
         if not isinstance(item, Order):
-            self.told.append(item)
+            self.received.append(item)
             return
         self.orders.append(item)
         if item.command in self.answers:
@@ -147,8 +147,8 @@ class PlayedDaemon:
 
     def write(self, **entry: Any) -> None:
         """Write an entry into the event log."""
-        told: Entry = entry
-        self.feed.append(told)
+        whole: Entry = entry
+        self.feed.append(whole)
 
 
 class Station:

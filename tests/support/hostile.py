@@ -3,6 +3,11 @@
 from pathlib import Path
 from random import Random
 
+from robosc.model.structure import Deployment
+from robosc.supervisor import Supervisor
+from support.models import model_of
+from support.random_supervisors import CERTIFICATE
+
 # Words of Python, C, C++ and their libraries, of generated code and of templates.
 WORDS = """
     None True False def class lambda self import pass yield async await global nonlocal raise del with as assert print
@@ -153,3 +158,9 @@ robot {robot} {{ /* {comment} */
     provide {count} with {arm}.{steps}
 }}
 """
+
+
+def hostile_supervisor(seed: int, canary: Path, *, is_on_ros: bool = True) -> Supervisor:
+    """The supervisor, without a condition, of a hostile robot."""
+    text = hostile_text(seed, canary, is_on_ros=is_on_ros)
+    return Supervisor(model_of(text), Deployment.CONTROLLER, (), CERTIFICATE)

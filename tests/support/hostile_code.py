@@ -61,7 +61,7 @@ def tried(line: str) -> str:
         _WAYS[what](rest)
     except OSError as error:
         return errno.errorcode.get(error.errno or 0, str(error))
-    except RuntimeError as error:  # Of the module threading.
+    except RuntimeError as error:  # The module threading raises it.
         return str(error)
     return "done"
 
@@ -94,7 +94,7 @@ def _fork(_: str) -> None:
 
 
 def _interrupt(pid: str) -> None:
-    # Of its connection: it has no other.
+    # The descriptor is that of its connection: it has no other.
     for number in range(3, 64):
         with contextlib.suppress(OSError):
             if stat.S_ISSOCK(os.fstat(number).st_mode):

@@ -51,7 +51,7 @@ def settings_of(editor: str, language: str) -> str:
 
 
 class Home:
-    """The folder of somebody who has nothing but `robosc-lsp`.
+    """The folder of a user who has nothing but `robosc-lsp`.
 
     Args:
         folder: Empty.
@@ -222,7 +222,7 @@ class Emacs:
     def __init__(self, home: Home, file: Path) -> None:
         assert EMACS is not None
         home.write(".emacs.d/init.el", settings_of("Emacs", "elisp"))
-        # In a new home Emacs would translate all its packages into machine code first, and show the output of that.
+        # Emacs would translate all its packages into machine code first in a new home, and show the output of that.
         home.write(
             ".emacs.d/early-init.el",
             "(setq native-comp-deferred-compilation nil native-comp-jit-compilation nil"
@@ -257,14 +257,14 @@ class Emacs:
             raise
 
     def _listens(self) -> bool:
-        # Its socket is there a moment before anybody is let in.
+        # Its socket is there a moment before connections are accepted.
         with socket.socket(socket.AF_UNIX) as line, contextlib.suppress(FileNotFoundError, ConnectionRefusedError):
             line.connect(str(self._socket))
             return True
         return False
 
     def _read(self) -> None:
-        # Nothing that it shows may stay in its way.
+        # Output must not stay in its way.
         try:
             while came := os.read(self._number, 65536):
                 self.seen += came

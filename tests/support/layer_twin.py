@@ -24,7 +24,7 @@ class Fault(Exception):
 
 
 class Endless(Fault):
-    """Silent steps that do not end: the state at which that is noticed is nobody's business."""
+    """Silent steps that do not end: the state at which that is noticed does not matter."""
 
 
 @dataclass
@@ -127,7 +127,7 @@ class LayerTwin:
         with self.guard():
             self.settle()
 
-    # What both deployments do.
+    # Behaviour of both deployments.
 
     @contextmanager
     def guard(self) -> Iterator[None]:
@@ -191,7 +191,7 @@ class LayerTwin:
     def may_request(self) -> bool:
         return not self.reasons and self.seen.keys() >= self.sensors.keys()
 
-    # What the caller sends.
+    # Data from the caller.
 
     def request(self, identifier: str, message: Any) -> None:
         self.arrived[identifier] = self.now
@@ -256,7 +256,7 @@ class LayerTwin:
         self.cancel(goal)
         self.finish()
 
-    # What the robot sends.
+    # Data from the robot.
 
     def receive(self, identifier: str, data: Any) -> None:
         is_fault = False
@@ -368,7 +368,7 @@ class LayerTwin:
         self.finish()
 
     def finish(self) -> None:
-        """Goals that nobody but the supervisor, time or a restart ended are aborted for their callers."""
+        """Goals that only the supervisor, time or a restart ended are aborted for their callers."""
         for goal in self.goals:
             if not (goal.runs_in_model or goal.was_cancelled_by_caller or goal.has_ended_for_caller):
                 goal.has_ended_for_caller = True

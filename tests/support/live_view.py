@@ -100,7 +100,7 @@ class StandIn:
         self._wait(lambda: len(self._sockets) == count)
 
     def _wait(self, is_so: Callable[[], bool]) -> None:
-        wait_until(is_so, told=lambda: f"received: {self.received}")
+        wait_until(is_so, heard=lambda: f"received: {self.received}")
 
     def _do(self, work: Any) -> Any:
         return asyncio.run_coroutine_threadsafe(work, self._loop).result(LIMIT_S)

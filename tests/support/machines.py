@@ -38,16 +38,16 @@ class RecordedEndpoint:
     def __init__(self, made: Machine, problem: str = "") -> None:
         self.made = made
         self.problem = problem
-        self.told: list[str] = []
+        self.calls: list[str] = []
         self.switch_s = 0.0
 
     def start(self) -> None:
         if self.problem:
             raise BridgeError(self.problem)
-        self.told.append(f"start {self.made.drive.is_alive}")
+        self.calls.append(f"start {self.made.drive.is_alive}")
         self.switch_s = sys.getswitchinterval()
         self.made.operations.order(OperatorCommand.QUIT, "a test")
 
     def stop(self) -> None:
         snapshot = self.made.operations.feed.snapshot
-        self.told.append(f"stop {self.made.drive.is_alive} {None if snapshot is None else snapshot.state}")
+        self.calls.append(f"stop {self.made.drive.is_alive} {None if snapshot is None else snapshot.state}")

@@ -25,7 +25,7 @@ from support.models import EXAMPLES
 FOLDER = Path(__file__).with_name("mistakes")
 GOOD = (*sorted(EXAMPLES.glob("*/*.rscd")), *sorted(FOLDER.glob("*.rscd")))
 _PAIRS = ("duplicate-", "multiple-")
-"""Codes of findings about two places, of which one is too many: nobody knows which."""
+"""Codes of findings about two places, of which one is too many: either may be."""
 
 STEPS = 12
 """Fixes that are obeyed one after the other; a slip that is made everywhere in a line takes several."""

@@ -166,14 +166,14 @@ class _Writer:
 
     def _requirement(self, item: Requirement) -> str:
         requests = f"{{ {', '.join(map(spelled, item.communications))} }}"
-        # Whatever the condition is, it does not run into the words around it.
+        # The parentheses keep the condition apart from the words around it.
         condition = f"({self._expression(item.expression)})"
         if item.form is RequirementForm.NEEDS:
             return f"requirement {requests} needs {condition}"
         return f"requirement {condition} disables {requests}"
 
     def _aim(self, item: Goal | Assumption) -> str:
-        # Whatever a condition is, none of its words is taken for one of the form.
+        # The parentheses keep words of a condition from being taken for those of the form.
         conditions = [f"({self._expression(expression)})" for expression in item.expressions]
         return f" {item.form} ".join(conditions) if len(conditions) > 1 else f"{item.form} {conditions[0]}"
 

@@ -19,7 +19,7 @@ EXAMPLE_DEPLOYMENTS = tuple(
     (name, deployment)
     for name in EXAMPLE_NAMES
     for deployment in Deployment
-    # As a layer, it could not tell its two messages on one topic apart: that is what the other model is for.
+    # A layer could not tell its two messages on one topic apart: that is the purpose of the other model.
     if (name, deployment) != ("line_follower/line_follower", Deployment.LAYER)
 )
 

@@ -1,4 +1,4 @@
-"""Supervisors that somebody tampered with: each mutant differs from a right one in one thing."""
+"""Supervisors that were tampered with: each mutant differs from a right one in one thing."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass
@@ -11,7 +11,15 @@ from robosc.automata.controlled import Added, controlled_graph
 from robosc.automata.state import subject_domain, subjects
 from robosc.expressions import TRUE, Binary, BooleanType, Constant, Expression, IntegerType, Unary
 from robosc.model.structure import Behaviour, Component, Model, RequirementForm
-from robosc.supervisor import AddedCondition, Certificate, DecisionDiagram, DecisionNode, Supervisor
+from robosc.supervisor import (
+    AddedCondition,
+    Certificate,
+    Choice,
+    DecisionDiagram,
+    DecisionNode,
+    Strategy,
+    Supervisor,
+)
 from robosc.verification import ExplicitSupervisor
 from support.random_supervisors import random_diagram
 
@@ -185,3 +193,31 @@ def _behaviour_mutants(behaviour: Behaviour) -> Iterator[Mutant[Behaviour]]:
 def with_added(supervisor: Supervisor, added: tuple[AddedCondition, ...]) -> Supervisor:
     """A supervisor with other conditions."""
     return change(supervisor, added=added)
+
+
+def strategy_mutants(supervisor: Supervisor) -> Iterator[Mutant[Strategy]]:
+    """Every single change of a strategy: of what it chooses, in which order, and where."""
+    assert supervisor.strategy is not None
+    modes, executable = supervisor.strategy.modes, supervisor.executable
+
+    def changed(number: int, mode: tuple[Choice, ...]) -> Strategy:
+        return Strategy((*modes[:number], mode, *modes[number + 1 :]))
+
+    for number, mode in enumerate(modes):
+        subject = f"goal {number + 1}"
+        if number:
+            swapped = (*modes[: number - 1], mode, modes[number - 1], *modes[number + 1 :])
+            yield Mutant(f"{subject} exchanged with the one before", Strategy(swapped))
+        yield Mutant(f"{subject}: nothing", changed(number, ()))
+        for place, choice in enumerate(mode):
+            before, after, name = mode[:place], mode[place + 1 :], f"{subject}, {choice.event}"
+            yield Mutant(f"{name}: removed", changed(number, (*before, *after)))
+            if place:
+                yield Mutant(f"{name}: earlier", changed(number, (*mode[: place - 1], choice, before[-1], *after)))
+            for event in executable.requests:
+                if event not in {item.event for item in mode}:
+                    other = change(choice, event=event)
+                    yield Mutant(f"{name}: {event} instead", changed(number, (*before, other, *after)))
+            for mutant in diagram_mutants(choice.condition, executable.remembering_automata):
+                other = change(choice, condition=mutant.value)
+                yield Mutant(f"{name}: {mutant.name}", changed(number, (*before, other, *after)))

@@ -267,7 +267,7 @@ def _ports(count: int) -> Iterator[list[int]]:
 
 def _environment() -> dict[str, str]:
     variables = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
-    # Without bytecode on disk, each start would compile all that it imports.
+    # Each start would compile all imports without bytecode on disk.
     variables.pop("PYTHONDONTWRITEBYTECODE", None)
     return variables
 

@@ -1,4 +1,4 @@
-"""Runs the tests that generated packages bring with them, as somebody would who has nothing but pytest."""
+"""Runs the tests that generated packages bring with them, for a user who has nothing but pytest."""
 
 import os
 import subprocess

@@ -30,18 +30,18 @@ class OpenPage:
         """The next message."""
         message = await asyncio.wait_for(self.socket.receive(), LIMIT_S)
         assert message.type is aiohttp.WSMsgType.TEXT, message
-        told: dict[str, Any] = json.loads(message.data, parse_constant=_refuse)
-        self.messages.append(told)
-        return told
+        content: dict[str, Any] = json.loads(message.data, parse_constant=_refuse)
+        self.messages.append(content)
+        return content
 
     async def until(self, fits: Callable[[dict[str, Any]], Any]) -> dict[str, Any]:
         """The next message that fits."""
         while True:
-            told = await self.next()
-            if fits(told):
-                return told
+            message = await self.next()
+            if fits(message):
+                return message
 
-    async def told(self, kind: str) -> dict[str, Any]:
+    async def receive(self, kind: str) -> dict[str, Any]:
         """The next message of a kind."""
         return await self.until(lambda message: message["type"] == kind)
 

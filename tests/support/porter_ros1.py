@@ -19,7 +19,7 @@ from support.waiting import wait_until
 PACKAGE = "porter_layer"
 CARELESS = Path(__file__).with_name("ros1_careless.py")
 
-# What Debian's ROS 1 has of actions.
+# The action types that Debian's ROS 1 has.
 _OTHER_TYPES = {
     "use Fibonacci from test_msgs": "use Test from actionlib",
     "object Order { order: integer }": "object Order { goal: integer }",
@@ -143,7 +143,7 @@ class Porter:
         self._parameters = parameters
 
     def leave(self) -> None:
-        """End what runs, as a crash would, and wait until nobody is connected with it."""
+        """End what runs, as a crash would, and wait until no node is connected with it."""
         self._parameters = None
         if self.layer is not None:
             self.layer.__exit__(None, None, None)
@@ -153,7 +153,7 @@ class Porter:
     def _is_alone(self) -> bool:
         if not any(map(self._is_connected, (*RECEIVED, *SENT))):
             return True
-        # Who is gone is only noticed when something is sent to him.
+        # A subscriber that is gone is only noticed when something is sent to it.
         for topic, type_name in SENT.items():
             self.peer.publish(topic, type_name)
         return False
@@ -175,7 +175,7 @@ class Porter:
         assert self.layer is not None
         until(condition, what, self.layer, repeat)
 
-    # What is seen.
+    # Observations.
 
     @property
     def commands(self) -> list[Any]:
@@ -208,7 +208,7 @@ class Porter:
             lambda: self.blocked.count(identifier) >= before + count, f"{count} of {identifier} held back", repeat
         )
 
-    # What is done.
+    # Acts.
 
     def allow(self, is_allowed: bool) -> None:
         state = "granted" if is_allowed else "denied"

@@ -37,7 +37,7 @@ def has_postgresql() -> bool:
 
 
 def skip_without_postgresql() -> None:
-    """Skip the test where there is no PostgreSQL, or nobody to run it as."""
+    """Skip the test where there is no PostgreSQL, or no user to run it as."""
     if _programs() is None:
         pytest.skip("PostgreSQL is not installed (Debian's package: postgresql)")
     if os.getuid() == 0:
@@ -94,7 +94,7 @@ class Postgresql:
             "unix_socket_directories": "",
             "shared_buffers": "16MB",
             "max_connections": str(self._connections),
-            # What is committed survives a kill of its processes without it, and the machine's disk is busy.
+            # Committed rows survive a kill of its processes without it, and the machine's disk is busy.
             "fsync": "off",
         }
         settings = [word for name, value in options.items() for word in ("-c", f"{name}={value}")]
@@ -187,7 +187,7 @@ class Postgresql:
 def postgresql(connections: int = 40) -> Iterator[Postgresql]:
     """A server that runs and takes so many connections; ended at the end."""
     skip_without_postgresql()
-    # Not where only root comes: the server runs as somebody else.
+    # Not where only root comes: the server runs as another user.
     folder = Path(tempfile.mkdtemp(prefix="postgresql-", dir="/tmp"))
     server = Postgresql(folder, connections)
     try:

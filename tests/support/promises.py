@@ -94,9 +94,9 @@ def measured_s(promise: Promise, chance: random.Random, host: VirtualHost | Syst
         if promise.promised_s is not None:
             return bridge.stopped_after(cause, promise.promised_s)
         cause()
-        told = len(bridge.trace.told)
+        commanded = len(bridge.trace.commanded)
         bridge.host.sleep(GOES_ON_S)
-        is_stopped = any(wheels == [0.0, 0.0] for _, *wheels in bridge.trace.told[told:])
+        is_stopped = any(wheels == [0.0, 0.0] for _, *wheels in bridge.trace.commanded[commanded:])
         if is_stopped or bridge.state is not State.RUNNING or bridge.wheels_m_s == (0.0, 0.0):
             raise PromiseBrokenError(f"it did not go on: {bridge.messages}")
         return GOES_ON_S
@@ -114,7 +114,10 @@ def _of_a_process_s(promise: Promise, number: signal.Signals, chance: random.Ran
         command = [sys.executable, "-m", "robosc_bridge.main", "run", "--model", str(model), "--config", str(file)]
         process = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         try:
-            _wait(lambda: trace.told[-1][1:] != (0.0, 0.0) and robot.time.now_s() - trace.told[-1][0] > 0.3, process)
+            _wait(
+                lambda: trace.commanded[-1][1:] != (0.0, 0.0) and robot.time.now_s() - trace.commanded[-1][0] > 0.3,
+                process,
+            )
             time.sleep(chance.uniform(0.0, 0.3))
             begin_s = robot.time.now_s()
             process.send_signal(number)
@@ -122,7 +125,7 @@ def _of_a_process_s(promise: Promise, number: signal.Signals, chance: random.Ran
         finally:
             process.kill()
             process.wait()
-        took_s = trace.told[-1][0] - begin_s
+        took_s = trace.commanded[-1][0] - begin_s
     if promise.promised_s is None or took_s > promise.promised_s:
         raise PromiseBrokenError(f"{took_s:.3f} s instead of {promise.promised_s} s")
     return took_s
@@ -130,7 +133,7 @@ def _of_a_process_s(promise: Promise, number: signal.Signals, chance: random.Ran
 
 def _stands(trace: Recorded, robot: SimulatedTurtleBot3) -> bool:
     trace.look()
-    return trace.told[-1][1:] == (0.0, 0.0) and robot.time.now_s() - trace.told[-1][0] > _STANDS_S
+    return trace.commanded[-1][1:] == (0.0, 0.0) and robot.time.now_s() - trace.commanded[-1][0] > _STANDS_S
 
 
 def _wait(condition: Callable[[], bool], process: subprocess.Popen[bytes] | None) -> None:
@@ -143,7 +146,7 @@ def _wait(condition: Callable[[], bool], process: subprocess.Popen[bytes] | None
         time.sleep(0.005)
 
 
-# What lets the faults happen.
+# Functions that let the faults happen.
 
 
 def _halt(bridge: Driven, _: ExitStack) -> Cause:
@@ -205,7 +208,7 @@ def _operator_goes(bridge: Driven, stack: ExitStack) -> Cause:
 
     operator = bridge.host.thread(sees, "operator")
     operator.start()
-    # Whatever becomes of the run, its thread must end before the host does.
+    # The operator's thread must end before the host does, whatever becomes of the run.
     stack.callback(lambda: operator.join(_TOO_LATE_S))
     stack.callback(bridge.machine.quit)
     return there.clear

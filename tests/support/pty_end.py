@@ -27,7 +27,7 @@ class PtyEnd:
     """
 
     def __init__(self) -> None:
-        # The slave stays open here: the master would see a hang-up whenever nobody has the port open.
+        # The slave stays open here: the master would see a hang-up whenever the port is not open.
         self.master, self._slave = os.openpty()
         self.path = os.ttyname(self._slave)
         self._is_open = True

@@ -1,4 +1,4 @@
-"""Random robots for supervision layers: several messages on one identifier, told apart by conditions."""
+"""Random robots for supervision layers: several messages on one identifier, distinguished by conditions."""
 
 from random import Random
 
@@ -15,7 +15,7 @@ _INCOMING = CommunicationKind.INCOMING_MESSAGE
 
 
 def random_layer(dice: Random) -> Supervisor:
-    """A random robot, its incoming messages on few identifiers and told apart by conditions."""
+    """A random robot, its incoming messages on few identifiers and distinguished by conditions."""
     model = random_robot(dice.randrange(2**32)).model
     found: list[Communication] = []
     for item in model.communications:

@@ -211,7 +211,7 @@ class _Builder:
 
     def system(self) -> System:
         """The drawn system; each event belongs to one or two automata."""
-        # An event of nobody's is one of requirements alone, or one that cannot happen.
+        # An event of no plant is one of requirements alone, or one that cannot happen.
         counts = (1, 1, 2, 1, 1, 2, 1, 1, 2, 0) if self.is_wide else (1, 1, 2)
         owners = {event: self.random.sample(tuple(self.locations), self.random.choice(counts)) for event in self.events}
         automata = tuple(

@@ -15,7 +15,7 @@ from support.reactive import ReactiveProblem, primed
 
 
 def arbiter(clients: int) -> ReactiveProblem:
-    """A resource for one client at a time: whoever requests it is granted it, and gives it back some time."""
+    """A resource for one client at a time: each client that requests it gets it, and gives it back some time."""
     every = range(clients)
     return ReactiveProblem(
         order=tuple(name for item in every for name in (f"r{item}", f"g{item}")),

@@ -142,7 +142,7 @@ class FakeDaemon:
         self.seen = 0
         self.refusal: str | None = ""
         self.orders: list[Order] = []
-        self.told: list[FromProgram] = []
+        self.received: list[FromProgram] = []
         self.handle: Callable[[FromProgram], None] = lambda item: None
         self.turns = True
         self._number = 0
@@ -178,11 +178,11 @@ class FakeDaemon:
 
     def program(self) -> Program:
         """The first that was attached, after the turn in which that was sent: a snapshot was shown at its end."""
-        return wait_until(lambda: self.told[0].program if self._turned else None)
+        return wait_until(lambda: self.received[0].program if self._turned else None)
 
     def of(self, kind: type[Any]) -> list[Any]:
         """Return the reported items of a kind."""
-        return [item for item in self.told if isinstance(item, kind)]
+        return [item for item in self.received if isinstance(item, kind)]
 
     def _post(self, item: Order | FromProgram) -> None:
         if isinstance(item, Order) and item.command is OperatorCommand.STOP:
@@ -203,10 +203,10 @@ class FakeDaemon:
                 if self.refusal is not None:
                     item.answer(self.refusal)
             else:
-                self.told.append(item)
+                self.received.append(item)
                 self.handle(item)
             self.show()
-            self._turned = len(self.told)
+            self._turned = len(self.received)
 
 
 @contextmanager

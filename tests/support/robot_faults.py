@@ -75,7 +75,7 @@ def steer(bridge: Driven) -> None:
     bridge.robot.opencr.steer(0.04, 0.0)
 
 
-# What a person must see to.
+# Faults that a person must see to.
 GRAVE = (
     Fault("a motor is overloaded", lambda bridge: bridge.robot.left.overload(), "A motor reports a fault."),
     Fault("a motor is too hot", lambda bridge: bridge.robot.right.overheat(), "A motor reports a fault."),

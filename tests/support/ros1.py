@@ -45,7 +45,7 @@ def clean_environment() -> dict[str, str]:
 
 
 def free_port() -> int:
-    """A port that nobody listens on."""
+    """A port without a listener."""
     with socket.socket() as found:
         found.bind(("127.0.0.1", 0))
         return int(found.getsockname()[1])
@@ -75,7 +75,7 @@ class Master:
             }
             self.port = port
             self.process = self._start(folder)
-            # Somebody else may have taken the port.
+            # Another process may have taken the port.
             while self.process.is_running:
                 if self.is_up():
                     return
@@ -296,5 +296,5 @@ def until(
         limit_s,
         repeat=repeat,
         fault=lambda: "" if process.is_running else "the node ended",
-        told=lambda: process.stderr,
+        heard=lambda: process.stderr,
     )

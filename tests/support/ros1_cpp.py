@@ -100,7 +100,7 @@ class Master(Process):
         wait_until(self._is_up, "the master")
 
     def another(self, folder: Path) -> Process:
-        """One in its place that knows nobody; it has ended."""
+        """One in its place that knows no node; it has ended."""
         return Process(self._command, self.variables, folder)
 
     def _is_up(self) -> bool:
@@ -142,7 +142,7 @@ class Peer:
         for line in self._process.stdout or ():
             self.heard.append(json.loads(line))
 
-    def tell(self, what: str, name: str = "", type_: str = "", data: Any = None) -> None:
+    def order(self, what: str, name: str = "", type_: str = "", data: Any = None) -> None:
         """Give an order."""
         assert self._process.stdin is not None
         self._process.stdin.write(json.dumps({"do": what, "name": name, "type": type_, "data": data}) + "\n")
@@ -159,7 +159,7 @@ class Peer:
 
     def publish(self, topic: str, type_: str, **fields: Any) -> None:
         """Send a message."""
-        self.tell("publish", topic, type_, fields)
+        self.order("publish", topic, type_, fields)
 
     def kill(self) -> None:
         """End it at once, as a crash would."""

@@ -136,7 +136,7 @@ class Server(ActionServer):  # type: ignore[misc]
             self.running.append(handle)
         else:
             handle.set_rejected()
-        # Last: whoever has read it may let the goal go on.
+        # Last: its reader may let the goal go on.
         report(action=self.name, goal=plain(handle.get_goal()))
 
     def cancel_came(self, handle: Any) -> None:

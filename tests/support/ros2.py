@@ -142,7 +142,7 @@ class Peer:
         self.publisher(type(message), topic, qos).publish(message)
 
     def wait_for_peers(self, topics: Sequence[str]) -> None:
-        """Wait until somebody else publishes on or subscribes to each topic, as seen from here."""
+        """Wait until another node publishes on or subscribes to each topic, as seen from here."""
         own = self.node.get_name()
 
         def others(topic: str) -> bool:
@@ -183,7 +183,7 @@ class Peer:
             )
             if process is not None and not process.is_running and not has_ended:
                 has_ended = True
-                # What it said last may be on its way still.
+                # The last words of the process may be on their way still.
                 deadline = min(deadline, time.monotonic() + _LAST_WORDS_S)
             if time.monotonic() >= next_repeat:
                 repeat()

@@ -12,7 +12,7 @@ class _Dying(Exception):
 
 
 def main() -> None:
-    """Serve until somebody asks for something."""
+    """Serve until the first request."""
     rclpy.init()
     node = rclpy.create_node("dying_server")
     goals: list[object] = []

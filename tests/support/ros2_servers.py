@@ -218,7 +218,7 @@ class HeldAction:
 
 
 def cancel_all(peer: Peer, action: str) -> Callable[[], object]:
-    """A function that, as somebody else, asks the server of an action to cancel every goal."""
+    """A function that, as another client, asks the server of an action to cancel every goal."""
     from action_msgs.srv import CancelGoal
 
     client = peer.node.create_client(CancelGoal, f"{action}/_action/cancel_goal")

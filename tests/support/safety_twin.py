@@ -17,7 +17,7 @@ class Past:
     name: str
     value: Any = None
     time_s: float = 0.0
-    # Of an output: the clock, what it gave, and since when torque was wanted or to go.
+    # Fields of an output: the clock, its reasons, and the time since which torque was wanted or to go.
     now_s: float = 0.0
     reasons: frozenset[Reason] = frozenset()
     velocity: Velocity = STANDSTILL
@@ -183,7 +183,7 @@ class SafetyTwin:
                 found.add(Reason.UNBIDDEN_MOTION)
         return found
 
-    def tells(self, reading: DriveReading) -> None:
+    def answers(self, reading: DriveReading) -> None:
         """The drive base has answered; what latches of it is noted at once."""
         self.happens("drive", reading, reading.time_s)
         _, is_lost, read = self._torque_story()
@@ -260,7 +260,7 @@ class SafetyTwin:
 
     @staticmethod
     def _moved(present: float, wanted: float, up: float, down: float) -> float:
-        # Of the smallest numbers the product would be 0.
+        # The product of the smallest numbers would be 0.
         if present < 0 < wanted or wanted < 0 < present:
             aim, most = 0.0, down
         elif abs(wanted) < abs(present):

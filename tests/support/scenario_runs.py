@@ -131,8 +131,8 @@ class Companion:
     def __init__(
         self, run: ScenarioRun, identifier: str, data: Callable[[Person | None], object], serves: frozenset[str]
     ) -> None:
-        self.told: list[ToProgram] = []
-        self.program = Program("companion", self.told.append, serves)
+        self.received: list[ToProgram] = []
+        self.program = Program("companion", self.received.append, serves)
         self._run = run
         self._identifier = identifier
         self._data = data

@@ -114,7 +114,7 @@ class Script:
 
 @contextmanager
 def kept_port() -> Iterator[int]:
-    """A port that nobody else is given, also while no server listens at it."""
+    """A port that no other process is given, also while no server listens at it."""
     with socket.socket() as keeper:
         keeper.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEPORT, 1)
         keeper.bind(("127.0.0.1", 0))

@@ -146,10 +146,10 @@ def logged_server_process(
     with tempfile.TemporaryDirectory() as folder:
         usual = ["--port", "0", "--worker-processes", "1", "--state-dir", folder, "--drain-seconds", "0.5"]
         command = [sys.executable, "-m", "robosc_server.main", *usual, *arguments]
-        # Where it waits is reported should it not end.
+        # The stacks of its threads are reported should it not end.
         variables = {**os.environ, "PYTHONFAULTHANDLER": "1", **environment}
         process = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, env=variables)
-        # Its log must not fill the pipe while nobody reads.
+        # Its log must not fill the pipe while it is not read.
         log: list[str] = []
         assert process.stdout is not None and process.stderr is not None
         reader = threading.Thread(target=lambda lines: log.extend(lines), args=(process.stderr,))

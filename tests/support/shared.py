@@ -10,7 +10,7 @@ from support.colcon import locked
 
 
 def shared(factory: pytest.TempPathFactory, name: str, build: Callable[[Path], object]) -> Path:
-    """Return a folder that all workers of a run share; whoever comes first builds in it, the others wait for it.
+    """Return a folder that all workers of a run share; the first one builds in it, the others wait for it.
 
     Args:
         factory: Factory of the run.

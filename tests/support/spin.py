@@ -36,7 +36,7 @@ def ask_spin(model: str, properties: Mapping[str, str], folder: Path) -> Answer:
     """
     claims = "".join(f"ltl {name} {{ {formula} }}\n" for name, formula in properties.items())
     (folder / "model.pml").write_text(model + claims, encoding="utf-8")
-    # What is only written would be left out of the state, but for -o2.
+    # Variables that are only written would be left out of the state, but for -o2.
     _run(folder, "spin", "-a", "-o2", "model.pml")
     # Small tables: a hundred runs would otherwise spend their time on clearing memory.
     _run(folder, "gcc", "-O0", "-w", "-DSAFETY", "-DNOCLAIM", "-o", "plain", "pan.c")

@@ -113,7 +113,7 @@ class SteppedTwin:
             if deployment is Deployment.CONTROLLER
             else Layer(system, self, _Careless(self), settings, clock, log)
         )
-        # What others do with what they received; not while the executor is handing it over.
+        # Reactions of others to data that they received; not while the executor is handing it over.
         self._waiting: deque[Callable[[], None]] = deque()
         self._turn: Turn | None = None
         self._goal: tuple[int, float, float] | None = None
@@ -128,7 +128,7 @@ class SteppedTwin:
     ) -> None:
         self._stack.close()
 
-    # What the test does.
+    # Acts of the test.
 
     @property
     def is_standing(self) -> bool:
@@ -140,7 +140,7 @@ class SteppedTwin:
         """Position of its middle, in metres."""
         return self.world.pose[:2]
 
-    def tell(self, identifier: str, data: object = None) -> None:
+    def receive(self, identifier: str, data: object = None) -> None:
         """A message comes, without data such as that of a button."""
         self.executor.receive(identifier, data)
 
@@ -293,7 +293,7 @@ class SteppedTwin:
         self.world.left.goal_rad_s = (ahead_m_s - aside_m_s) / body.wheel_radius_m
         self.world.right.goal_rad_s = (ahead_m_s + aside_m_s) / body.wheel_radius_m
 
-    # What the executor asks of the robot.
+    # Calls of the executor to the robot.
 
     def prepare(self, communication: str, data: Any) -> Any:
         return data
@@ -310,7 +310,7 @@ class SteppedTwin:
             case "/rotate_right":
                 self._turn = Turn(-math.radians(message), self.world.pose[2])
             case other if other in TOLD:
-                self.house.tell(other)
+                self.house.receive(other)
             case other:
                 raise AssertionError(f"nobody hears {other}")
 

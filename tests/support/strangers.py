@@ -42,7 +42,7 @@ class Stranger:
         self._thread.start()
 
     def send(self, kind: int, flags: int, stream: int, content: bytes) -> None:
-        """A frame; nobody takes it where the server has ended the connection."""
+        """A frame; it is lost where the server has ended the connection."""
         self._send(frame(kind, flags, stream, content))
 
     def call(
@@ -64,7 +64,7 @@ class Stranger:
         for place in range(0, len(data), _FRAME_BYTES):
             self.send(DATA, 0, stream, data[place : place + _FRAME_BYTES])
 
-    def was_told(self, words: bytes) -> bool:
+    def has_received(self, words: bytes) -> bool:
         """Return True if headers or trailers that came hold some words."""
         return any(kind == HEADERS and words in content for kind, _, content in self.frames)
 

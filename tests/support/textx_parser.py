@@ -26,7 +26,7 @@ _RECURSION = 50_000
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class TextFault:
     """Fault of a text: a code of the language's diagnostics, and its place."""
 
     code: str
@@ -40,12 +40,12 @@ class Parsed:
 
     Attributes:
         tree: The syntax tree, or None where something is wrong.
-        findings: All faults of a text that the grammar reads, by place; else the one place where it stops.
+        faults: All faults of a text that the grammar reads, by place; else the one place where it stops.
         stopped: True if the grammar does not read the text.
     """
 
     tree: syntax.File | None
-    findings: tuple[Finding, ...]
+    faults: tuple[TextFault, ...]
     stopped: bool
 
 
@@ -60,11 +60,11 @@ def parse(file: SourceFile, *, has_not: bool = True) -> Parsed:
         try:
             root = metamodel(has_not=has_not).model_from_str(file.text)
         except TextXSyntaxError as error:
-            return Parsed(None, (Finding("syntax-error", int(error.line), int(error.col)),), True)
+            return Parsed(None, (TextFault("syntax-error", int(error.line), int(error.col)),), True)
         converter = _Converter(file)
         tree = converter.file(root.content)
-    findings = tuple(sorted(set(converter.findings), key=lambda found: (found.line, found.column, found.code)))
-    return Parsed(None if findings else tree, findings, False)
+    faults = tuple(sorted(set(converter.faults), key=lambda found: (found.line, found.column, found.code)))
+    return Parsed(None if faults else tree, faults, False)
 
 
 @cache
@@ -90,7 +90,7 @@ class _Converter:
     """textX objects to syntax tree; collects what the grammar alone does not say."""
 
     def __init__(self, file: SourceFile) -> None:
-        self.findings: list[Finding] = []
+        self.faults: list[TextFault] = []
         self._file = file
 
     # Places
@@ -109,7 +109,7 @@ class _Converter:
         return self._location(node._tx_position, node._tx_position + len(word))
 
     def _report(self, code: str, location: Location) -> None:
-        self.findings.append(Finding(code, location.line, location.column))
+        self.faults.append(TextFault(code, location.line, location.column))
 
     # Definitions
 

@@ -5,7 +5,7 @@ from typing import Any
 
 from support.browser import Visit
 
-# In the browser: state and variables of each component, places of services and actions, and the enabled requests.
+# State and variables of each component in the browser, places of services and actions, and the enabled requests.
 SHOWN = """() => {
   const text = (element) => element.textContent.trim();
   const pair = (line) => [text(line.querySelector("dt")), text(line.querySelector("dd"))];
@@ -32,7 +32,7 @@ EQUALS = f"(wanted) => JSON.stringify(({SHOWN})()) === wanted"
 
 def _in_words(value: Any) -> str:
     if isinstance(value, float):
-        # To a browser 0.0 and 0 are one number.
+        # Browsers take 0.0 and 0 for one number.
         return f"{value:g}"
     return value if isinstance(value, str) else json.dumps(value)
 

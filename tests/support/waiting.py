@@ -1,4 +1,4 @@
-"""Waiting for what nobody reports; what does is waited for by its event.
+"""Waiting for conditions without an event; others are awaited by their events.
 
 It is asked for often, and a limit is there for failing tests alone: nothing is decided by how long it takes.
 """
@@ -35,7 +35,7 @@ def wait_until[Found](
     *,
     repeat: Callable[[], object] = lambda: None,
     fault: Callable[[], str] = lambda: "",
-    told: Callable[[], str] = lambda: "",
+    heard: Callable[[], str] = lambda: "",
 ) -> Found:
     """Return what a look finds, as soon as it is true.
 
@@ -45,7 +45,7 @@ def wait_until[Found](
         limit_s: Time after which it is taken for lost, in seconds.
         repeat: Function called now and again meanwhile: the first messages of a new connection may be lost.
         fault: Function that says why it cannot come any more; an empty text while it can.
-        told: Function that returns what others said, for the failure.
+        heard: Function that returns what others have sent, for the failure.
 
     Raises:
         AssertionError: It was not found.
@@ -53,8 +53,8 @@ def wait_until[Found](
     end_s = time.monotonic() + limit_s
     next_s = time.monotonic()
     while not (found := look()):
-        assert time.monotonic() < end_s, f"waited {limit_s:g} s in vain for {what}\n{told()}"
-        assert not fault(), f"{fault()}, waiting for {what}\n{told()}"
+        assert time.monotonic() < end_s, f"waited {limit_s:g} s in vain for {what}\n{heard()}"
+        assert not fault(), f"{fault()}, waiting for {what}\n{heard()}"
         if time.monotonic() >= next_s:
             repeat()
             next_s = time.monotonic() + _REPEAT_S

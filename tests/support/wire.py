@@ -121,7 +121,7 @@ class SdkPort(PortHandler):  # type: ignore[misc]
         self.settle()
         self._read = self._line.sent
         assert self.setBaudRate(baud)
-        # As it comes it spins while it waits, and a simulator in the same process starves.
+        # The handler spins while it waits by default, and a simulator in the same process starves.
         self.ser.timeout = 0.005
 
     def writePort(self, packet: bytes | list[int]) -> int:

@@ -142,7 +142,7 @@ def on_dynamixel(data: bytes) -> None:
             packet, result = handler.rxPacket(port, False)
             if result == 0 and (status := status_of(packet)) is not None:
                 _require(status.device <= MAX_DEVICE and len(status.data) <= len(garbage), "an impossible answer")
-    # What came before is discarded with the request: `DynamixelPort.clearPort`.
+    # Bytes from before are discarded with the request: `DynamixelPort.clearPort`.
     packet, result = PacketHandler().rxPacket(_Port(answer), False)
     found = status_of(packet) if result == 0 else None
     _require(found is not None and (found.device, found.data) == (7, b"\x01\x02\x03\x04"), "an answer is not read")

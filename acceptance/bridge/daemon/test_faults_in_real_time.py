@@ -70,7 +70,7 @@ def test_a_port_that_may_not_be_opened_is_reported_once_and_tried_until_it_may(m
         monkeypatch.setattr("serial.serialposix.os.open", refused)
 
     with driven("opencr", host=SYSTEM_HOST, before=forbid) as bridge:
-        bridge.was_told("no permission; is this user in the group dialout?")
+        bridge.reports("no permission; is this user in the group dialout?")
         bridge.stays(2.5 * WHILE_S)
         assert bridge.state is State.STARTING
         monkeypatch.undo()

@@ -140,13 +140,13 @@ def test_it_follows_the_line_and_stops_for_whatever_there_is(follower: Follower)
     os.write(follower.keys, b"r")
     follower.until(follower.drives, "it to go on when the operator says so")
 
-    # Where there is no line.
+    # A place without a line.
     follower.put(-1.0, -1.0, 0.0)
     follower.until(follower.stands, "a stop without a line")
     follower.put(0.0, 0.0, 0.0)
     follower.until(follower.drives, "it to go on with a line")
 
-    # Without pictures, and then without a camera.
+    # No pictures, and then no camera.
     follower.camera.is_frozen = True
     follower.until(follower.stands, "a stop without pictures")
     follower.until(lambda: "camera: no picture for 0.5 s" in follower.log, "a message")

@@ -98,7 +98,7 @@ def test_a_bridge_that_was_halted_moves_nothing_when_it_goes_on(base: str, tmp_p
     with halted(tmp_path, base, signal.SIGSTOP) as (process, wheels):
         before_s = wheels.moved_s
         process.send_signal(signal.SIGCONT)
-        # Nobody can reach it to say that it may go on.
+        # The operator cannot reach it to let it go on.
         _, errors = process.communicate(timeout=LIMIT_S)
         assert process.returncode == 1, errors
         assert "Traceback" not in errors

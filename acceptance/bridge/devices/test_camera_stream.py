@@ -19,7 +19,7 @@ def process_of(camera: Camera) -> subprocess.Popen[bytes]:
 
 @pytest.mark.real_time
 def test_a_camera_that_hangs_while_it_is_opened_is_left(tmp_path: Path) -> None:
-    """Use a pipe without a writer: whoever opens it waits for ever."""
+    """Use a pipe without a writer: opening it waits for ever."""
     path = tmp_path / "hangs"
     os.mkfifo(path)
     camera = make_camera(str(path))

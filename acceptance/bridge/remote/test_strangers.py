@@ -42,7 +42,7 @@ def test_streams_without_an_end_do_not_keep_it_from_ending(
         reflect = channel.stream_stream("/grpc.reflection.v1alpha.ServerReflection/ServerReflectionInfo")
         attach = channel.stream_stream("/robosc_api.v1.BridgeService/Attach")
         calls = [reflect(nothing()) for _ in range(20)] + [attach(nothing()) for _ in range(5)]
-        # What comes after them on the same connection is answered after them.
+        # Calls that follow on the same connection are answered after them.
         health_pb2_grpc.HealthStub(channel).Check(health_pb2.HealthCheckRequest(), timeout=PATIENCE_S)
         begin_s = time.monotonic()
         endpoint.stop()

@@ -131,7 +131,7 @@ def test_a_stop_reaches_the_motors_at_once(
             assert watcher.stdout is not None
             assert watcher.stderr is not None
             watcher.stdout.readline()
-            # A bridge that hangs is reported to whoever relies on it.
+            # A bridge that hangs is reported to those who rely on it.
             bridge.process.send_signal(signal.SIGSTOP)
             stopped = command("stop", "--address", address)
             assert stopped.returncode == 2
@@ -169,10 +169,10 @@ def test_a_robot_is_driven_by_keys_as_far_as_the_layer_lets_it(tmp_path: Path) -
                     becomes(lambda: held(terminal) and not moves(robot))
                     gate.send(give=pb.Message(identifier="/gate/open"))
                     becomes(lambda: held(terminal) and moves(robot) and min(speeds(robot)) > 1.0)
-                    # Nobody holds a key.
+                    # The key is released.
                     becomes(lambda: not moves(robot))
                     becomes(lambda: held(terminal) and moves(robot) and min(speeds(robot)) > 1.0)
-                    # Nobody says goodbye.
+                    # The terminal goes without a word.
                     terminal.process.kill()
                     becomes(lambda: not moves(robot))
                     becomes(

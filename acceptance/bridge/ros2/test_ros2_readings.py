@@ -162,7 +162,7 @@ def test_other_nodes_see_the_robot(robot: SimulatedTurtleBot3, peer: Peer, tmp_p
                 late_s = sorted(arrival_s - at_s for (arrival_s, _), at_s in zip(received, stamps_s, strict=True))
                 assert late_s[len(late_s) // 2] < 0.4
 
-            # It hears nobody, and offers nothing that could command it.
+            # It hears no node, and offers nothing that could command it.
             name = "robosc_bridge"
             assert peer.node.get_subscriber_names_and_types_by_node(name, "/") == []
             assert all(

@@ -94,7 +94,7 @@ def test_landmarks_and_headings(seen: Visit) -> None:
     assert seen.page.locator("html").get_attribute("lang") == "en"
 
 
-# In the browser: what can be operated, with the name that a screen reader says.
+# Controls in the browser that have no name for a screen reader.
 NAMELESS = """() => [...document.querySelectorAll("button, input, select, summary, a, canvas, [tabindex]")]
   .filter((it) => it.checkVisibility())
   .filter((it) => {
@@ -181,7 +181,7 @@ def test_a_screen_reader_hears_what_matters_and_no_flood(server: StandIn, seen: 
     assert all(later - earlier > 1490 for earlier, later in pairwise(times_ms))
 
 
-# In the browser: what is lower than the 24 pixels that WCAG 2.2 asks for (2.5.8).
+# Controls in the browser that are lower than the 24 pixels that WCAG 2.2 asks for (2.5.8).
 SMALL = """() => [...document.querySelectorAll("button, select, summary, label, input[type=search]")]
   .filter((it) => it.checkVisibility())
   .filter((it) => it.getBoundingClientRect().height < 23.5)
@@ -232,7 +232,7 @@ def test_the_switch_goes_before_the_computer_and_is_kept(browser: Browser, serve
         assert seen.page.evaluate(ground) == dark
 
 
-# In the browser: each step of a light, how strongly it is painted then, and how much is moving.
+# Steps of each light in the browser: the strength of its paint then, and the count of moving elements.
 NOTE_MOTION = """() => {
   window.motion = [];
   new MutationObserver(([{ target }]) => {

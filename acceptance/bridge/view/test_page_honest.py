@@ -1,4 +1,4 @@
-"""The page never shows what is old as if it were so now, runs nothing that a robot sends it, and asks nobody else."""
+"""The page never shows old data as present ones, runs nothing that a robot sends, and loads nothing from elsewhere."""
 
 import re
 from collections.abc import Iterator

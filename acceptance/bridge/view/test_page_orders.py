@@ -80,7 +80,7 @@ def test_a_graph_in_full_size_leaves_the_stop_and_the_age_in_reach(
         dialog.get_by_role("button", name="Close").click()
         seen.wait("() => document.querySelector('#polite').parentNode === document.body")
         assert seen.page.get_by_role("button", name="STOP").is_visible()
-        # While nobody listened the browser noted that, and nothing else went wrong.
+        # The browser noted the time without a server, and nothing else went wrong.
         assert all("ERR_CONNECTION_REFUSED" in error for error in seen.errors)
 
 

@@ -68,14 +68,14 @@ def test_a_jump_back_takes_back_what_was_later(server: StandIn, seen: Visit) -> 
     seen.wait("() => document.querySelector('#stream-count').textContent === '30 entries'")
     server.send(position(10.5))
     seen.wait("() => document.querySelector('#stream-count').textContent === '10 entries'")
-    # What comes again is there once.
+    # Repeated entries are shown once.
     server.send(events([entry(number, time_s=BEGIN_S + number) for number in range(8, 13)]), position(12.5))
     seen.wait("() => document.querySelector('#stream-count').textContent === '12 entries'")
     found = seen.page.evaluate("() => [...document.querySelectorAll('.row')].map((row) => Number(row.dataset.number))")
     assert sorted(found) == list(range(1, 13))
 
 
-# In the browser: how much of the canvas has a colour of the style sheet, within what a line's soft edge changes.
+# Share of the canvas in the browser with a colour of the style sheet, within the change by a line's soft edge.
 SHARE = """(name) => {
   const probe = document.createElement("i");
   probe.style.color = `var(--map-${name})`;
@@ -132,7 +132,7 @@ def test_the_keyboard_moves_and_zooms_the_picture(placed: tuple[StandIn, Visit])
     seen.page.locator("#map").focus()
     for _ in range(6):
         seen.page.keyboard.press("+")
-    # Nothing but the middle of the room is in view.
+    # The view shows the middle of the room alone.
     seen.wait(NO_WALL)
     seen.page.keyboard.press("0")
     seen.wait(f"() => ({SHARE})('wall') === {fitted}")

@@ -17,7 +17,7 @@ def server() -> Iterator[StandIn]:
         yield standing_in
 
 
-# In the browser: everything that the page says about the state, as the server's words have it.
+# The page's whole report of the state, in the words of the server.
 SHOWN = """() => {
   const text = (element) => element.textContent.trim();
   const components = {};
@@ -55,8 +55,8 @@ def parts(**states: str) -> Any:
     return {name: {"state": state, "variables": {}} for name, state in states.items()}
 
 
-# In the browser: how brightly each transition has been lit, in its order. A light fades within two seconds: whoever
-# looks at the page now and then may miss it.
+# Brightness of each transition's light in the browser, in its order. A light fades within two seconds: an occasional
+# look at the page may miss it.
 NOTE_LIGHTS = """() => {
   window.lights = {};
   new MutationObserver((records) => {
@@ -152,7 +152,7 @@ def test_only_the_latest_of_many_updates_counts(server: StandIn, seen: Visit) ->
     shown = shown_when(seen, "() => document.querySelector('[data-component=Base] dd')?.textContent === '199'")
     assert shown["components"]["Base"]["state"] == "driving"
     assert shown["components"]["Base"]["active"] == ["driving"]
-    # Nothing is sent about it any more.
+    # Its state is not sent any more.
     assert shown["components"]["Gripper"]["state"] == "not known"
     assert shown["components"]["Gripper"]["active"] == []
 
@@ -225,7 +225,7 @@ def test_a_graph_in_full_size_goes_on_living(server: StandIn, seen: Visit) -> No
     seen.wait("() => document.activeElement?.getAttribute('aria-label') === 'Enlarge the graph of Base'")
 
 
-# In the browser: each goal and assumption by name: its state, and what is said of it.
+# Goals and assumptions in the browser by name: the state of each, and the words about it.
 GOALS = """() => Object.fromEntries([...document.querySelectorAll(".goal")].map((goal) => [
   goal.dataset.name, [goal.dataset.state, goal.lastElementChild.innerText.replace(/\\s+/g, " ").trim()]]))"""
 

@@ -45,7 +45,7 @@ def test_every_entry_is_there_once_and_in_order(server: StandIn, seen: Visit) ->
     assert len(shown) < 100
 
 
-# In the browser: numbers of the rows that can be seen, once they fill the box; null: the page has not painted yet.
+# Numbers of the rows in the browser's view, once they fill the box; null: the page has not painted yet.
 IN_VIEW = """() => {
   const box = document.querySelector("#stream");
   const from = box.scrollTop;
@@ -168,7 +168,7 @@ def test_the_keyboard_goes_through_the_stream(server: StandIn, seen: Visit) -> N
     seen.wait("() => document.querySelector('#stream-detail').textContent.endsWith('text 200')")
 
 
-# In the browser: how many changes of the document the cards of the components have cost.
+# Number of changes of the document in the browser for the cards of the components.
 COUNT_CHANGES = """() => {
   window.changes = 0;
   const observer = new MutationObserver((records) => { window.changes += records.length; });

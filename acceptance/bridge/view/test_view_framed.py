@@ -1,4 +1,4 @@
-"""The page in a frame: of those that may, and of nobody else."""
+"""The page in a frame: of those that may, and of no others."""
 
 import argparse
 import http.server

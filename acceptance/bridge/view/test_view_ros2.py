@@ -77,7 +77,7 @@ async def test_a_node_is_shown_over_dds(peer: Peer, tmp_path: Path) -> None:
             await page.next()
         assert [entry["event"] for entry in page.entries()] == wanted
         await page.send(type="stop")
-        assert (await page.told("refused"))["what"] == "stop"
+        assert (await page.receive("refused"))["what"] == "stop"
 
 
 @pytest.mark.ros2
@@ -89,12 +89,12 @@ async def test_a_node_that_is_not_there_is_reported_and_found_when_it_comes(
     monkeypatch.setattr("robosc_view.ros2_topic.SILENCE_S", 1.0)
     node = Node(supervisor_without_synthesis(large_model(3)), tmp_path / "package")
     async with served(StateTopic) as server, opened(server.url) as page:
-        assert "/state" in (await page.told("gone"))["why"]
+        assert "/state" in (await page.receive("gone"))["why"]
         publisher, end_s = peer.publisher(String, "/state"), time.monotonic() + 30
-        task = asyncio.create_task(page.told("definition"))
+        task = asyncio.create_task(page.receive("definition"))
         while not task.done():
             assert time.monotonic() < end_s
             publisher.publish(String(data=node.system.report()))
             await asyncio.sleep(0.02)
-        await page.told("update")
-        assert "/state" in (await page.told("gone"))["why"]
+        await page.receive("update")
+        assert "/state" in (await page.receive("gone"))["why"]

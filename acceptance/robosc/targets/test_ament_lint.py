@@ -19,7 +19,7 @@ OF_JAZZY = ("ament_flake8", "ament_pep257")
 OF_DEBIAN = ("ament_copyright", "ament_lint_cmake", "ament_xmllint")
 NOTHING_TO_CHECK = ("0 files checked", "No files found")
 
-# Which licences the linter knows by their names in package.xml, and its own names of them.
+# Licences by their names in package.xml, with the linter's own names.
 LICENSES = {
     "Apache-2.0": "apache2",
     "BSD-2-Clause": "bsd_2clause",

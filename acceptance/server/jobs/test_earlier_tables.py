@@ -41,7 +41,7 @@ def test_each_version_in_postgresql_is_migrated_with_all_that_is_in_it(
     make(database_url, version)
     url = make_url(database_url)
     with psycopg.connect(database_url) as reader:
-        # Who only looks waits for nobody, as a change of these tables would have to.
+        # Reading needs no lock, as a change of these tables would.
         reader.execute("SELECT * FROM results")
         looking = url.update_query_dict({"options": "-c statement_timeout=5000"})
         assert inspect_postgresql(looking, 10.0)[1] == version

@@ -1,4 +1,4 @@
-"""Owners that give something back where too much is kept: as in an obvious twin, and nobody at another's cost."""
+"""Owners that give something back where too much is kept: as in an obvious twin, and no owner at another's cost."""
 
 import asyncio
 from pathlib import Path
@@ -65,7 +65,7 @@ def test_two_servers_that_sweep_at_once_give_back_no_more_than_one(
         left = [result for result in results if await first.find_result(result.key) is not None]
         assert left == results[5:]
 
-        # While one has the lock the other leaves the work to it.
+        # The holder of the lock does the work; the other leaves it.
         with first._database._engine.connect() as connection, connection.begin():
             connection.execute(select(func.pg_advisory_xact_lock(store_module._SWEEP_LOCK)))
             await second.sweep(0)

@@ -24,7 +24,7 @@ _MODEL = pb.Bundle(main=pb.SourceFile(name="robot.rscd", text="robot Small {}"))
 
 
 def settings_of(authority: Path, role: str, certificate: tuple[Path, Path]) -> dict[str, str]:
-    """Dask's settings of somebody in the cluster."""
+    """Dask's settings of a member of the cluster."""
     file, key = map(str, certificate)
     return {f"{_PREFIX}CA_FILE": str(authority), f"{_PREFIX}{role}__CERT": file, f"{_PREFIX}{role}__KEY": key}
 

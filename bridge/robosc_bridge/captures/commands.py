@@ -70,7 +70,7 @@ def add_commands(commands: Any) -> None:
 
 
 def make_recorder(arguments: argparse.Namespace, configuration: Configuration, host: Host) -> Recorder | None:
-    """Return the recorder that a command line asks for; None: it asks for none.
+    """Return the recorder of a command line; None: it has none.
 
     Raises:
         CaptureError: The file is something else.

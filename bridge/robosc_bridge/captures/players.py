@@ -310,7 +310,7 @@ def _wheels_of(info: LineInfo) -> Wheels:
 
 
 def _above_zero(value: object, usual: float) -> float:
-    """Return a number of a file that anybody may have written."""
+    """Return a number of an untrusted file."""
     return float(value) if isinstance(value, int | float) and math.isfinite(value) and value > 0 else usual
 
 

@@ -58,7 +58,7 @@ def redacted(capture: Capture, without: Collection[str] = ()) -> Capture:
         without: Names of lines that are left out.
 
     Raises:
-        CaptureError: It has no such line, or a line of a driver of which nobody knows what it reveals.
+        CaptureError: It has no such line, or a line of a driver whose secrets are unknown.
     """
     unknown = sorted(set(without) - set(capture.lines))
     if unknown:

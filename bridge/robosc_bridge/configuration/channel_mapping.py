@@ -56,7 +56,7 @@ class ChannelMapping:
         return settings_from(given)
 
     def never_released(self, settings: Settings) -> tuple[str, ...]:
-        """Identifiers mapped to the drive whose last message acts until another one comes, whoever has sent it."""
+        """Identifiers mapped to the drive whose last message acts until another one comes, also from another sender."""
         released = settings.release_identifiers or ()
         driven = dict.fromkeys(item.identifier for item, _ in self.mapped_to(DriveChannel))
         return tuple(identifier for identifier in driven if identifier not in released)

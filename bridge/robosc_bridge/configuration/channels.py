@@ -40,7 +40,7 @@ class RotateChannel(_Channel, frozen=True, tag="rotate"):
 
 
 class RotatedChannel(_Channel, frozen=True, tag="rotated"):
-    """A rotation that a message asked for has ended."""
+    """A rotation that a message requested has ended."""
 
     outcome: Annotated[Literal["done", "failed", "any"], Meta(description="Outcomes that are reported.")] = "done"
 

@@ -143,7 +143,7 @@ def _bounds(annotation: Any) -> Iterator[str]:
             yield f"above {meta.gt}, at most {high}"
         elif meta.min_length is not None and meta.max_length is not None:
             yield f"of {meta.min_length} to {meta.max_length} characters"
-        elif meta.title is not None:  # What a pattern means, in words.
+        elif meta.title is not None:  # The title of a pattern puts it in words.
             yield f"like {meta.title}"
 
 

@@ -151,7 +151,7 @@ def _within(name: str, description: str = "") -> Meta:
 
 
 class Safety(_Section, frozen=True):
-    """Limits and times of the safety layer; whatever the supervisor asks for stays within them."""
+    """Limits and times of the safety layer; all requests of the supervisor stay within them."""
 
     linear_m_s: Annotated[
         Annotated[float, _within("linear_m_s")] | None,

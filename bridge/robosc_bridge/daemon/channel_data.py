@@ -101,7 +101,7 @@ def shaped(communication: Communication, value: Any) -> Any:
 
 
 def velocity_of(message: Any) -> Velocity:
-    """Return the velocity that a message of the channel `drive` asks for; parts that are left out are 0."""
+    """Return the velocity that a message of the channel `drive` requests; parts that are left out are 0."""
     twist = message if isinstance(message, dict) else {}
     twist = twist.get("twist", twist) or {}
     linear, angular = twist.get("linear") or {}, twist.get("angular") or {}
@@ -109,7 +109,7 @@ def velocity_of(message: Any) -> Velocity:
 
 
 def angle_of(message: Any) -> float:
-    """Return the angle that a message, call or goal of the channel `rotate` asks for, in the unit of the channel."""
+    """Return the angle that a message, call or goal of the channel `rotate` requests, in the unit of the channel."""
     if isinstance(message, dict):
         message = message.get("data", message.get("angle"))
     return float(message or 0.0)

@@ -136,7 +136,7 @@ class Feed:
             subscription.put(None)
 
     def append(self, entry: Entry) -> None:
-        """Send a new entry, whose values nobody changes any more."""
+        """Send a new entry, whose values do not change any more."""
         for subscription in self._subscriptions:
             subscription.put(entry)
 

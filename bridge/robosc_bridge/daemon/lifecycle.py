@@ -275,7 +275,7 @@ class Lifecycle:
         _log.info("running")
 
     def _enable(self) -> None:
-        """Let the safety layer leave standby, unless somebody wants it there."""
+        """Let the safety layer leave standby, unless it is to stay there."""
         self._safety.enable()
         if self._orders.is_halt_coming:
             # Its own word to the layer may have come just before this one.
@@ -289,7 +289,7 @@ class Lifecycle:
         self._safety.disable()
         self._hurry()
         if self.state is not State.STOPPING or self._after_stop is not State.OVER:
-            # Who wants the bridge to end gets that, whatever fails on the way.
+            # A wish to end the bridge holds, whatever fails on the way.
             self._after_stop = then
         self.state = State.STOPPING
         self._stop_end_s = self._clock.monotonic() + STOP_LIMIT_S
@@ -318,7 +318,7 @@ class Lifecycle:
             case State.STOPPING if not self._readiness.has_torque or now_s >= self._stop_end_s:
                 self._come_to_rest()
             case State.FAULT if self._is_drive_lost and self._readiness.is_drive_there:
-                # Nothing moves before somebody says so.
+                # The robot stands still until an operator resumes it.
                 self._is_drive_lost = False
                 self.problem = ""
                 self.state = State.STANDBY
@@ -357,7 +357,7 @@ class Lifecycle:
         self._orders.resolve(Until.RESET, str(Reason.OPERATOR_STOP))
         self._safety.operator_stop()
         self._hurry()
-        # What was wanted before does not move the robot afterwards.
+        # Earlier motions do not move the robot after the stop.
         self._robot.stop("the operator has stopped the robot")
 
     def operator_resume(self) -> str:
@@ -371,7 +371,7 @@ class Lifecycle:
         if why:
             _log.error("the robot cannot go on: %s", why)
         elif self.state is State.RUNNING:
-            # What was wanted meanwhile does not move it either.
+            # Motions that were commanded meanwhile do not move it either.
             self._robot.stop("the operator had stopped the robot")
             self._enable()
         return why

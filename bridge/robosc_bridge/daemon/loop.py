@@ -207,7 +207,7 @@ class Daemon:
         self._in_hand = ()
         for item in items:
             self._handle(item)
-        # Not what comes meanwhile: nobody can keep the loop from its cycle.
+        # Items that come meanwhile wait: they cannot keep the loop from its cycle.
         for _ in range(self._inbox.qsize()):
             self._handle(self._inbox.get_nowait())
         self._take_from_programs()
@@ -217,7 +217,7 @@ class Daemon:
         self._lifecycle.poll(now_s)
         executor = self._execution.executor
         if self.state is State.RUNNING and executor is not None:
-            # In a safe stop nothing moves, whatever identifiers are released.
+            # A safe stop holds all motions, whatever identifiers are released.
             self._motion.pause(bool(executor.reasons), now_s)
             self._motion.refresh(now_s)
         self._snapshots.poll(self.state, self.problem, self._lifecycle.notice)
@@ -282,7 +282,7 @@ class Daemon:
                 self._lifecycle.execute(item)
                 self._in_hand = ()
             case _Woken():
-                pass  # What they have sent is taken up in any cycle.
+                pass  # Every cycle takes up the items that woke it.
             case _:
                 assert_never(item)
 

@@ -66,7 +66,7 @@ class MetricsEndpoint:
 
     @property
     def is_alive(self) -> bool:
-        """True: a robot does not stop because nobody can measure it."""
+        """True: a robot does not stop because its metrics are unavailable."""
         return True
 
     def start(self) -> None:

@@ -81,7 +81,7 @@ def answer(order: Order, why: str) -> None:
         _log.warning("%s%s: %s", order.command, f" ({order.by})" if order.by else "", why)
     try:
         order.answer(why)
-    except Exception:  # Whoever asked has gone; the loop has not.
+    except Exception:  # The operator may have gone; the loop goes on.
         _log.exception("an answer could not be given")
 
 

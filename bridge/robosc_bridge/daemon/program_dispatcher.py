@@ -51,12 +51,12 @@ class ProgramDispatcher:
         self._robot = robot
 
     def take(self, item: Arrived) -> None:
-        """Do what a program asks for, or refuse it with the reason."""
+        """Take a program's item, or refuse it with the reason."""
         program = item.program
         if isinstance(item, Attached):
             self._attach(program)
         elif program in self._clients:
-            # What comes from others is too late: they are gone.
+            # Items of programs that have gone come too late.
             self._take(item)
         if self._execution.executor is not None:
             self._robot.deliver_pending(self._execution.executor)

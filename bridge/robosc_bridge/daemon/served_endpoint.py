@@ -79,7 +79,7 @@ class ServedEndpoint(ABC):
         """Listen, set `address`, call `_is_listening`, and serve until `_end` is set."""
 
     def _is_listening(self) -> None:
-        """Let whoever waits in `start` go on."""
+        """Let the thread that waits in `start` go on."""
         self._is_ready.set()
 
     def _run(self) -> None:

@@ -175,7 +175,7 @@ def _signer(file: Path, data: bytes, trusted: tuple[PublicKey, ...], report: Cal
     """The trusted key that has signed a file; None: none has, so that the verifier decides.
 
     Raises:
-        NoSupervisorError: The signature does not fit the file: somebody has changed one of them.
+        NoSupervisorError: The signature does not fit the file: one of them was changed.
     """
     place = signature_file(file)
     if not trusted or not place.exists():
@@ -192,7 +192,7 @@ def _signer(file: Path, data: bytes, trusted: tuple[PublicKey, ...], report: Cal
 def _signed(
     file: Path, data: bytes, bundle: Bundle | None, source: Source, report: Callable[[str], None]
 ) -> Supervisor:
-    """A supervisor that somebody vouches for: what it is for, and what was found out about it, stands in it."""
+    """A supervisor that its signer vouches for: its purpose, and the findings about it, stand in it."""
     try:
         supervisor = decode(data)
     except RoboscError as error:
@@ -302,7 +302,7 @@ def _checked(data: bytes, place: str, bundle: Bundle, source: Source, report: Ca
     claimed = supervisor.certificate.controller
     outcome = "not checked" if claimed is None else claimed.finite_response
     if outcome == "not checked":
-        # What it says, the verifier has judged; a file that says nothing of it must not get past.
+        # The verifier has judged the claim of a file; a file without a claim must not pass unchecked.
         outcome = _response(supervisor, place)
     _require_response(outcome, place, source, report)
     return supervisor

@@ -32,7 +32,7 @@ class BoardYaw:
             # A sensor that has not started yet.
             self._last = None
             return None
-        # As turtlebot3_node has it.
+        # The formula is that of turtlebot3_node.
         yaw_rad = math.atan2(x * y + w * z, 0.5 - y * y - z * z)
         self._last = yaw_rad, block.uptime_ms
         if last is None:

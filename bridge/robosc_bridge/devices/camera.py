@@ -187,7 +187,8 @@ class ProcessCamera(_StreamCamera):
             raise LineDeniedError(self._path, DENIED)
         command = [sys.executable, "-P", "-m", "robosc_bridge.devices.camera_process", self._path]
         try:
-            # In a session of its own: Ctrl-C in a terminal is for the bridge, which ends it after the wheels.
+            # The process gets a session of its own: Ctrl-C in a terminal is for the bridge, which ends it after the
+            # wheels.
             self._process = subprocess.Popen(  # noqa: S603 (our own module, and no shell)
                 command,
                 stdin=subprocess.PIPE,

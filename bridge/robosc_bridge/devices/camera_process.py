@@ -24,7 +24,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     """Run the command; returns the exit status."""
     (path,) = sys.argv[1:] if arguments is None else arguments
     with os.fdopen(os.dup(2), "w", encoding="utf-8") as problems:
-        # Decoders write about every damaged picture, and nobody reads that: a full pipe would block them.
+        # Decoders write about every damaged picture, and that is not read: a full pipe would block them.
         silence = os.open(os.devnull, os.O_WRONLY)
         os.dup2(silence, 2)
         os.close(silence)
@@ -43,7 +43,7 @@ def _serve(device: VideoDevice) -> None:
 
     Raises:
         LineError: There are no more.
-        BrokenPipeError: Nobody wants them.
+        BrokenPipeError: The reader has gone.
     """
     due_s = time.monotonic()
     while True:

@@ -112,9 +112,9 @@ class DynamixelBase:
         self._source: VelocitySource = CONSTANT
         self._is_torque_wanted = False
         self._is_torque_on = False
-        # Why they stay at a standstill until torque is switched on anew.
+        # Faults that keep the motors at a standstill until torque is switched on anew.
         self._stops: frozenset[MotorFault] = frozenset()
-        # Whether a motor may have restarted.
+        # A motor may have restarted.
         self._is_doubtful = True
         self._commanded_s = 0.0
         self._check_s = 0.0
@@ -288,7 +288,7 @@ class DynamixelBase:
 
     def _exchange(self, pair: ServoPair, bus: DynamixelBus, velocity: Velocity) -> DriveReading:
         if self._is_doubtful or self._has_paused():
-            # Nothing is commanded before it is known what became of the motors.
+            # No velocity is commanded before the state of the motors is known.
             self._check_torque(pair)
             self._check_watchdogs(pair)
             self._is_doubtful = False
@@ -300,7 +300,7 @@ class DynamixelBase:
             self._look_at(pair, motor, is_alert)
         measured = [measurement for measurement, _ in answers]
         if any(self._odometry.jumps(*(one.ticks for one in measured))):
-            # Of its own motion, or of a restart.
+            # A jump comes of the motor's own motion, or of a restart.
             goals = self._renewed(pair, goals)
             self._check_torque(pair)
         if self._host.monotonic() >= self._check_s:

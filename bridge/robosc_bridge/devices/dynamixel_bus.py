@@ -110,7 +110,7 @@ class DynamixelBus:
         interruption: Function that is called while the answer to a request is awaited for the first time, and that may
             `interject`; None: none.
         unheard: Number of interjected writes in a row that were not answered though the read before them was. Behind a
-            write nobody knows which of two answers is missing, and mostly it is that of a write that was lost.
+            write it is unknown which of two answers is missing, and mostly it is that of a write that was lost.
     """
 
     def __init__(

@@ -10,7 +10,7 @@ from collections.abc import Callable, Sequence
 
 from robosc_bridge.host import Host, Port
 
-_BITS_PER_BYTE = 10  # With a start and a stop bit.
+_BITS_PER_BYTE = 10  # The eight bits have a start and a stop bit around them.
 
 
 class DynamixelPort:

@@ -180,7 +180,7 @@ class DriveBase(Protocol):
 
 
 class VelocitySource(Protocol):
-    """Source of the velocity to command now, for a drive base that asks during an exchange, too."""
+    """Source of the velocity to command now, for a drive base that reads it during an exchange, too."""
 
     def newer(self) -> Velocity | None:
         """Return the velocity to command instead of the last one; None: there is no other one."""

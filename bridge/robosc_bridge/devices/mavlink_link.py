@@ -244,7 +244,7 @@ class VehicleLink:
             with self._changed:
                 self._lost = error
                 self._changed.notify_all()
-            # Whoever plugs it in again must not find it busy.
+            # The port must not be busy for the one who plugs it in again.
             self._line.close()
 
     def _take(self, data: bytes, time_s: float, *, is_old: bool) -> None:

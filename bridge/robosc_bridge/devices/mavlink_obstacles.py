@@ -26,7 +26,7 @@ from robosc_bridge.protocol.mavlink_obstacles import Sector, nearest_in_sectors,
 from robosc_bridge.protocol.mavlink_signing import Signing
 from robosc_bridge.transport.system_host import SYSTEM_HOST
 
-# As ArduPilot itself has it: what is older says nothing.
+# ArduPilot, too, ignores measurements that are older.
 STALE_AFTER_S = 0.5
 _SLICE_S = 0.2
 _INTERVAL_S = 0.1
@@ -130,7 +130,7 @@ class MavlinkObstacles:
         return self._link
 
     def _keep_on(self, link: VehicleLink) -> None:
-        # A drive base's heartbeat says that it lives; nobody says so in its place.
+        # A drive base's heartbeat says that it lives; no other message does.
         if not link.has_driver:
             link.keep_alive()
         if not self._is_requested and link.state.heartbeat is not None:

@@ -173,13 +173,13 @@ class MavlinkRover:
         """Do nothing: no exchange waits."""
 
     def open(self) -> None:
-        """Find the vehicle and check that it is a rover which reports its position, and that nobody else drives it.
+        """Find the vehicle and check that it is a rover which reports its position, without another driver.
 
         Raises:
             LineError: The line cannot be used.
             DeviceSilentError: No vehicle is heard.
             WrongDeviceError: It is no ArduPilot Rover.
-            DeviceFaultError: Somebody else drives it, or it does not know its position, or does not disarm.
+            DeviceFaultError: Another operator drives it, or it does not know its position, or does not disarm.
         """
         self.close()
         self._link = acquire(self._settings, as_driver=True, host=self._host)
@@ -205,12 +205,12 @@ class MavlinkRover:
             raise
 
     def set_torque(self, is_on: bool) -> None:
-        """Enter GUIDED and arm; or stop and disarm. A vehicle that somebody else has taken over is left alone.
+        """Enter GUIDED and arm; or stop and disarm. A vehicle that another operator has taken over is left alone.
 
         Raises:
             LineError: The line is gone.
             DeviceSilentError: The vehicle does not answer.
-            DeviceFaultError: It refuses, with its reason, or somebody else drives it.
+            DeviceFaultError: It refuses, with its reason, or another operator drives it.
         """
         link = self._used_link
         self._is_torque_wanted = False
@@ -288,7 +288,7 @@ class MavlinkRover:
         self.set_torque(False)
 
     def close(self) -> None:
-        """Stop, disarm, and close the line; a vehicle that somebody else drives is left alone."""
+        """Stop, disarm, and close the line; a vehicle that another operator drives is left alone."""
         if self._link is not None and self._is_torque_wanted:
             self._is_torque_wanted = False
             with contextlib.suppress(BridgeError):

@@ -162,7 +162,7 @@ def velocity_variances(left_m_s: float, right_m_s: float, raw_m_s: float, separa
         raw_m_s: Unit in which the wheels report their speed; the error of a speed is one unit.
         separation_m: Distance between them.
     """
-    # As far off as their ways are after one metre.
+    # Variances of the wheels' ways after one metre.
     left, right = (raw_m_s**2 + _WHEEL_VARIANCE_M * speed**2 for speed in (left_m_s, right_m_s))
     return (left + right) / 4, (left + right) / separation_m**2
 

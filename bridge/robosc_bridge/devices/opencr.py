@@ -358,7 +358,7 @@ class OpenCrBase:
         if self._bus is not None and self._is_slow:
             self._is_torque_wanted = False
             with contextlib.suppress(BridgeError):
-                # Nothing is waited for: the wheels have stopped when the board comes to the second one.
+                # No answer is awaited: the wheels have stopped when the board comes to the second packet.
                 self._bus.write_unanswered(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
                 self._bus.write_unanswered(opencr.DEVICE, opencr.TORQUE, b"\0")
         elif self._bus is not None:
@@ -417,7 +417,7 @@ class OpenCrBase:
         self._heartbeat = bus.read(opencr.DEVICE, opencr.HEARTBEAT, 1).data[0]
 
     def _clear_profile(self, bus: DynamixelBus) -> None:
-        # With one that other software has left, a goal of zero is a long way to a standstill.
+        # A profile that other software has left makes a goal of zero a long way to a standstill.
         bus.begin(self._exchange_limit_s)
         bus.write(opencr.DEVICE, opencr.PROFILE_ACCELERATIONS, opencr.NO_PROFILE)
         if bus.read(opencr.DEVICE, opencr.PROFILE_ACCELERATIONS, len(opencr.NO_PROFILE)).data != opencr.NO_PROFILE:

@@ -167,7 +167,7 @@ class Robot:
 
 
 BURGER = Robot("burger", 0.105, 0.033, 0.160, 0.22, 2.84, XL430_W250, 61.0, frozenset({1}))
-# With an OpenManipulator, the board of a Waffle reports another number.
+# The board of a Waffle reports another number with an OpenManipulator.
 WAFFLE = Robot("waffle", 0.220, 0.033, 0.287, 0.26, 1.82, XM430_W210, 77.0, frozenset({2, 3}))
 WAFFLE_PI = Robot("waffle_pi", 0.220, 0.033, 0.287, 0.26, 1.82, XM430_W210, 77.0, frozenset({2, 3}))
 ROBOTS = {robot.name: robot for robot in (BURGER, WAFFLE, WAFFLE_PI)}

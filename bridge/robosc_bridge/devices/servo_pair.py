@@ -277,7 +277,7 @@ class ServoPair:
     def _write_both(self, address: int, value: int, problem: str) -> None:
         """Write one byte to both at once, and see that they have it."""
         self._bus.begin(self._limit_s)
-        for _ in range(2):  # Nobody answers to the first, which may have been lost.
+        for _ in range(2):  # The first packet is not acknowledged and may have been lost.
             self._bus.sync_write(address, dict.fromkeys(self.motors, bytes((value,))))
             found = self._read_both(address, 1)
             wrong = [motor for motor in self.motors if found[motor].data[0] != value]

@@ -69,7 +69,7 @@ class VideoDevice:
 
 
 def _require_readable(path: str) -> None:
-    """OpenCV only says no; the reason is asked for before.
+    """OpenCV gives no reason; it is looked up before.
 
     Raises:
         LineError: The file cannot be opened.

@@ -28,11 +28,11 @@ RESET_LIMIT_S = 20.0
 LOOP_HANGS = "The bridge's loop hangs."
 
 REPEATED_S = 10.0
-"""For so long it is known how a command was answered, if its sender asks again."""
+"""Time for which the answer to a command is kept, for a sender that repeats it."""
 
 _MOST_PENDING = 8
 _MOST_REMEMBERED = 32
-# What was ordered is on its way into the next snapshot.
+# An ordered stop appears in a snapshot within this time.
 _SHOWN_S = 1.0
 
 type Say = Callable[[Severity, str, Sender | None], None]
@@ -99,7 +99,7 @@ class CommandHandler:
         self._ordered: set[Stop] = set()
 
     def begin(self) -> None:
-        """Begin anew: commands that come from now on are newer than every earlier order, whoever gave it."""
+        """Begin anew: commands that come from now on are newer than every earlier order of any sender."""
         self._ordered.clear()
 
     def _stop(self, stop: Stop, by: Sender, now_s: float) -> None:
@@ -110,7 +110,7 @@ class CommandHandler:
         if stop is Stop.OPERATOR:
             self._held_s = now_s
         if stop not in self._ordered:
-            # What came at the same time is one: a flood costs the loop little.
+            # Stops that come at the same time count as one: a flood costs the loop little.
             self._ordered.add(stop)
             self._operations.order(stop.command, _name(by))
 
@@ -173,7 +173,7 @@ class CommandHandler:
                 return result
         elif now_s - self._last_stop_s > REPEATED_S:
             return None
-        # Whether the stop or the first sending came later, nobody knows.
+        # The order of the stop and the first sending is unknown.
         self._say(
             Severity.WARNING,
             f"{_NOT_DONE[change.command]}: the robot was stopped meanwhile; send it anew.",

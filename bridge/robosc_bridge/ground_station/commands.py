@@ -21,7 +21,7 @@ type Parameters = tuple[float, float, float, float, float, float, float]
 
 
 class Stop(StrEnum):
-    """Ways of stopping: they are obeyed at once, and whoever asks."""
+    """Ways of stopping: they are obeyed at once, from every sender."""
 
     STANDBY = "standby"
     OPERATOR = "operator stop"
@@ -109,7 +109,7 @@ def meaning(number: int, parameters: Parameters) -> Meaning:
         case MavCommand.PAUSE_CONTINUE:
             return _choice(first, {0.0: Stop.OPERATOR, 1.0: Change(OperatorCommand.RESUME)})
         case MavCommand.FLIGHT_TERMINATION:
-            # What cannot be read is taken for a stop, too.
+            # A parameter that cannot be read is taken for a stop, too.
             why = "A termination is ended by a mode or by going on, not by this command."
             return Refusal(Result.DENIED, why) if first <= 0.5 else Stop.OPERATOR
         case MavCommand.REBOOT_SHUTDOWN:

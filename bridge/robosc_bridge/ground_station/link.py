@@ -94,7 +94,7 @@ class GroundLink:
                     self._talk(self._opened())
                 except BridgeError as error:
                     self._failed(str(error))
-                except Exception:  # Nothing that a station sends or the daemon shows may end the link.
+                except Exception:  # The link survives everything that a station sends or the daemon shows.
                     _log.exception("ground station")
                     self._failed("an internal error; see above")
             with contextlib.suppress(BridgeError):
@@ -102,7 +102,7 @@ class GroundLink:
                 if self._line is not None:
                     self._line.write(last)
         finally:
-            # Whatever has ended the thread, nobody drives any more.
+            # The end of the thread, however it came, ends driving by the station.
             self._close()
             self._session.lost()
 

@@ -10,7 +10,7 @@ from robosc_bridge.protocol.mavlink import is_old, is_signed
 from robosc_bridge.protocol.mavlink_messages import Incoming
 
 STOPPING = frozenset({Incoming.SET_MODE, Incoming.COMMAND_LONG, Incoming.COMMAND_INT})
-"""Messages that can stop the robot: they are heard whoever has signed them."""
+"""Messages that can stop the robot: they are heard with every signature."""
 
 OLD = STOPPING | {Incoming.HEARTBEAT}
 """Messages that are heard as MAVLink 1, too."""

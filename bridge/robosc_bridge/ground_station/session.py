@@ -95,7 +95,7 @@ class StationSession:
         self._bytes = Bucket(settings.bytes_per_s, settings.bytes_per_s)
         self._heeded = Bucket(MESSAGES_PER_S, MOST_MESSAGES)
         self._station_s: float | None = None
-        # When bytes of a line came last; infinite: they were looked through since.
+        # Time of the last bytes of a line; infinite once they were looked through.
         self._fed_s = math.inf
         self._now_s = now_s
         self._subscription = operations.feed.subscribe(lambda: None)
@@ -118,7 +118,7 @@ class StationSession:
             SigningError: The time of signed packets cannot be kept.
         """
         self._pass_time(now_s)
-        # What is asked is judged by what is so now.
+        # Commands are judged by the present snapshot.
         self._look()
         replies: list[Make] = []
         for received in self._decoder.take_datagram(data) if is_datagram else self._fed(data):
@@ -192,7 +192,7 @@ class StationSession:
             self._signing.reserve(self._codec.timestamp)
         return b"".join(packets)
 
-    # What the daemon shows.
+    # The daemon's snapshot.
 
     def _look(self) -> None:
         now_s = self._now_s
@@ -231,7 +231,7 @@ class StationSession:
     def _answer_in_words(self, severity: Severity, text: str, asked_by: Sender | None) -> None:
         self._texts.say(self._now_s, severity, text, again_s=0.0, asked_by=asked_by)
 
-    # What the ground station says.
+    # Messages of the ground station.
 
     def _is_own(self, received: ReceivedMessage) -> bool:
         """Return True if it was sent by us, and sent back: our own signature says nothing of who did that."""
@@ -241,7 +241,7 @@ class StationSession:
         if self._is_own(received) or not self._is_trusted(received):
             return
         self.accepted += 1
-        # What another vehicle with the same key has sent must not choose whoever sends it on.
+        # Messages of another vehicle with the same key must not choose the address that is answered.
         is_station = received.number == Incoming.HEARTBEAT and received.message.type in GROUND_STATIONS
         self.claims += is_station or command_in(received, self._settings) is not None
 

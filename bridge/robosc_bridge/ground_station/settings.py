@@ -19,7 +19,7 @@ NETWORK_BYTES_PER_S = 60_000
 """Most that is sent over a network."""
 
 _FORMS = "udpin:HOST:PORT, udpout:HOST:PORT, tcp:HOST:PORT, or a serial port's path, also with ,BAUD"
-# Of a LiDAR that is not known, and of one that is: what its maker says, in metres.
+# Ranges in metres: of an unknown LiDAR, and of known ones by their makers' data sheets.
 _ANY_RANGE_M = (0.05, 100.0)
 _RANGES_M = {"lds01": (0.12, 3.5), "lds02": (0.16, 8.0), "lds03": (0.05, 12.0)}
 

@@ -116,7 +116,7 @@ class StatusTexts:
 
     def __init__(self) -> None:
         self._waiting: list[_Waiting] = []
-        # Of which a piece has gone: a station that joins pieces must get the others next.
+        # The text of which a piece was sent: a station that joins pieces must get the others next.
         self._begun: _Waiting | None = None
         self._recent: dict[str, float] = {}
         self._standing: frozenset[str] = frozenset()

@@ -25,7 +25,7 @@ type Make = Callable[[Any], Any]
 _MOTORS: int = dialect.MAV_SYS_STATUS_SENSOR_MOTOR_OUTPUTS
 _BATTERY: int = dialect.MAV_SYS_STATUS_SENSOR_BATTERY
 _PROXIMITY: int = dialect.MAV_SYS_STATUS_SENSOR_PROXIMITY
-# There is none; MAVProxy takes one that is not healthy for broken, whether it is there or not.
+# The robot has no fence; MAVProxy takes one that is not healthy for broken, whether it is present or not.
 _FENCE: int = dialect.MAV_SYS_STATUS_GEOFENCE
 _NO_TEMPERATURE = 32767
 

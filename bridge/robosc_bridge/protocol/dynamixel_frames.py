@@ -1,6 +1,6 @@
-"""Packets of Dynamixel protocol 2.0 in a stream that somebody else listens to, requests as well as answers.
+"""Packets of Dynamixel protocol 2.0 in a stream between two others, requests as well as answers.
 
-Who asks a device has the SDK's packet handler, which waits for one answer; here nobody asks.
+The SDK's packet handler, which waits for one answer, is for those who send requests; here none are sent.
 """
 
 from dataclasses import dataclass

@@ -24,7 +24,7 @@ POINTS_PER_FRAME = 6
 PROOF_FRAMES = 16
 """A rule that this many frames in a row have kept is one: by chance, two equal bytes come so once in 2**128 times."""
 
-# What the sensor is made for, and what its official driver says of its ranges.
+# Limits of the sensor's data sheet, and of ranges in its official driver.
 _MIN_MM = 120
 _MAX_MM = 3500
 _HEADER = 0xFA

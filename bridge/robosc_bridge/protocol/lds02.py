@@ -17,7 +17,7 @@ from robosc_bridge.protocol.revolutions import WIDEST_STEP_DEG, Points, wrapped_
 POINTS_PER_FRAME = 12
 POINTS_PER_S = 2300
 
-# What the sensor is made for.
+# Limits of the sensor's data sheet.
 _MAX_SQUARE_MM2 = 8000.0**2
 _HEADER = 0x54
 _KINDS = (0x2C, 0xEC)

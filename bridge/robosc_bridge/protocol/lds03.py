@@ -19,7 +19,7 @@ STOP = bytes.fromhex("aa55f50a")
 MOST_SAMPLES = 50
 """Twice as many as a frame was ever seen to have: a false header holds the frames behind it up no longer than two."""
 
-# What the sensor is made for.
+# Limits of the sensor's data sheet.
 _MIN_MM = 50
 _MAX_MM = 12_000
 _HEADER = b"\xaa\x55"
@@ -28,7 +28,7 @@ _HALF_TURN_TICKS = 180 * 64
 _TURN_TICKS = 2 * _HALF_TURN_TICKS
 # By count of samples: header, kind and count, first and last angle, checksum; then a byte and a word of each sample.
 _FIELDS = [struct.Struct("<HHHHH" + "BH" * samples) for samples in range(MOST_SAMPLES + 1)]
-# What is before the samples: header, kind and count, first and last angle, checksum.
+# Header of a frame before the samples: start, kind and count, first and last angle, checksum.
 _HEAD = struct.Struct("<5H")
 # By count of samples: how far to shift, and what to keep, until the samples lie on one another.
 _FOLDS: list[list[tuple[int, int]]] = [[], []]
@@ -37,7 +37,7 @@ for _samples in range(2, MOST_SAMPLES + 1):
     _FOLDS.append([(24 * _half, (1 << 24 * _half) - 1), *_FOLDS[_half]])
 # By the two lowest bits of a sample's word, and its byte.
 _INTENSITIES = [255 if bits & 1 else min(bits >> 2, 254) for bits in range(1 << 10)]
-# What is this near and this weak is no obstacle for the official driver.
+# The official driver takes samples this near and this weak for no obstacle.
 _WEAK_MM = 150
 _WEAK_INTENSITY = 65
 

@@ -121,7 +121,7 @@ class Decoder[Content](FrameDecoder[Content]):
 
     def __init__(self, codec: Codec, read: Callable[[Any], Content], old: frozenset[int] = frozenset()) -> None:
         super().__init__()
-        # Nothing is cut off at the end of these: every other length is that of noise.
+        # These messages lose no bytes at their end: every other length is that of noise.
         self._old_lengths = {number: int(dialect.mavlink_map[number].unpacker.size) for number in old}
         self._codec = codec
         self._read = read
@@ -165,7 +165,7 @@ class Decoder[Content](FrameDecoder[Content]):
             is_heard = self._old_lengths.get(data[at + 5]) == data[at + 1]
             return _OLD_HEADER + data[at + 1] + _CHECKSUM if is_heard else 0
         flags = data[at + 2]
-        # Without its message's extra byte, a checksum cannot be checked.
+        # The checksum needs its message's extra byte.
         if flags & ~_SIGNED or int.from_bytes(data[at + 7 : at + 10], "little") not in dialect.mavlink_map:
             return 0
         return _HEADER + data[at + 1] + _CHECKSUM + (_SIGNATURE if flags & _SIGNED else 0)

@@ -119,7 +119,7 @@ class Telemetry(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class Heartbeat:
-    """Sign that somebody is there, and their state."""
+    """Sign of life of a system, and its state."""
 
     kind: int
     autopilot: int

@@ -50,7 +50,7 @@ def ring_sectors(ring: ObstacleRing, heading_rad: float | None) -> tuple[Sector,
         heading_rad: Of the vehicle, counter-clockwise from north; None: unknown.
 
     Returns:
-        None: it counts from north, and nobody knows where that is.
+        None: it counts from north, whose direction is unknown.
     """
     if ring.is_body_fixed:
         turned_deg = 0.0
@@ -108,7 +108,7 @@ def ring_distances_cm(ranges_m: Sequence[float], least_cm: int, most_cm: int) ->
         was measured, which need not mean that nothing is there.
     """
     half = RING_STEP_DEG // 2
-    # Nothing was measured: farther than all that was, also than what is infinitely far.
+    # A beam without a measurement counts as farther than every range, also than an infinite one.
     clear = [range_m if 0.0 < range_m < _FAR_M else _FAR_M if range_m >= _FAR_M else math.inf for range_m in ranges_m]
     clear = clear[-half:] + clear[: BINS - half]
     found = []

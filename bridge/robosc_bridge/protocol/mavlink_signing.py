@@ -20,7 +20,7 @@ KEY_LENGTH = 32
 _HEXADECIMAL = frozenset(b"0123456789abcdefABCDEF")
 _EPOCH_S = 1_420_070_400  # 2015-01-01 in UTC.
 _UNITS_PER_S = 100_000
-# Whoever begins anew within this time is ahead of the clock by as much; others are heard up to a minute behind.
+# A sender that restarts within this time is ahead of the clock by as much; others are heard up to a minute behind.
 _RESERVED = 10 * _UNITS_PER_S
 
 
@@ -122,7 +122,7 @@ def _read_key(path: Path) -> bytes:
         raise SigningError(f"{path}: the key of signing cannot be read: {error.strerror}") from error
     text = data.strip()
     is_hexadecimal = bool(text) and set(text) <= _HEXADECIMAL
-    # As many hexadecimal digits as a key has bytes are half of one, and no key that chance would make.
+    # A text of hexadecimal digits, as many as a key has bytes, is half a key: a random key never looks so.
     if len(data) == KEY_LENGTH and not is_hexadecimal:
         key = data
     else:

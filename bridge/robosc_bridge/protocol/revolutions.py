@@ -98,7 +98,7 @@ class RevolutionBuilder:
         ended = None
         first_deg = points.counted_deg[begin]
         if self._reached_deg is None:
-            # Nobody knows what came before; only a beginning at 0 makes this a revolution.
+            # The points before are unknown; only a beginning at 0 makes this a revolution.
             self._reached_deg = 0.0
             self._lost_deg = 0.0 if first_deg <= WIDEST_STEP_DEG else math.inf
         elif first_deg < self._reached_deg - WIDEST_STEP_DEG:

@@ -1,4 +1,4 @@
-"""Warning when all connections are taken: gRPC refuses callers and reports it to nobody."""
+"""Warning when all connections are taken: gRPC refuses callers without a report."""
 
 import logging
 from pathlib import Path

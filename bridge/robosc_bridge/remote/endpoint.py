@@ -175,7 +175,7 @@ def _watch(port: int, arrivals: Arrivals) -> ConnectionWatch:
 
 def _options() -> list[tuple[str, int]]:
     return [
-        # Without this two bridges could share a port and each get some of the stops.
+        # Two bridges could otherwise share a port, and each would get some of the stops.
         ("grpc.so_reuseport", 0),
         ("grpc.max_receive_message_length", MAXIMUM_REQUEST_BYTES),
         ("grpc.max_metadata_size", MAXIMUM_METADATA_BYTES),
@@ -187,7 +187,7 @@ def _options() -> list[tuple[str, int]]:
         # A caller whose cable is pulled says no goodbye.
         ("grpc.keepalive_time_ms", int(PING_S * 1000)),
         ("grpc.keepalive_timeout_ms", int(PING_LIMIT_S * 1000)),
-        # By itself a minute. The machine of a caller that hangs takes all bytes: only this finds that nobody answers.
+        # The default is a minute. The machine of a caller that hangs takes all bytes: only this finds its silence.
         ("grpc.http2.ping_timeout_ms", int(PING_LIMIT_S * 1000)),
         ("grpc.keepalive_permit_without_calls", 1),
         ("grpc.http2.max_pings_without_data", 0),

@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 
 class LoopCall:
-    """Call of a function in the running event loop: however often it is asked for before it begins, there is one.
+    """Call of a function in the running event loop: several requests before it begins make one call.
 
     Args:
         function: The function.

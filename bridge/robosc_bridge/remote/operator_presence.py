@@ -7,7 +7,7 @@ buffer on the way; once it hangs, its messages go on arriving.
 from collections.abc import Callable
 
 MESSAGES_A_S = 200
-"""More than anybody drives with; beyond it messages are no sign of life."""
+"""More than any terminal sends; beyond it messages are no sign of life."""
 
 FLOOD_S = 3
 """After so many seconds in a row with more than that the stream is ended."""

@@ -50,8 +50,8 @@ _RULES = {
     "GetDefinition": _WATCH,
     "GetStatus": _WATCH,
     "Watch": _WATCH,
-    # Whoever sees the robot may stop it: a stop in vain is a nuisance, one that is refused is an accident.
-    # A stop that is refused is an accident, also where somebody has forgotten a new token.
+    # Every client that sees the robot may stop it: a stop in vain is a nuisance, a refused one is an accident, also
+    # where the new token was forgotten.
     "Stop": Rule(admits_expired=True),
     "Command": _OPERATE,
     "Attach": _OPERATE,
@@ -123,7 +123,7 @@ class BridgeService(convert.BridgeServiceServicer):
     async def _order(self, command: states.OperatorCommand, by: str) -> str:
         """Return the reason why the command cannot be; empty: it is done.
 
-        Without an answer, or with nobody to hear it, it is taken back.
+        It is taken back if there is no answer, or if its caller has gone.
 
         Raises:
             TimeoutError: The loop does not answer.
@@ -237,7 +237,7 @@ class BridgeService(convert.BridgeServiceServicer):
             await context.abort(grpc.StatusCode.RESOURCE_EXHAUSTED, f"there are {most} {what} already")
         self._counts[what] += 1
         try:
-            # With the first message, gRPC would note them as sent only after it: a call that is ended in between could
+            # Metadata sent with the first message count as sent only after it: a call that is ended in between could
             # not be given a status any more.
             await context.send_initial_metadata(())
             yield

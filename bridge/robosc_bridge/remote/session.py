@@ -56,7 +56,7 @@ class ProgramSession:
         self._operator_timeout_s = operator_timeout_s
         self._is_operator = hello.is_operator
         self._presence = OperatorPresence(asyncio.get_running_loop().time)
-        # The control loop's thread tells what it has put.
+        # The control loop's thread announces the items that it has put.
         self._put_call = LoopCall(self._called)
         self._news = asyncio.Event()
         self._overflow = asyncio.Event()

@@ -77,7 +77,7 @@ class Watchers:
 
     def __init__(self, feed: Feed) -> None:
         self._feed = feed
-        # The control loop's thread tells that there is something new.
+        # The control loop's thread announces new entries.
         self._news = LoopCall(self._hand_out)
         self._watchers: set[Watcher] = set()
         self._subscription: Subscription | None = None

@@ -55,18 +55,18 @@ class SafetyLayer:
         # A signal handler may call while its own thread is inside.
         self._lock = threading.RLock()
         self._now_s = 0.0
-        # When the drive base's thread or the loop was at work last.
+        # Time at which the drive base's thread or the loop was last at work.
         self._alive_s = 0.0
         self._is_enabled = False
         self._latched: set[Reason] = set()
-        # What is commanded, within the limits, and what was put out last.
+        # The commanded velocity, within the limits, and the velocity of the last output.
         self._wanted = self._velocity = STANDSTILL
         self._is_refused = False
-        # Forward, as it was commanded last: whether it counts or not, that is where somebody wants to go.
+        # Forward velocity of the last command: whether it counts or not, the robot is wanted there.
         self._asked_m_s = 0.0
-        # Whether what was commanded up to the next output came too early to count.
+        # All commands up to the next output came too early to count.
         self._is_held = True
-        # As put out last.
+        # Reasons of the last output.
         self._reasons: tuple[Reason, ...] = ()
         self._commands = Freshness(limits.command_timeout_s)
         self._scans = Freshness(limits.scan_timeout_s)
@@ -79,7 +79,7 @@ class SafetyLayer:
         self._is_noisy = False
         self._battery = BatteryMonitor(limits)
         self._wheels = WheelMonitor(limits)
-        # When torque began to be wanted, None: it is not; whether the motors have reported since then that they hold.
+        # Time since which torque is wanted, None if it is not; and the motors' report since then that they hold.
         self._torque_since_s: float | None = None
         self._is_torque_seen = False
         # Since when torque is to go off; when the last reading was taken, if the wheels stood still in it.
@@ -237,7 +237,7 @@ class SafetyLayer:
             is_clock_wrong = not self._now_s <= now_s < math.inf
             step_s = now_s - self._now_s
             if step_s > self._limits.motor_timeout_s:
-                # What was put out before holds no longer: motion begins anew.
+                # The last output holds no longer: motion begins anew.
                 self._velocity, step_s = STANDSTILL, 0.0
             if math.isfinite(now_s):
                 self._now_s = now_s
@@ -252,7 +252,7 @@ class SafetyLayer:
                 self._velocity = STANDSTILL
             else:
                 self._velocity = ramped(self._velocity, self._wanted, self._limits, step_s)
-            # What is written later than this was decided from what is no longer so.
+            # A velocity that is written later was decided from outdated measurements.
             velocity = replace(self._velocity, until_s=self._now_s + self._limits.motor_timeout_s)
             return Output(velocity, self._torque_since_s is not None, self._reasons, self._find_warnings())
 

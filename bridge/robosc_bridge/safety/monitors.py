@@ -56,7 +56,7 @@ class ScanCoverageMonitor:
 
     def __init__(self, min_share: float) -> None:
         self._min_share = min_share
-        # Without any scan, it is not known that a part of the view is missing.
+        # No scan, no proof of a missing part of the view.
         self._is_blind_ahead = self._is_blind_behind = False
 
     def update(self, ranges_m: Sequence[float]) -> None:
@@ -166,5 +166,5 @@ class WheelMonitor:
 
     @staticmethod
     def _are_within(wheels_m_s: tuple[float, float], limit_m_s: float) -> bool:
-        # What is not a number is not.
+        # NaN is not within the limit.
         return all(abs(speed) <= limit_m_s for speed in wheels_m_s)

@@ -13,7 +13,7 @@ from robosc_bridge.devices.interface import STANDSTILL, Velocity
 from robosc_bridge.skills.settings import RotateSettings
 
 MAXIMUM_ANGLE_RAD = 200 * math.pi
-"""A hundred revolutions; who asks for more has mistaken the unit."""
+"""A hundred revolutions; a larger angle is one in a mistaken unit."""
 
 
 class RotateState(StrEnum):
@@ -100,7 +100,7 @@ class Rotate:
         if time_s >= self._end_s:
             self._fail("the rotation has taken too long" if self._heading_rad is not None else "there is no odometry")
             return STANDSTILL
-        # Without a heading nobody knows how far it is.
+        # The remaining rotation is unknown without a heading.
         return Velocity(0.0, self._speed_rad_s()) if is_known else STANDSTILL
 
     def _follow(self, heading_rad: float) -> None:

@@ -5,8 +5,8 @@ from typing import Annotated, Literal
 from msgspec import Meta, Struct
 
 Words = tuple[Annotated[str, Meta(min_length=1, max_length=40)], ...]
-# What a terminal gives: no blank (it is called `space`), no carriage return (it becomes a line feed), and none of the
-# characters that the terminal keeps to itself: Ctrl-C, Ctrl-Q, Ctrl-S, Ctrl-Z and Ctrl-\.
+# Terminals give no blank (it is called `space`), no carriage return (it becomes a line feed), and none of the
+# characters that they keep to themselves: Ctrl-C, Ctrl-Q, Ctrl-S, Ctrl-Z and Ctrl-\.
 TypedKey = Annotated[
     str,
     Meta(pattern=r"^(space|[^ \r\u0003\u0011\u0013\u001a\u001c])(?![\s\S])", title="space or a single character"),

@@ -125,7 +125,7 @@ def _connected(arguments: argparse.Namespace, work: Callable[[Any, argparse.Name
     except KeyboardInterrupt:
         return _failed("interrupted", 130)
     except BrokenPipeError:
-        # Whoever read has gone; Python would complain once more when it flushes.
+        # The reader has gone; Python would complain once more when it flushes.
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return DONE
 

@@ -103,7 +103,7 @@ class Lines:
         if response.lost_events:
             yield f"{_clock(time.time())} ! {response.lost_events} events were lost: they came too quickly"
         for entry in events_of(response):
-            # What the bridge is doing stands in the snapshot, with why nothing moves.
+            # The snapshot shows the state of the bridge, with the reasons why the wheels stand still.
             if entry.get("kind") != "state":
                 yield event_line(entry)
         if response.HasField("snapshot"):

@@ -37,7 +37,7 @@ EXPIRY_S = 0.6
 """A request holds for so long after a key: longer than terminals wait before they repeat a held key, commonly 0.5 s."""
 
 PRESENT_S = 1.5
-"""After so long without a byte of the terminal nobody is there."""
+"""The operator counts as gone after so long without a byte of the terminal."""
 
 LINEAR_M_S, ANGULAR_RAD_S = 0.22, 2.0
 """Fastest request; what the robot may do is for the bridge's own limits."""
@@ -233,7 +233,7 @@ class _Resuming:
         self._failure: UnreachableError | None = None
 
     def begin(self) -> None:
-        """Ask for it; once more while it is asked for changes nothing."""
+        """Request it; a second request before the first one is served changes nothing."""
         if self._running is None or not self._running.is_alive():
             self._running = self._terminal.start(self._ask)
 

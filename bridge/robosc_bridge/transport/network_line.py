@@ -89,7 +89,7 @@ class NetworkLine(PolledLine, NetworkPort):
         try:
             data, self._sender = self._socket.recvfrom(_DATAGRAM)
         except (BlockingIOError, ConnectionRefusedError):
-            # Refused: of a datagram that was sent before; nobody listens there yet.
+            # Refused for a datagram that was sent before: the peer does not listen yet.
             return b""
         except OSError as error:
             raise LineLostError(self.path, f"the connection is gone: {error.strerror}") from error

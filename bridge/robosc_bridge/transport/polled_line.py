@@ -27,7 +27,7 @@ class PolledLine(ABC):
         self._poll = select.poll()  # Unlike `select`, it takes any number of a file.
         self._poll.register(file, select.POLLIN)
         self._poll.register(self._woken, select.POLLIN)
-        # Another thread may wake the line while it is being closed: its file's number may be somebody else's then.
+        # Another thread may wake the line while it is being closed: its file's number may be another file's then.
         # A signal handler may wake it, too, while its own thread is inside.
         self._guard = threading.RLock()
         self._is_open = True
@@ -62,6 +62,6 @@ class PolledLine(ABC):
             os.close(self._waker)
 
     def _check_open(self) -> None:
-        # The numbers of a closed line's files may be somebody else's.
+        # The numbers of a closed line's files may be other files' now.
         if not self._is_open:
             raise LineLostError(self.path, "the line is closed")

@@ -15,7 +15,7 @@ from robosc_bridge.errors import LineBusyError, LineDeniedError, LineError, Line
 from robosc_bridge.transport.polled_line import PolledLine
 
 _CHUNK = 4096
-# How a line says that it is gone: an OSError, pyserial's own (an OSError, too) or that of termios (which is none).
+# A line that is gone raises OSError, pyserial's own (an OSError, too) or that of termios (which is none).
 _FAILURES = (OSError, termios.error)
 
 
@@ -144,7 +144,7 @@ class SerialLine(PolledLine):
             return error
         return LineLostError(self.path, f"the line is gone: {_words(error)}")
 
-    # As in `robosc_simulated.closing`: a driver and a simulated device share no code.
+    # `robosc_simulated.closing` has the same methods: a driver and a simulated device share no code.
     def __enter__(self) -> Self:
         return self
 

@@ -108,11 +108,11 @@ class RosRobot:
         # On the computer's clock, as far as it was lived.
         self._host_s = 0.0
         self._commanded_s = -math.inf
-        # Of the world, which goes no further before the next velocity.
+        # Limit of the world's time, which goes no further before the next velocity.
         self._limit_s = math.inf
         self._left_rad, self._right_rad = world.left.angle_rad, world.right.angle_rad
         self._x_m = self._y_m = self._heading_rad = 0.0
-        # In the order in which they are reported; the clock first, so that who reads a stamp knows the time.
+        # Readings in the order of their reports; the clock comes first, so that readers of a stamp know the time.
         self._periods: list[tuple[float, Callable[[float], Reading]]] = [
             # No faster than a hundred times a second on the computer's clock.
             (max(1.0, self._time.factor) / CLOCK_HZ, Clock),
@@ -215,7 +215,7 @@ class RosRobot:
 
     def _scan(self, stamp_s: float) -> Scan:
         if self.is_scanner_covered:
-            # Something is too near: who reads it stops.
+            # The cover is too near: readers of the scan stop.
             ranges_m = np.full(self._beams, -np.inf)
         else:
             # The one of a beam for each degree is quicker.

@@ -157,7 +157,7 @@ def plain_environment(variables: Mapping[str, str] | None = None) -> dict[str, s
         variables: With it; None: those of this process.
     """
     found = dict(os.environ if variables is None else variables)
-    # What the wheels of ROS 2 set for themselves.
+    # The wheels of ROS 2 set these variables for themselves.
     if found.pop("_ROS_WHEELS_BOOTSTRAP_COMPLETE", None) is not None:
         found.pop("LD_LIBRARY_PATH", None)
     own = (Path(sys.prefix), Path(sys.base_prefix))
@@ -272,7 +272,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
         The exit code: 0 when it was interrupted, 1 when it cannot be served.
     """
     given = sys.argv[1:] if arguments is None else arguments
-    # As with every node of ROS 1, and as roslaunch gives them.
+    # Remappings are given to every node of ROS 1, also by roslaunch.
     names = [word for word in given if ":=" in word]
     options = _parser().parse_args([word for word in given if ":=" not in word])
 

@@ -50,7 +50,8 @@ class Ros2Node:
     def __init__(
         self, robot: RosRobot, pacer: Pacer, *, is_stamped: bool = False, arguments: Sequence[str] = ()
     ) -> None:
-        # As in `robosc_bridge.ros2.node`, which no simulator may import: the imports differ, and the message is short.
+        # The message is that of `robosc_bridge.ros2.node`, which no simulator may import; it is short, and the imports
+        # differ.
         try:
             import rclpy
             from geometry_msgs.msg import TransformStamped, Twist, TwistStamped

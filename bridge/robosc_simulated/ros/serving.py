@@ -61,7 +61,7 @@ class RosNode(Protocol):
         """Obey velocities; comes back after some, or after so long at most.
 
         Raises:
-            ServingError: There is nobody any more to serve.
+            ServingError: The middleware has ended.
         """
 
 
@@ -166,7 +166,7 @@ def run(robot: RosRobot, pacer: Pacer, node: RosNode, should_end: Callable[[], b
 
 
 def make_robot(options: argparse.Namespace) -> tuple[RosRobot, Pacer]:
-    """The robot that was asked for, in its scene.
+    """The robot of the options, in its scene.
 
     Raises:
         ValueError: There is no such scene, or something in it is wrong, or the speed is no positive number.

@@ -170,7 +170,7 @@ export function startComponents() {
         if (entry.kind === "restart") forget();
         for (const { component, id } of entry.transitions ?? []) {
           const ids = taken.get(component) ?? [];
-          // Of what happens between two frames nobody sees more than this.
+          // People see no more than this of transitions between two frames.
           if (ids.length >= 64) ids.shift();
           ids.push(id);
           taken.set(component, ids);

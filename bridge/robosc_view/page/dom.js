@@ -28,7 +28,7 @@ export function say(element, text) {
   const wanted = String(text);
   if (element.textContent === wanted) return;
   const { firstChild } = element;
-  // To change the text that is there is cheaper than to put another in its place.
+  // Changing the text node is cheaper than replacing it.
   if (firstChild?.nodeType === Node.TEXT_NODE && firstChild === element.lastChild) firstChild.data = wanted;
   else element.textContent = wanted;
 }

@@ -83,7 +83,7 @@ export class Entries {
     this.released += excess;
     this.all = this.all.slice(excess);
     const first = this.all[0].serial;
-    // What is looked at in a pause stays; it is no more than was there when the pause began.
+    // Entries that are shown in a pause stay; they are no more than at its beginning.
     if (this.isPaused) return 0;
     const cut = this.shown.findIndex((entry) => entry.serial >= first);
     const gone = cut < 0 ? this.shown.length : cut;

@@ -23,7 +23,7 @@ export function afterPainting(owner, place) {
   last.set(owner, place);
 }
 
-/** Something about these subjects has changed. */
+/** Note that these subjects have changed. */
 export function touch(...subjects) {
   for (const subject of subjects) dirty.add(subject);
   if (!isAwaited) {

@@ -136,5 +136,5 @@ connection = new Connection(streamAddress, `/places${shown}`, {
 lookAtFreshness();
 touch("stream", "map");
 
-// Whoever frames this page cannot see whether it has come.
+// The frame around this page cannot see whether it has come.
 if (window.parent !== window) window.parent.postMessage("robosc-live-view", "*");

@@ -62,7 +62,7 @@ export function startMap() {
     actions[event.key]();
   });
   canvas.addEventListener("wheel", (event) => {
-    // Without a key the page scrolls on, unless the picture is what is being worked with.
+    // The page scrolls on without a key, unless the picture has the focus.
     if (!event.ctrlKey && document.activeElement !== canvas) return;
     event.preventDefault();
     zoom(Math.exp(-event.deltaY / 400), event.offsetX, event.offsetY);

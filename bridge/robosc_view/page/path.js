@@ -23,7 +23,7 @@ export class Path {
   thin() {
     const half = LIMIT / 2;
     this.points = this.points.filter((point, i) => i >= half || i % 2 === 0 || !point[2]);
-    // Nothing but jumps: the oldest go.
+    // The points are all jumps: the oldest go.
     if (this.points.length > LIMIT) this.points = this.points.slice(-half);
   }
 

@@ -38,7 +38,7 @@ export function paintMap(context, view, { scene, path, scan, pose }) {
     strokes(context, view, (scene.walls ?? []).map(([a, b, c, d]) => [[a, b], [c, d]]), now.wall, 3);
   }
   if (scene?.way) {
-    // Of a recorded run all of it is known: what is still to come is seen through.
+    // The path of a recorded run is known as a whole: its future is drawn faintly.
     context.globalAlpha = 0.35;
     strokes(context, view, [scene.way], now.path, 2);
     context.globalAlpha = 1;

@@ -131,6 +131,7 @@ export function startPlay(send, token) {
   };
 
   for (const type of ["undo", "redo"]) byId(`play-${type}`).addEventListener("click", () => want({ type }));
+  byId("play-wait").addEventListener("click", () => want({ type: "wait" }));
   const beginning = byId("play-beginning");
   byId("play-restart").addEventListener("click", () =>
     want(beginning.hidden ? { type: "restart" } : { type: "restart", beginning: beginning.selectedIndex }));
@@ -145,7 +146,7 @@ export function startPlay(send, token) {
     const seed = walks;
     walks += 1;
     const steps = untilFinding ? 1000 : Math.min(Math.max(Math.trunc(Number(byId("play-steps").value)) || 1, 1), 5000);
-    // Of a large system it takes its time.
+    // The walk through a large system takes its time.
     if (want({ type: "walk", steps, seed, until_finding: untilFinding })) report("step", ["chance goes on…"]);
   };
   byId("play-walk").addEventListener("click", () => walk(false));
@@ -183,7 +184,7 @@ export function startPlay(send, token) {
       const before = new Map(events.map((item) => [item.event, item]));
       events = play.events.map((item) => new PlayEvent(item, want));
       for (const item of events) {
-        // What was entered stays, as far as there is a field for it.
+        // Entered values stay, as far as there is a field for them.
         const old = before.get(item.event)?.fields ?? [];
         for (const field of item.fields) {
           const was = old.find((other) => String(other.path) === String(field.path) && other.isChoice === field.isChoice);
@@ -201,6 +202,11 @@ export function startPlay(send, token) {
       narrow();
       beginning.replaceChildren(...play.beginnings.map((label) => make("option", {}, label)));
       show(beginning, play.beginnings.length > 0);
+      // Against the surroundings a person has the part of the controller only.
+      const isOpposed = play.goals.length > 0;
+      for (const id of ["play-wait", "play-opposition"]) show(byId(id), isOpposed);
+      for (const id of ["play-finding", "play-world", "play-world-title"]) show(byId(id), !isOpposed);
+      byId("play-goals").replaceChildren(...play.goals.map((text) => make("li", {}, quoted(text), ": ", make("strong", { class: "play-goal" }))));
       begun = null;
       for (const form of ["log", "test"]) show(byId(`play-${form}`), play.forms.includes(form));
       show(byId("play-link"), play.link !== null);
@@ -223,9 +229,16 @@ export function startPlay(send, token) {
         button.disabled = run[type] === "";
         mark(button, "title", run[type]);
       }
+      if (run.opposition) {
+        const { goals, denied, assumptions } = run.opposition;
+        const kept = assumptions.map((times, i) => `assumption ${i + 1} came true ${count(times, "time", "times")}`);
+        const what = denied === null ? "Silent steps do not end." : `The surroundings deny ${denied}, whatever you do.`;
+        say(byId("play-denied"), kept.length > 0 ? `${what} They keep to what is assumed: ${kept.join(", ")}.` : what);
+        byId("play-goals").querySelectorAll(".play-goal").forEach((place, i) => say(place, goals[i] ? "true" : "not yet"));
+      }
       say(byId("play-count"), `${count(run.steps, "event", "events")}${run.is_marked ? " · marked" : ""}`);
     },
-    /** There is a definition: a page that was here before goes on with what it did. */
+    /** Goes on from the run of an earlier page once a definition has come. */
     defined(definition) {
       if (!definition.play || isResumed) return;
       isResumed = true;

@@ -105,7 +105,7 @@ export function startStream() {
   });
 
   box.addEventListener("scroll", () => {
-    // What the page has scrolled itself is painted already.
+    // Positions that the page has set itself are painted already.
     if (Math.abs(box.scrollTop - top) < 1) return;
     top = box.scrollTop;
     isFollowing = top + boxHeight >= Number.parseFloat(spacer.style.height) - rowHeight;

@@ -37,6 +37,6 @@ function keep(name) {
   try {
     localStorage.setItem(KEPT, name);
   } catch {
-    // Where nothing may be kept, the choice lasts as long as the page.
+    // The choice lasts as long as the page where storage is forbidden.
   }
 }

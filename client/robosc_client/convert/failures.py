@@ -55,7 +55,7 @@ def failure_of(error: grpc.RpcError) -> Failure:
         if key == _DETAILS and isinstance(value, bytes):
             reason, retry_after_s = _details(value)
             return Failure(call.code(), message, reason, retry_after_s)
-    # Without details of a server, the message is from gRPC itself.
+    # A message without details of a server is from gRPC itself.
     is_lost = call.code() in _LOST_CODES and details.startswith(_LOST)
     code = grpc.StatusCode.UNAVAILABLE if is_lost else call.code()
     return Failure(code, first_line(details) if code is grpc.StatusCode.UNAVAILABLE else message)

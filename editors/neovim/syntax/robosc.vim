@@ -15,6 +15,13 @@ syntax match roboscWord "\%(^\s*goal\s\+\)\@<=once\>\ze\s\+\%(and\>\|or\>\|leads
 syntax match roboscWord "\%(^\s*assume\s\+\)\@<=allow\>\ze\s\+\%(and\>\|or\>\|leads\>\)\@![[:alpha:]_(!^]"
 syntax match roboscWord "\%(\<always\s\+\)\@<=eventually\>"
 syntax match roboscWord "\<leads\>\ze\s\+to\>"
+" Words of missions and preferences, where they are no names.
+syntax match roboscWord "^\s*\zsmission\>\ze\s\+\^\?\h\w*\s*\%({\|while\>\|$\)"
+syntax match roboscWord "\%(^\s*\%(mission\s\+\^\?\h\w*\s\+\)\?\)\@<=while\>\ze\s\+[[:alnum:]_(!^-]"
+syntax match roboscWord "\%(^\s*\|{\s*\|\<anywhere\s\+\)\@<=visit\>\ze\s\+[[:alnum:]_(!^-]"
+syntax match roboscWord "\%(\<from\s\+\)\@<=anywhere\>\ze\s*\%(visit\>\|$\)"
+syntax match roboscWord "^\s*\zsprefer\>\ze\s\+\%({\|\^\?\h\w*\s*\%(over\>\|$\)\)"
+syntax match roboscWord "\%(^\s*\%(prefer\s\+\%({[^}]*}\|\^\?\h\w*\)\s\+\)\?\)\@<=over\>\ze\s\+[[:alpha:]_{^]"
 " A word of the language as a name.
 syntax match roboscName "\^\h\w*"
 syntax match roboscNumber "\<\d\+\%(\.\d\+\)\?\>"

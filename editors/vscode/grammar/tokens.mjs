@@ -1,5 +1,5 @@
-// What the grammar makes of texts: reads a JSON list of them from standard input, and writes for each one a list of
-// [first column, column behind, scopes] by line.
+// Scopes that the grammar gives to texts: reads a JSON list of them from standard input, and writes for each one a list
+// of [first column, column behind, scopes] by line.
 
 import { readFileSync } from "node:fs";
 import { createRequire } from "node:module";

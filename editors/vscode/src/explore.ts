@@ -136,7 +136,7 @@ function table({ states, transitions }: Explored): string {
   return `<table><thead><tr><th>state</th>${heads}<th>what can happen</th></tr></thead><tbody>${rows.join("")}</tbody></table>`;
 }
 
-/** Everything that makes up a state, by its name in the model. */
+/** All values of a state, by their names in the model. */
 function values(state: State): Record<string, unknown> {
   return { ...state.components, ...state.variables, ...state.communications };
 }

@@ -126,7 +126,7 @@ export class LivePanel {
     } else if (!this.isClosed) {
       const source = new URL(address).origin;
       const nonce = randomBytes(16).toString("hex");
-      // What is behind the frame stays in sight until the page in it has said that it has come.
+      // The text behind the frame stays in sight until the page in it has reported itself.
       this.panel.webview.html = html(
         `frame-src ${source}; script-src 'nonce-${nonce}'`,
         `<p>The live view is at ${escaped(source)}.</p><p id="why" hidden>If it does not come, this editor does not

@@ -38,7 +38,7 @@ export async function synthesize(output: Output, given: unknown, target: unknown
   if (target instanceof vscode.Uri) {
     await vscode.workspace.fs.writeFile(target, supervisor);
   } else {
-    // Who waits for the command waits for the supervisor, not for the user to look at the message.
+    // The command ends with the supervisor, not with the user's look at the message.
     offer(output, model, supervisor, ended.output).catch((error: Error) => output.fail(error.message));
   }
   return true;

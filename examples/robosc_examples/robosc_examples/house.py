@@ -56,7 +56,7 @@ class House:
         self._now_s: float | None = None
         self._due: list[tuple[float, str]] = []
 
-    def tell(self, topic: str) -> None:
+    def receive(self, topic: str) -> None:
         """Take what the courier says on one of `TOLD`; it takes effect with time."""
         settings, now_s = self.settings, self._now_s or 0.0
         match topic:

@@ -33,7 +33,7 @@ class Household(HelperNode):
         self._shown = ("obstacle door back", f"battery {self._house.battery_v:.2f}")
         self._sent_to = {topic: self.create_publisher(Empty, topic, 10) for topic in REPORTED}
         for topic in TOLD:
-            self.create_subscription(Empty, topic, lambda _, topic=topic: self._house.tell(topic), 10)
+            self.create_subscription(Empty, topic, lambda _, topic=topic: self._house.receive(topic), 10)
         self.create_subscription(Odometry, "/odom", self._read, qos_profile_sensor_data)
         self.every(PERIOD_S, self._live)
 

@@ -95,7 +95,7 @@ class StopPanel(HelperNode):
                 self._press(self._keys.get(key.lower(), key))
         else:
             *lines, self._unread = (self._unread + data).split(b"\n")
-            # What never ends is no line.
+            # A text without an end is no line.
             self._unread = self._unread[-CHUNK:]
             for line in lines:
                 self._press(line.decode(errors="replace").strip().lower())
@@ -107,7 +107,7 @@ class StopPanel(HelperNode):
             self._sent_to[name].publish(Empty())
             self.get_logger().info(name)
         elif name:
-            # When in doubt, stop: somebody in a hurry misses the key.
+            # The panel stops when in doubt: people in a hurry miss the key.
             self._sent_to["stop"].publish(Empty())
             self.get_logger().warning(f"stop: {name!r:.40} is not one of {', '.join(self._sent_to)}, quit")
 

@@ -6,6 +6,7 @@ from ipaddress import IPv4Address, ip_address, ip_network
 from typing import Any
 from urllib.parse import unquote
 
+from robosc_api.peers import peer_of
 from robosc_api.security.tokens import Entry, Scope
 
 _NETWORK_BITS = 64
@@ -23,12 +24,12 @@ def caller_of(context: Any) -> str:
     Args:
         context: Context of the call under way.
     """
-    return CALLER.get() or _certificate_name(context) or host_of(context.peer())
+    return CALLER.get() or _certificate_name(context) or host_of(peer_of(context))
 
 
 def token_or_host_of(context: Any) -> str:
     """Return the name of a caller, without client certificates."""
-    return CALLER.get() or host_of(context.peer())
+    return CALLER.get() or host_of(peer_of(context))
 
 
 def is_admin() -> bool:

@@ -109,7 +109,7 @@ class _TokenSource:
 
     def __init__(self, path: Path) -> None:
         self._path = path
-        # In this order: a token that is replaced meanwhile is read with the next call.
+        # The order matters: a token that is replaced meanwhile is read with the next call.
         self._stamp = _stamp(path)
         self._token = _token(path)
         self._is_failing = False

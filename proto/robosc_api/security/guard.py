@@ -9,6 +9,7 @@ import grpc
 
 from robosc_api.failures import failure_metadata
 from robosc_api.layers import Layer, behaviour_of, with_behaviour, writing
+from robosc_api.peers import peer_of
 from robosc_api.security.addresses import is_loopback_peer
 from robosc_api.security.callers import CALLER, ENTRY
 from robosc_api.security.forwarded import forwarded_entry
@@ -31,6 +32,9 @@ class _Refusal:
 
 
 _NO_TOKEN = _Refusal(grpc.StatusCode.UNAUTHENTICATED, "a valid token is needed")
+_ANOTHER_MACHINE = _Refusal(
+    grpc.StatusCode.PERMISSION_DENIED, "without tokens, only callers on the same machine may call this method"
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -46,6 +50,9 @@ class Rule:
     scopes: frozenset[Scope] = frozenset()
     is_open: bool = True
     admits_expired: bool = False
+
+
+_ANY_TOKEN = Rule()
 
 
 class Guard(Layer):
@@ -79,59 +86,51 @@ class Guard(Layer):
         method: str = details.method
         if inner is None or method.startswith(_HEALTH):
             return inner
-        rule = self._rules.get(method, Rule())
-        if self._needs_caller and self._entry(rule, details.invocation_metadata) is None:
-            # Refuse at once: a handler of unary requests would wait for a request that may never arrive, and count as
-            # an open call.
-            return grpc.stream_stream_rpc_method_handler(self._refuse(method))
+        if self._needs_caller:
+            rule = self._rules.get(method, _ANY_TOKEN)
+            entry = self._entry(rule, details.invocation_metadata)
+            if entry is None or (rule.scopes and not rule.scopes & entry.scopes):
+                # Refuse at once: a handler of unary requests would wait for a request that may never arrive, and count
+                # as an open call.
+                return grpc.stream_stream_rpc_method_handler(self._refuse(rule, method, entry))
+            # The handler runs in the same task, and so sees what is set here.
+            CALLER.set(entry.name)
+            ENTRY.set(entry)
         return super().handler(inner, details)
 
-    def _refuse(self, method: str) -> Any:
+    def _refuse(self, rule: Rule, method: str, entry: Entry | None) -> Any:
         async def refuse(requests: Any, context: Any) -> None:
-            refusal = self._refusal(Rule(), method, context.invocation_metadata(), context.peer())
-            # A token that has become valid meanwhile is refused once.
-            await _abort(context, refusal or _NO_TOKEN)
+            await _abort(context, self._refusal(rule, method, entry, context))
 
         return refuse
 
     def wrap(self, inner: Any, method: str) -> Any:
         """Wrap a handler in the authorization of its caller."""
-        rule = self._rules.get(method, Rule())
-        if not self._needs_caller and (rule.is_open or self._has_client_certificates):
+        if self._needs_caller or self._has_client_certificates or self._rules.get(method, _ANY_TOKEN).is_open:
             return inner
-
-        async def admit(context: Any) -> None:
-            refusal = self._refusal(rule, method, context.invocation_metadata(), context.peer())
-            if refusal is not None:
-                await _abort(context, refusal)
-
         answer = behaviour_of(inner)
-        return with_behaviour(inner, _guarded(writing(answer) if inner.response_streaming else answer, admit))
+        return with_behaviour(inner, _for_this_machine(writing(answer) if inner.response_streaming else answer))
 
-    def _refusal(self, rule: Rule, method: str, metadata: Any, peer: str) -> _Refusal | None:
-        """Return the reason why a call is not admitted; None: it is."""
-        if not self._needs_caller:
-            if rule.is_open or self._has_client_certificates or is_loopback_peer(peer):
-                return None
-            return _Refusal(
-                grpc.StatusCode.PERMISSION_DENIED,
-                "without tokens, only callers on the same machine may call this method",
-            )
-        entry = self._entry(rule, metadata)
-        if entry is None:
-            expired = self._expired(metadata)
-            if expired is not None and expired.expires_s is not None:
-                message = f"the token has expired at {time_text(expired.expires_s)}: a new one is needed"
-                return _Refusal(grpc.StatusCode.UNAUTHENTICATED, message, "TOKEN_EXPIRED")
-            self._log_refusal(peer, f"no valid token for {method}")
-            return _NO_TOKEN
-        if rule.scopes and not rule.scopes & entry.scopes:
+    def _refusal(self, rule: Rule, method: str, entry: Entry | None, context: Any) -> _Refusal:
+        """Return the reason why a call is not admitted.
+
+        Args:
+            rule: Rule of the method.
+            method: The method.
+            entry: Entry of the caller, who is not one of the rule's; None: there is none.
+            context: Context of the call.
+        """
+        peer = peer_of(context)
+        if entry is not None:
             self._log_refusal(peer, f"the token '{entry.name}' is not for {method}")
             wanted = " or ".join(f"'{scope}'" for scope in sorted(rule.scopes))
             return _Refusal(grpc.StatusCode.PERMISSION_DENIED, f"the token's scope does not include {wanted}")
-        CALLER.set(entry.name)
-        ENTRY.set(entry)
-        return None
+        expired = self._expired(context.invocation_metadata())
+        if expired is not None and expired.expires_s is not None:
+            message = f"the token has expired at {time_text(expired.expires_s)}: a new one is needed"
+            return _Refusal(grpc.StatusCode.UNAUTHENTICATED, message, "TOKEN_EXPIRED")
+        self._log_refusal(peer, f"no valid token for {method}")
+        return _NO_TOKEN
 
     def _entry(self, rule: Rule, metadata: Any) -> Entry | None:
         """Return the entry of a call's caller; None: there is none whom the rule may admit."""
@@ -169,9 +168,10 @@ async def _abort(context: Any, refusal: _Refusal) -> None:
     await context.abort(code, message, failure_metadata(code, message, reason, context=context))
 
 
-def _guarded(answer: Any, admit: Callable[[Any], Awaitable[None]]) -> Any:
+def _for_this_machine(answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any, Any], Awaitable[Any]]:
     async def guarded(request: Any, context: Any) -> Any:
-        await admit(context)
+        if not is_loopback_peer(peer_of(context)):
+            await _abort(context, _ANOTHER_MACHINE)
         return await answer(request, context)
 
     return guarded

@@ -72,7 +72,7 @@ def add_port(server: Any, address: str, security: ServerSecurity) -> str:
 def _add_socket(server: Any, address: str) -> str:
     """Let a gRPC server listen on a Unix socket, to which this user and its group may connect."""
     path = Path(address.removeprefix(UNIX))
-    # The socket exists before its mode can be set: until then nobody else may connect.
+    # The socket exists before its mode can be set: until then no other user may connect.
     before = os.umask(0o177)
     try:
         got = server.add_insecure_port(address)

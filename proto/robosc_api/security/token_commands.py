@@ -184,7 +184,7 @@ def _revoke(arguments: argparse.Namespace, now_s: float) -> None:
 
 
 def _deliver(arguments: argparse.Namespace, token: str, line: str) -> None:
-    """Give the token to who has asked for it, before it is valid: one that could not be written is of no use.
+    """Give the token to its owner, before it is valid: one that could not be written is of no use.
 
     Raises:
         SecurityError: It cannot be written.

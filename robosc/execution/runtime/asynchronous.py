@@ -110,7 +110,7 @@ class AsyncController:
         self.executor = Executor(system, self._work, settings, self._clock, log)
         self._news: Optional[asyncio.Event] = None
         self._is_ended = False
-        # What comes before the start; None afterwards.
+        # Data that come before the start; None afterwards.
         self._early: Optional[Deque[Tuple[str, Any]]] = deque(maxlen=EARLY_MESSAGES)
 
     def receive(self, identifier: str, data: Any) -> None:
@@ -197,7 +197,7 @@ class AsyncController:
         finally:
             for task in waiting:
                 task.cancel()
-        # What a broken `sleep` raised is a fault, not silence.
+        # An error of a broken `sleep` is a fault, not silence.
         if waiting[0].done() and not waiting[0].cancelled():
             waiting[0].result()
 

@@ -75,15 +75,15 @@ class Callers:
         self._waiting_goals[number] = CallerGoal(number, action, goal_id)
 
     def close_call(self, number: int) -> Optional[CallerCall]:
-        """Return the call that is about to be answered, or None if nobody waits for it."""
+        """Return the call that is about to be answered, or None if its caller has gone."""
         return self._waiting_calls.pop(number, None)
 
     def close_goal(self, number: int) -> Optional[CallerGoal]:
-        """Return the goal that is about to end for its caller, or None if nobody waits for it."""
+        """Return the goal that is about to end for its caller, or None if the caller has gone."""
         return self._waiting_goals.pop(number, None)
 
     def goal(self, number: int) -> Optional[CallerGoal]:
-        """Return the goal with a number of the robot's side, if somebody waits for it."""
+        """Return the goal with a number of the robot's side, if its caller waits for it."""
         return self._waiting_goals.get(number)
 
     def find_goal(self, action: str, goal_id: Any) -> Optional[CallerGoal]:
@@ -103,7 +103,7 @@ class Callers:
         return [self._waiting_calls.pop(number) for number in failed]
 
     def close_failed_goals(self) -> List[CallerGoal]:
-        """List the goals that the model no longer executes, though nobody else ended them."""
+        """List the goals that the model no longer executes, though no result has ended them."""
         failed = [number for number, goal in self._waiting_goals.items() if self._has_failed(goal)]
         return [self._waiting_goals.pop(number) for number in failed]
 

@@ -76,7 +76,7 @@ class Layer(Runner):
         self._callers = Callers(self._calls, self._goals)
         self._command_timeouts = CommandTimeouts(self._releases, self.settings.command_timeout_s)
 
-    # What comes from the existing controller.
+    # Data from the existing controller.
 
     @guarded
     def on_request(self, identifier: str, message: Any) -> None:
@@ -184,7 +184,7 @@ class Layer(Runner):
         if self._releases.is_acting(identifier):
             self._steps.release(identifier)
 
-    # What comes from the robot, and time.
+    # Data from the robot, and time.
 
     def receive(self, identifier: str, data: Any) -> None:
         """Take in a message of the robot as one batch, and pass it on."""
@@ -213,7 +213,8 @@ class Layer(Runner):
         for identifier in self._command_timeouts.silent(now):
             self._steps.release(identifier)
         super()._end_what_is_over(now)
-        # What is over ends for the caller before anything that comes at the same moment.
+        # Calls and goals that are over end for the caller before all that comes at the same
+        # moment.
         self._finish()
 
     def _take_reply(self, request_id: int, data: Any) -> None:

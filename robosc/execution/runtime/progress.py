@@ -189,7 +189,7 @@ class ProgressAccount:
     def expire(self, now_s: float) -> None:
         """Report each assumption that is owed for too long by now, once."""
         for number in self._owed():
-            # As the sum that is the deadline: their difference may be rounded to less.
+            # The sum is the deadline: their difference may be rounded to less.
             if now_s >= self._since_s[number] + self._timeout_s and not self._is_reported[number]:
                 self._is_reported[number] = True
                 self._recorder.owed(self._items[number], now_s - self._since_s[number])

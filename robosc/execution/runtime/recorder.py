@@ -140,6 +140,6 @@ class Recorder:
             try:
                 self._log.write({'time': self._clock.wall(), **entry})
             except Exception:
-                # Whatever a log does, it must not stop the robot's controller: counted, and the
-                # loop goes on.
+                # The log must never stop the robot's controller: the loss is counted, and the loop
+                # goes on.
                 self._lost += 1

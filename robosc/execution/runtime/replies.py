@@ -56,7 +56,7 @@ class Replies:
             self._steps.settle()
         for goal in self._goals.expired(now_s):
             if not goal.is_running:
-                # What another one's end led to has cancelled it.
+                # The end of another goal has led to a cancellation of this one.
                 continue
             goal.is_running = False
             self._steps.happen(goal.action + '.error', None, 'timeout')

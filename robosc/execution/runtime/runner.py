@@ -143,10 +143,10 @@ class Runner:
         self._is_started = False
         self._may_request = False
         self._now_s = 0.0
-        # Nothing that waits for time to pass is over before this reading of the clock.
+        # No deadline passes before this reading of the clock.
         self._deadline_s = 0.0
 
-    # What an adapter may ask.
+    # Properties for adapters.
 
     @property
     def status(self) -> Status:
@@ -392,7 +392,7 @@ class Runner:
                 self._deadline_s = self._next_deadline(self._now_s)
             self._update_may_request()
 
-    # What the deployments do in their own way.
+    # Methods that the deployments override.
 
     def _end_batch(self) -> None:
         """Silent steps after a batch."""

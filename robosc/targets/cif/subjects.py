@@ -149,7 +149,7 @@ class Reader:
             return TRUE
         type_ = self.type(source)
         if isinstance(type_, IntegerType):
-            return any_of(self._between(source, run, values, count, place) for run in runs)
+            return any_of(self._between(source, run, values, place) for run in runs)
         inside = [str(values[index]) for run in runs for index in run]
         outside = [str(values[index]) for index in range(count) if str(values[index]) not in set(inside)]
         if isinstance(type_, BooleanType):
@@ -168,7 +168,7 @@ class Reader:
             return all_of(negated(self.location(automaton, item, place)) for item in outside)
         return any_of(self.location(automaton, item, place) for item in inside)
 
-    def _between(self, source: Source, run: range, values: Sequence[Value | None], count: int, place: Place) -> Text:
+    def _between(self, source: Source, run: range, values: Sequence[Value | None], place: Place) -> Text:
         number = self.number(source, place)
         low, high = (Number((), int(values[index])) for index in (run[0], run[-1]))  # type: ignore[arg-type]
         if len(run) == 1:

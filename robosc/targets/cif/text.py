@@ -80,7 +80,7 @@ class Text:
         return self.text
 
     def within(self, level: Level) -> str:
-        """The text for a place that asks for `level`, in parentheses where it binds less tightly."""
+        """The text for a place that requires `level`, in parentheses where it binds less tightly."""
         return self.text if self.level >= level else f"({self.text})"
 
 
@@ -108,7 +108,7 @@ def _joined(parts: Iterable[Text], word: str, level: Level, neutral: Text, decis
                 kept.setdefault(item.text, item)
     if len(kept) < 2:
         return next(iter(kept.values()), neutral)
-    # A disjunction in a conjunction, or the reverse, stands in parentheses: nobody needs to know which binds first.
+    # A disjunction in a conjunction, or the reverse, stands in parentheses: readers need not know which binds first.
     texts = (item.within(Level.COMPARISON) for item in kept.values())
     return Text(f" {word} ".join(texts), level, tuple(kept.values()))
 

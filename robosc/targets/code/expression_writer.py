@@ -82,7 +82,7 @@ class ExpressionWriter(ABC):
     root: Type | None
     elements: tuple[tuple[Any, Type], ...]
 
-    # What the expressions read
+    # Reads of the expressions
 
     @property
     @abstractmethod
@@ -129,7 +129,7 @@ class ExpressionWriter(ABC):
     def _quantifier_code(self, expression: Quantifier) -> Code:
         """The code of a quantifier."""
 
-    # What the language offers
+    # Code that differs by language
 
     @abstractmethod
     def _kleene_call(self, function: str, *arguments: Code, sort: Sort = Sort.BOOLEAN) -> Code:
@@ -185,7 +185,7 @@ class ExpressionWriter(ABC):
 
     def received_type(self, path: Path) -> Type:
         """The type of received data of a path."""
-        assert self.root is not None  # noqa: S101  # There are paths only where data comes.
+        assert self.root is not None  # noqa: S101  # Paths exist only where data comes.
         return path_type(self.model, self.root, path)
 
     def _array(self, part: ArrayPart) -> tuple[Code, ArrayType]:

@@ -19,7 +19,7 @@ from robosc.targets.ros.topics import Topic, sent_paths, shapes_of
 MAXIMUM_STARTER = 100
 
 EVENT_LOG_FOLDER = "event_log"
-"""Folder of the event log if the user asked for it without a folder: in the folder that the node is started in."""
+"""Folder of the event log if the option names no folder: in the folder that the node is started in."""
 
 _DIAGNOSTICS = Interface("DiagnosticArray", "diagnostic_msgs")
 _RELEASED_TYPES = frozenset({"Twist", "TwistStamped"})

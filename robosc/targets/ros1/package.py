@@ -27,7 +27,7 @@ MIDDLEWARE = Middleware(
     remapped=remapped,
     require_names=_require_names,
     parts_of_actions=PARTS_OF_ACTIONS,
-    # In ROS 1 it is a parameter of the whole graph, read by the client library.
+    # The parameter is one of the whole graph in ROS 1, read by the client library.
     without=frozenset({USE_SIM_TIME}),
     script="script.py.j2",
 )

@@ -33,6 +33,6 @@ MIDDLEWARE = Middleware(
         "package.xml": "package.xml.j2",
         "src/node.cpp": "node.cpp.j2",
     },
-    # In ROS 1 it is a parameter of the whole graph, read by the client library.
+    # The parameter is one of the whole graph in ROS 1, read by the client library.
     without=frozenset({USE_SIM_TIME}),
 )

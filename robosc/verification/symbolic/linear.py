@@ -156,7 +156,7 @@ class Linear:
             greatest.append(greatest[-1] + max(weight, 0))
         least.reverse()
         greatest.reverse()
-        # What is left after each bit, then the nodes from the lowest bit up.
+        # The remainders after each bit, then the nodes from the lowest bit up.
         layers: list[dict[int, None]] = [{left: None}]
         for place, (_, weight) in enumerate(ordered):
             open_ = [item for item in layers[-1] if known(item, least[place], greatest[place]) is None]

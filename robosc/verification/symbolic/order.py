@@ -26,7 +26,7 @@ def place_order(system: System) -> tuple[int, ...]:
         for place in members:
             for other in members:
                 if other != place:
-                    # What ties many places together ties each two of them loosely.
+                    # A condition that ties many places together ties each two of them loosely.
                     weights[place][other] = weights[place].get(other, 0.0) + 1 / (len(members) - 1)
     return cuthill_mckee(weights)
 

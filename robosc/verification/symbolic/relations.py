@@ -208,7 +208,7 @@ class Relations:
             return self._written(expressions, whole, digits, kept)
 
         def in_range(value: Value) -> bool:
-            # As the meaning of systems has it, only integers can leave their range.
+            # Only integers can leave their range in the meaning of systems.
             return not isinstance(type_, IntegerType) or value in digits.values
 
         def result(value: Value | None) -> Any:

@@ -273,7 +273,7 @@ class Variables:
 
     def _possible_knowledge(self, group: Sequence[InputVariable]) -> Any:
         """Return the predicate that a combination of the data of an array can be known together."""
-        # With one value each, what remains of the choices is which are known.
+        # The choices with one value each differ in which data are known.
         single = [replace(item, type=IntegerType(0, 0)) for item in group]
         found = self.manager.false
         for data in valuations(single):
@@ -295,7 +295,7 @@ class Variables:
             branches = [made[child] for child in node.children]
             self.work.spend(len(branches))
             found = self._by_ranges(digits.names, node.starts, branches)
-            # In another order of variables a small diagram can become a large one; an honest one hardly does.
+            # Another order of variables can make a small diagram large; an honest one hardly does.
             if found.dag_size > 4 * len(made) * len(digits.names):
                 self.work.count(found)
             made.append(found)

@@ -130,7 +130,7 @@ def page_size_of(request: pb.ListJobsRequest) -> int:
 
 
 def page_token(last: JobRecord, chosen: JobFilter) -> str:
-    """Return the page token that asks for the jobs that follow a given one."""
+    """Return the token of the page of jobs that follow a given one."""
     return urlsafe_b64encode(_TOKEN.pack(last.created_us, bytes.fromhex(last.id), _digest(chosen))).decode()
 
 

@@ -173,7 +173,7 @@ class Scheduler:
             self.check(caller)
             return await self.work(place, task, limits, on_report)
         except WorkerLostError:
-            # With WORKERS_UNAVAILABLE the caller would retry the task that crashes workers.
+            # The caller would retry the task that crashes workers on WORKERS_UNAVAILABLE.
             return Failure(Reason.WORKER_DIED, "the worker process was lost more than once during this task")
         except WorkersError as error:
             raise _no_workers() from error
@@ -263,7 +263,7 @@ class Scheduler:
             place._begun_s = None
             self._running -= 1
             self._running_of[place.line] -= 1
-            self._running_of += Counter()  # Without those that are none.
+            self._running_of += Counter()  # The addition drops counts of zero.
             self._start_waiting()
             return
         line = self._ring.get(place.line)

@@ -1,7 +1,7 @@
 """Watchers of jobs; an idle watcher takes no time.
 
 A new state is passed on at once. Progress is passed on at a limited rate, since a worker reports it ten times a second:
-a thousand watchers of one job would take half of a processor for lines that nobody can read so fast.
+a thousand watchers of one job would take half of a processor for lines that people cannot read so fast.
 """
 
 import asyncio

@@ -149,7 +149,7 @@ def _check_parser() -> Parser:
 def check_config(argv: Sequence[str]) -> int:
     """Print whether a server could start with such settings; returns the exit status."""
     # The database's library takes longer to import than other commands take in all.
-    from robosc_server.operations.config_check import Grade, check_settings
+    from robosc_server.operations.config_check import CheckGrade, check_settings
 
     arguments = _check_parser().parse_args(argv)
     try:
@@ -162,7 +162,7 @@ def check_config(argv: Sequence[str]) -> int:
                 sys.stderr.write(f"robosc-server: {problem}\n")
         return 2
     findings = check_settings(settings)
-    is_ok = all(finding.grade is not Grade.ERROR for finding in findings)
+    is_ok = all(finding.grade is not CheckGrade.ERROR for finding in findings)
     if arguments.json:
         _print_json(
             {

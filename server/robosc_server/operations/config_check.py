@@ -53,7 +53,7 @@ _SOON_DAYS = 14
 _SOCKET_PATH_BYTES = 107
 
 
-class Grade(StrEnum):
+class CheckGrade(StrEnum):
     """Severity of a finding."""
 
     OK = "ok"
@@ -62,7 +62,7 @@ class Grade(StrEnum):
 
 
 @dataclass(frozen=True, slots=True)
-class Finding:
+class SettingCheck:
     """Finding about one part.
 
     Attributes:
@@ -72,13 +72,13 @@ class Finding:
     """
 
     part: str
-    grade: Grade
+    grade: CheckGrade
     message: str
 
 
-def check_settings(settings: Settings) -> tuple[Finding, ...]:
+def check_settings(settings: Settings) -> tuple[SettingCheck, ...]:
     """Return the findings about every part of the settings, in the order in which a server uses them."""
-    parts: dict[str, Callable[[Settings], Iterator[tuple[Grade, str]]]] = {
+    parts: dict[str, Callable[[Settings], Iterator[tuple[CheckGrade, str]]]] = {
         "listening": _listening,
         "certificates": _certificates,
         "tokens": _tokens,
@@ -89,14 +89,16 @@ def check_settings(settings: Settings) -> tuple[Finding, ...]:
         "metrics": _metrics,
         "tracing": _tracing,
     }
-    return tuple(Finding(part, grade, message) for part, look in parts.items() for grade, message in look(settings))
+    return tuple(
+        SettingCheck(part, grade, message) for part, look in parts.items() for grade, message in look(settings)
+    )
 
 
-def _listening(settings: Settings) -> Iterator[tuple[Grade, str]]:
+def _listening(settings: Settings) -> Iterator[tuple[CheckGrade, str]]:
     try:
         check_listening(settings.address, settings.security)
     except (SecurityError, ValueError) as error:
-        yield Grade.ERROR, str(error)
+        yield CheckGrade.ERROR, str(error)
         return
     if settings.socket is not None:
         yield _listenable(settings.socket.absolute())
@@ -105,35 +107,35 @@ def _listening(settings: Settings) -> Iterator[tuple[Grade, str]]:
     usable = usable_connections(settings.connections, settings.worker_processes, highest_descriptor_limit())
     if usable < settings.connections:
         yield (
-            Grade.WARNING,
+            CheckGrade.WARNING,
             f"the limit on open files permits {usable} connections and not {settings.connections}: raise it"
             " (LimitNOFILE, ulimit -n), or lower connections",
         )
     security = settings.security
     if security.tokens is None and security.client_ca is None and not is_loopback_host(settings.host):
-        yield Grade.WARNING, "every host that reaches the address may use the server: set tokens or client_ca"
+        yield CheckGrade.WARNING, "every host that reaches the address may use the server: set tokens or client_ca"
 
 
-def _listenable(path: Path) -> tuple[Grade, str]:
+def _listenable(path: Path) -> tuple[CheckGrade, str]:
     """Check whether a server could listen on a Unix socket now."""
     if len(os.fsencode(path)) > _SOCKET_PATH_BYTES:
-        return Grade.ERROR, f"{path}: the path of a Unix socket has at most {_SOCKET_PATH_BYTES} bytes"
+        return CheckGrade.ERROR, f"{path}: the path of a Unix socket has at most {_SOCKET_PATH_BYTES} bytes"
     if not path.parent.is_dir():
-        return Grade.ERROR, f"{path.parent} is not a folder"
+        return CheckGrade.ERROR, f"{path.parent} is not a folder"
     problem = _unwritable(path.parent)
     if problem is not None:
-        return Grade.ERROR, f"{path.parent} cannot be written: {problem}"
+        return CheckGrade.ERROR, f"{path.parent} cannot be written: {problem}"
     if path.exists() and not path.is_socket():
-        return Grade.ERROR, f"{path} is there, and no socket"
-    return Grade.OK, f"{path}"
+        return CheckGrade.ERROR, f"{path} is there, and no socket"
+    return CheckGrade.OK, f"{path}"
 
 
-def _bindable(host: str, port: int) -> tuple[Grade, str]:
+def _bindable(host: str, port: int) -> tuple[CheckGrade, str]:
     """Check whether a server could listen on a host and port now."""
     try:
         found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM, flags=socket.AI_PASSIVE)
     except (OSError, UnicodeError) as error:
-        return Grade.ERROR, f"{host}: {getattr(error, 'strerror', None) or 'no such name'}"
+        return CheckGrade.ERROR, f"{host}: {getattr(error, 'strerror', None) or 'no such name'}"
     family, kind, protocol, _, address = found[0]
     with contextlib.closing(socket.socket(family, kind, protocol)) as place:
         place.setsockopt(socket.SOL_SOCKET, socket.SO_REUSEADDR, 1)
@@ -141,91 +143,91 @@ def _bindable(host: str, port: int) -> tuple[Grade, str]:
             place.bind(address)
         except OSError as error:
             if error.errno == errno.EADDRINUSE:
-                return Grade.WARNING, f"{host}, port {port} is in use"
-            return Grade.ERROR, f"cannot listen on {host}, port {port}: {error.strerror}"
-    return Grade.OK, f"{host}, port {port or 'any that is free'}"
+                return CheckGrade.WARNING, f"{host}, port {port} is in use"
+            return CheckGrade.ERROR, f"cannot listen on {host}, port {port}: {error.strerror}"
+    return CheckGrade.OK, f"{host}, port {port or 'any that is free'}"
 
 
-def _certificates(settings: Settings) -> Iterator[tuple[Grade, str]]:
+def _certificates(settings: Settings) -> Iterator[tuple[CheckGrade, str]]:
     security = settings.security
     if security.certificate is None or security.key is None:
-        yield Grade.OK, "no TLS"
+        yield CheckGrade.OK, "no TLS"
         return
     try:
         check_files(settings.model_copy(update={"tokens": None}).security)
     except SecurityError as error:
-        yield Grade.ERROR, str(error)
+        yield CheckGrade.ERROR, str(error)
         return
     for file in (security.certificate, security.client_ca):
         if file is not None:
             yield _valid(file)
 
 
-def _valid(file: Path) -> tuple[Grade, str]:
+def _valid(file: Path) -> tuple[CheckGrade, str]:
     """Check whether the certificates of a file are valid today."""
     if importlib.util.find_spec("cryptography") is None:
-        return Grade.OK, f"{file}: usable; its expiry date can be checked only with the extra `signing`"
+        return CheckGrade.OK, f"{file}: usable; its expiry date can be checked only with the extra `signing`"
     from cryptography import x509
 
     try:
         certificates = x509.load_pem_x509_certificates(read(file))
     except ValueError as error:
-        return Grade.ERROR, f"{file}: {error}"
+        return CheckGrade.ERROR, f"{file}: {error}"
     now = datetime.datetime.now(datetime.UTC)
     begins = max(certificate.not_valid_before_utc for certificate in certificates)
     ends = min(certificate.not_valid_after_utc for certificate in certificates)
     if begins > now:
-        return Grade.ERROR, f"{file}: not valid before {begins:%Y-%m-%d %H:%M} UTC"
+        return CheckGrade.ERROR, f"{file}: not valid before {begins:%Y-%m-%d %H:%M} UTC"
     if ends <= now:
-        return Grade.ERROR, f"{file}: expired at {ends:%Y-%m-%d %H:%M} UTC; install a new certificate"
-    grade = Grade.WARNING if ends - now < datetime.timedelta(days=_SOON_DAYS) else Grade.OK
+        return CheckGrade.ERROR, f"{file}: expired at {ends:%Y-%m-%d %H:%M} UTC; install a new certificate"
+    grade = CheckGrade.WARNING if ends - now < datetime.timedelta(days=_SOON_DAYS) else CheckGrade.OK
     return grade, f"{file}: valid until {ends:%Y-%m-%d %H:%M} UTC"
 
 
-def _tokens(settings: Settings) -> Iterator[tuple[Grade, str]]:
+def _tokens(settings: Settings) -> Iterator[tuple[CheckGrade, str]]:
     if settings.forwarded_identity:
-        yield Grade.OK, "a proxy names callers and their scopes"
+        yield CheckGrade.OK, "a proxy names callers and their scopes"
         return
     if settings.tokens is None:
-        yield Grade.OK, "callers need no token"
+        yield CheckGrade.OK, "callers need no token"
         return
     try:
         entries = TokenFile(settings.tokens).entries
     except SecurityError as error:
-        yield Grade.ERROR, str(error)
+        yield CheckGrade.ERROR, str(error)
         return
     now_s = wall_clock_s()
     valid = [entry for entry in entries if entry.is_valid(now_s)]
     problem = missing_scope(valid, Scope.SYNTHESIZE)
     useful = sum(Scope.SYNTHESIZE in entry.scopes for entry in valid)
     if problem is not None:
-        yield Grade.WARNING, f"{settings.tokens}: {problem}"
+        yield CheckGrade.WARNING, f"{settings.tokens}: {problem}"
     else:
-        yield Grade.OK, f"{settings.tokens}: tokens with the scope '{Scope.SYNTHESIZE}': {useful}"
+        yield CheckGrade.OK, f"{settings.tokens}: tokens with the scope '{Scope.SYNTHESIZE}': {useful}"
     for entry in entries:
         if entry.expires_s is None or entry.is_valid(now_s + SOON_S):
             continue
         verb = "expires" if entry.is_valid(now_s) else "has expired"
         words = f"{settings.tokens}: the token {entry.id} of '{entry.name}' {verb} at {time_text(entry.expires_s)}"
         if lasting_longer(entry, entries) is None:
-            yield Grade.WARNING, f"{words}: robosc-server tokens rotate {settings.tokens} {entry.name}"
+            yield CheckGrade.WARNING, f"{words}: robosc-server tokens rotate {settings.tokens} {entry.name}"
         else:
-            yield Grade.OK, f"{words}; another one replaces it"
+            yield CheckGrade.OK, f"{words}; another one replaces it"
 
 
-def _signing(settings: Settings) -> Iterator[tuple[Grade, str]]:
+def _signing(settings: Settings) -> Iterator[tuple[CheckGrade, str]]:
     if settings.signing_key is None:
-        yield Grade.OK, "supervisors are not signed"
+        yield CheckGrade.OK, "supervisors are not signed"
         return
     try:
         read_signing_key(settings.signing_key)
     except SigningError as error:
-        yield Grade.ERROR, str(error)
+        yield CheckGrade.ERROR, str(error)
     else:
-        yield Grade.OK, f"{settings.signing_key}"
+        yield CheckGrade.OK, f"{settings.signing_key}"
 
 
-def _database(settings: Settings) -> Iterator[tuple[Grade, str]]:
+def _database(settings: Settings) -> Iterator[tuple[CheckGrade, str]]:
     url = settings.database_url
     if url is None:
         yield _sqlite(settings.state_dir.absolute() / DATABASE_FILE)
@@ -236,7 +238,7 @@ def _database(settings: Settings) -> Iterator[tuple[Grade, str]]:
         yield from _unverified(url)
 
 
-def _unverified(text: str) -> Iterator[tuple[Grade, str]]:
+def _unverified(text: str) -> Iterator[tuple[CheckGrade, str]]:
     """Warn of a database on another machine whose certificate and name are not checked."""
     with contextlib.suppress(ArgumentError, ValueError):
         url = make_url(text)
@@ -244,7 +246,7 @@ def _unverified(text: str) -> Iterator[tuple[Grade, str]]:
         is_far = any(not is_loopback_host(host.rpartition(":")[0] or host) for host in hosts)
         if is_far and _words(url.query.get("sslmode")) != ["verify-full"]:
             yield (
-                Grade.WARNING,
+                CheckGrade.WARNING,
                 "whoever is on the way to the database can read and change jobs: add ?sslmode=verify-full to"
                 " database_url (and sslrootcert)",
             )
@@ -254,18 +256,18 @@ def _words(value: str | tuple[str, ...] | None) -> list[str]:
     return [] if value is None else [value] if isinstance(value, str) else list(value)
 
 
-def _postgresql(text: str) -> tuple[Grade, str]:
+def _postgresql(text: str) -> tuple[CheckGrade, str]:
     try:
         url = make_url(text)
         name = url.render_as_string(hide_password=True)
         server, version = inspect_postgresql(url, _CONNECT_S)
     except (ArgumentError, ValueError):
-        return Grade.ERROR, "database_url must have the form postgresql://USER:PASSWORD@HOST:PORT/NAME"
+        return CheckGrade.ERROR, "database_url must have the form postgresql://USER:PASSWORD@HOST:PORT/NAME"
     except (ImportError, NoSuchModuleError):
-        return Grade.ERROR, "PostgreSQL needs the extra `postgresql`: pip install 'robosc[postgresql]'"
+        return CheckGrade.ERROR, "PostgreSQL needs the extra `postgresql`: pip install 'robosc[postgresql]'"
     except StoreError as error:
-        return Grade.ERROR, f"{name}: {error}"
-    return Grade.OK, f"{name}: PostgreSQL {server}{_migration(version)}"
+        return CheckGrade.ERROR, f"{name}: {error}"
+    return CheckGrade.OK, f"{name}: PostgreSQL {server}{_migration(version)}"
 
 
 def _migration(version: int | None) -> str:
@@ -276,23 +278,23 @@ def _migration(version: int | None) -> str:
     return f"; the next start migrates the tables from schema version {version} to {latest}"
 
 
-def _sqlite(file: Path) -> tuple[Grade, str]:
+def _sqlite(file: Path) -> tuple[CheckGrade, str]:
     """Check whether the file can be used, or made."""
     folder = file.parent
     try:
         there = next(place for place in (folder, *folder.parents) if place.exists())
         if not there.is_dir():
-            return Grade.ERROR, f"{there} is not a folder"
+            return CheckGrade.ERROR, f"{there} is not a folder"
         problem = _unwritable(there)
         if problem is not None:
-            return Grade.ERROR, f"{there} cannot be written: {problem}"
+            return CheckGrade.ERROR, f"{there} cannot be written: {problem}"
         is_there = file.exists()
         version = inspect_sqlite(file) if is_there else None
         if is_in_use(file):
-            return Grade.WARNING, f"{file} is in use by another robosc-server"
+            return CheckGrade.WARNING, f"{file} is in use by another robosc-server"
     except (OSError, StoreError) as error:
-        return Grade.ERROR, f"{file}: {getattr(error, 'strerror', None) or error}"
-    return Grade.OK, f"SQLite in {file}{_migration(version)}" if is_there else f"{file} will be created"
+        return CheckGrade.ERROR, f"{file}: {getattr(error, 'strerror', None) or error}"
+    return CheckGrade.OK, f"SQLite in {file}{_migration(version)}" if is_there else f"{file} will be created"
 
 
 def _unwritable(folder: Path) -> str | None:
@@ -314,12 +316,12 @@ def _unwritable(folder: Path) -> str | None:
     return None
 
 
-def _workers(settings: Settings) -> Iterator[tuple[Grade, str]]:
+def _workers(settings: Settings) -> Iterator[tuple[CheckGrade, str]]:
     if settings.workers != "local":
         try:
             check_cluster(settings.workers, is_insecure_allowed=settings.insecure_workers_beyond_loopback)
         except WorkersError as error:
-            yield Grade.ERROR, str(error)
+            yield CheckGrade.ERROR, str(error)
             return
         yield _cluster(settings.workers)
         return
@@ -328,18 +330,18 @@ def _workers(settings: Settings) -> Iterator[tuple[Grade, str]]:
     if wanted > there:
         size = format_value("task_memory_bytes", settings.task_memory_bytes)
         yield (
-            Grade.WARNING,
+            CheckGrade.WARNING,
             f"{settings.worker_processes} worker processes with {size} each may exceed the memory of this machine: "
             "lower worker_processes or task_memory_bytes",
         )
     else:
-        yield Grade.OK, f"{settings.worker_processes} local processes"
+        yield CheckGrade.OK, f"{settings.worker_processes} local processes"
 
 
-def _confinement(settings: Settings) -> Iterator[tuple[Grade, str]]:
+def _confinement(settings: Settings) -> Iterator[tuple[CheckGrade, str]]:
     """Check what the kernel keeps workers from, in a process of its own: confinement cannot be undone."""
     if settings.workers != "local":
-        yield Grade.OK, "each machine of the cluster confines its own workers"
+        yield CheckGrade.OK, "each machine of the cluster confines its own workers"
         return
     environment = os.environ | {"PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     try:
@@ -353,16 +355,16 @@ def _confinement(settings: Settings) -> Iterator[tuple[Grade, str]]:
         missing = json.loads(probe.stdout)
     except (OSError, subprocess.SubprocessError, ValueError):
         missing = ["the confinement test could not be run"]
-    grade = Grade.ERROR if settings.confinement is Confinement.REQUIRED else Grade.WARNING
+    grade = CheckGrade.ERROR if settings.confinement is Confinement.REQUIRED else CheckGrade.WARNING
     for part in missing:
         yield grade, part
     if not missing:
-        yield Grade.OK, "workers can access only program files, no network and no other process"
+        yield CheckGrade.OK, "workers can access only program files, no network and no other process"
 
 
-def _cluster(spec: str) -> tuple[Grade, str]:
+def _cluster(spec: str) -> tuple[CheckGrade, str]:
     if importlib.util.find_spec("distributed") is None:
-        return Grade.ERROR, "a Dask cluster needs the extra `dask`: pip install 'robosc[dask]'"
+        return CheckGrade.ERROR, "a Dask cluster needs the extra `dask`: pip install 'robosc[dask]'"
     protocol, _, rest = spec.partition("://")
     address = rest.rstrip("/")
     error = _unreachable(address)
@@ -371,7 +373,7 @@ def _cluster(spec: str) -> tuple[Grade, str]:
 
         fault = asyncio.run(tls_fault(*split_address(address), _CONNECT_S))
         error = None if fault is None else f"{address}: {fault}"
-    return (Grade.OK, f"{address} answers") if error is None else (Grade.ERROR, error)
+    return (CheckGrade.OK, f"{address} answers") if error is None else (CheckGrade.ERROR, error)
 
 
 def _unreachable(address: str) -> str | None:
@@ -383,33 +385,33 @@ def _unreachable(address: str) -> str | None:
     return None
 
 
-def _metrics(settings: Settings) -> Iterator[tuple[Grade, str]]:
+def _metrics(settings: Settings) -> Iterator[tuple[CheckGrade, str]]:
     if settings.metrics_address is None:
-        yield Grade.OK, "disabled"
+        yield CheckGrade.OK, "disabled"
         return
     try:
         check_metrics_address(settings.metrics_address, beyond_loopback=settings.metrics_beyond_loopback)
     except SecurityError as error:
-        yield Grade.ERROR, str(error)
+        yield CheckGrade.ERROR, str(error)
         return
     yield _bindable(*split_address(settings.metrics_address))
 
 
-def _tracing(settings: Settings) -> Iterator[tuple[Grade, str]]:
+def _tracing(settings: Settings) -> Iterator[tuple[CheckGrade, str]]:
     endpoint = settings.tracing_endpoint
     if endpoint is None:
-        yield Grade.OK, "disabled"
+        yield CheckGrade.OK, "disabled"
         return
     try:
         is_there = importlib.util.find_spec("opentelemetry.exporter.otlp.proto.grpc") is not None
     except ImportError:
         is_there = False
     if not is_there:
-        yield Grade.ERROR, "traces need the extra `tracing`: pip install 'robosc[tracing]'"
+        yield CheckGrade.ERROR, "traces need the extra `tracing`: pip install 'robosc[tracing]'"
         return
     scheme, _, address = endpoint.partition("://")
     if scheme == "http" and not is_loopback_host(split_address(address.rstrip("/"))[0]):
-        yield Grade.WARNING, f"{endpoint}: traces, with the names of callers, can be read on the way: use https"
+        yield CheckGrade.WARNING, f"{endpoint}: traces, with the names of callers, can be read on the way: use https"
     error = _unreachable(address.rstrip("/"))
     # A server works without who takes its traces.
-    yield (Grade.OK, endpoint) if error is None else (Grade.WARNING, error)
+    yield (CheckGrade.OK, endpoint) if error is None else (CheckGrade.WARNING, error)

@@ -9,7 +9,7 @@ _RESERVED_PER_WORKER = 8
 """Descriptors for the pipes of one worker process."""
 
 _MOST = 65_536
-"""Limit that is asked for: some systems have no other, and some programs go through all descriptors."""
+"""Limit that the server sets: some systems have no other, and some programs go through all descriptors."""
 
 _FEWEST_CONNECTIONS = 16
 

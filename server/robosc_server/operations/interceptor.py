@@ -13,9 +13,10 @@ import structlog
 
 from robosc_api.failures import reason_of
 from robosc_api.layers import Layer, behaviour_of, with_behaviour, writing
+from robosc_api.peers import peer_of
 from robosc_api.security import CALLER
 from robosc_api.security.host_sample import HostSample
-from robosc_server.clock import monotonic
+from robosc_server.clock import running_clock
 from robosc_server.operations.failures import abort, code_of, fault_message
 from robosc_server.operations.logs import REQUEST_ID, REQUEST_ID_HEADER, log_fault, request_id_of
 from robosc_server.operations.metrics import MethodMetrics, Metrics
@@ -86,8 +87,8 @@ class CallInterceptor(Layer):
             inner = self._traced(inner, method)
 
         async def measured(request: Any, context: Any) -> Any:
-            begun_s = monotonic()
-            given_s = context.time_remaining()
+            clock = running_clock()
+            begun_s = clock()
             metrics.under_way += 1
             code = _OK
             try:
@@ -104,7 +105,7 @@ class CallInterceptor(Layer):
                 code = code_of(error.reason)
                 await abort(context, error)
             except asyncio.CancelledError:
-                code = _DEADLINE_EXCEEDED if _is_at_its_deadline(context, given_s) else _CANCELLED
+                code = _DEADLINE_EXCEEDED if _is_at_its_deadline(context, clock() - begun_s) else _CANCELLED
                 raise
             except grpc.aio.InternalError:
                 # gRPC raises this when the caller has gone.
@@ -115,7 +116,7 @@ class CallInterceptor(Layer):
                 await abort(context, internal_error(error))
             finally:
                 metrics.under_way -= 1
-                self._ended(method, metrics, context, code, monotonic() - begun_s)
+                self._ended(method, metrics, context, code, clock() - begun_s)
 
         return measured
 
@@ -138,9 +139,9 @@ class CallInterceptor(Layer):
             if code in _FAULTS:
                 level = logging.WARNING
         metrics.ended(code, reason, seconds)
-        peer, skipped = context.peer(), None
+        skipped = None
         if code is grpc.StatusCode.UNAUTHENTICATED:
-            skipped = self._refusals.take(peer)
+            skipped = self._refusals.take(peer_of(context))
             if skipped is None:
                 level = logging.DEBUG
         if method.startswith(_HEALTH):
@@ -155,7 +156,7 @@ class CallInterceptor(Layer):
             words["caller"] = caller
         if skipped:
             words["skipped"] = skipped
-        self._log.log(level, "call", **words, peer=peer)
+        self._log.log(level, "call", **words, peer=peer_of(context))
 
 
 _OK, _CANCELLED, _DEADLINE_EXCEEDED = (
@@ -167,7 +168,7 @@ _FAULTS = frozenset({grpc.StatusCode.INTERNAL, grpc.StatusCode.UNKNOWN, grpc.Sta
 _CODES = {code.value[0]: code for code in grpc.StatusCode}
 
 
-def _is_at_its_deadline(context: Any, given_s: float | None) -> bool:
+def _is_at_its_deadline(context: Any, taken_s: float) -> bool:
     """Return True if a call was cancelled because its deadline has passed, by our timer or by its caller's.
 
     Both count from when they knew of the call, and a deadline goes over the line in units of up to a hundredth of it,
@@ -176,11 +177,12 @@ def _is_at_its_deadline(context: Any, given_s: float | None) -> bool:
 
     Args:
         context: Context of the call.
-        given_s: Time that was left when the call began, in seconds; None: it has no deadline.
+        taken_s: Time that the call has taken, in seconds.
     """
-    if given_s is None:
-        return False
-    left_s: float = context.time_remaining()
+    left_s: float | None = context.time_remaining()
+    if left_s is None:
+        return False  # It has no deadline.
+    given_s = taken_s + left_s
     return left_s <= min(_ON_THE_WAY_S + _ROUNDED * given_s, given_s / 2)
 
 

@@ -47,7 +47,7 @@ _REQUEST_ID_FORM = re.compile(r"[A-Za-z0-9._:/+=@-]{1,128}\Z")
 
 
 class _RandomIds:
-    """Source of random ids, which asks the system for many at once: a call of the kernel for each takes longer.
+    """Source of random ids, which takes many at once from the system: a call of the kernel for each takes longer.
 
     The process that has it does not fork: a fork would give out the same ids.
     """

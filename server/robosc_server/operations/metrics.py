@@ -24,6 +24,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Histo
 from prometheus_client.registry import Collector
 from prometheus_client.utils import floatToGoString
 
+from robosc_api.connection_watch import CloseReason
 from robosc_api.metrics_server import MetricsServer
 from robosc_api.security import SecurityError, is_loopback_host, joined
 from robosc_api.security.addresses import split_address
@@ -128,6 +129,7 @@ class Metrics:
         self._conditions: Callable[[], Mapping[str, bool]] = dict
         self._restarts: Callable[[], int] = _zero
         self._expiries: Callable[[], Mapping[str, float]] = dict
+        self._closed: Callable[[], Mapping[CloseReason, int]] = lambda: dict.fromkeys(CloseReason, 0)
         Gauge("robosc_server_tasks_waiting", "Tasks waiting for a worker.", registry=registry).set_function(
             lambda: self._waiting()
         )
@@ -191,6 +193,7 @@ class Metrics:
         conditions: Callable[[], Mapping[str, bool]] | None = None,
         restarts: Callable[[], int] | None = None,
         expiries: Callable[[], Mapping[str, float]] | None = None,
+        closed: Callable[[], Mapping[CloseReason, int]] | None = None,
     ) -> None:
         """Set the functions that are called for each request for metrics, on the event loop: they must be quick.
 
@@ -201,6 +204,7 @@ class Metrics:
             conditions: Conditions that the service needs, and whether they hold.
             restarts: Number of times that the process that starts workers had to be started again.
             expiries: Seconds until tokens expire, by id of the token.
+            closed: Number of connections that the server has closed, by reason.
         """
         self._waiting = waiting or self._waiting
         self._running = running or self._running
@@ -208,6 +212,7 @@ class Metrics:
         self._conditions = conditions or self._conditions
         self._restarts = restarts or self._restarts
         self._expiries = expiries or self._expiries
+        self._closed = closed or self._closed
 
     def labelled_metrics(self) -> Iterable[Metric]:
         """Return the metrics that have labels and values that are computed on request."""
@@ -243,7 +248,14 @@ class Metrics:
         )
         for token, remaining_s in sorted(self._expiries().items()):
             expiries.add_metric((token,), remaining_s)
-        return calls, seconds, lookups, jobs, conditions, restarts, expiries
+        closed = CounterMetricFamily(
+            "robosc_server_connections_closed",
+            "Connections that the server has closed because they cost more than their calls explain, by reason.",
+            labels=("reason",),
+        )
+        for reason, number in self._closed().items():
+            closed.add_metric((reason.name.lower(),), number)
+        return calls, seconds, lookups, jobs, conditions, restarts, expiries, closed
 
     def collector(self, loop: asyncio.AbstractEventLoop) -> Collector:
         """Return a collector of all metrics for other threads, which collects them on the event loop."""
@@ -270,7 +282,7 @@ class _LabelledCollector:
 
 
 class _OnLoop(Collector):
-    """Collector that asks a registry on the event loop, for the threads of the endpoint.
+    """Collector that reads a registry on the event loop, for the threads of the endpoint.
 
     Args:
         registry: Registry of the metrics, or a part of one.
@@ -353,9 +365,3 @@ def check_metrics_address(address: str, *, beyond_loopback: bool) -> None:
             f"{address} is reachable from other machines, and metrics need no token: set metrics_beyond_loopback to "
             "allow this, or use a loopback address"
         )
-
-
-def metric_names() -> frozenset[str]:
-    """Return the names of all metrics, for dashboards and alerts."""
-    found: Any = Metrics("")._registry.collect()
-    return frozenset(metric.name for metric in found)

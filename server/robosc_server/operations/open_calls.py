@@ -6,7 +6,8 @@ from functools import partial
 from typing import Any
 
 from robosc_api.connection_watch import Arrivals, is_health_check
-from robosc_api.layers import Layer, behaviour_of, with_behaviour
+from robosc_api.layers import Layer, behaviour_of, when_call_ends, with_behaviour
+from robosc_api.peers import peer_of
 from robosc_api.security import ENTRY, caller_of, is_loopback_peer, network_of
 from robosc_server.tasks.task import Reason, RefusedError
 
@@ -76,7 +77,7 @@ class OpenCalls(Layer):
             return behaviour(request, context)
 
         def counted_health_check(request: Any, context: Any) -> Any:
-            is_own = is_loopback_peer(context.peer())
+            is_own = is_loopback_peer(peer_of(context))
             slots = self._own_health_slots if is_own else self._health_slots
             slots.take(network_of(identify(context)), context)
             return behaviour(request, context)
@@ -89,7 +90,7 @@ class _CallSlots:
 
     Args:
         limits: Limits on the calls.
-        arrivals: Layer that is told of each call.
+        arrivals: Layer that is notified of each call.
         are_checks: True if the calls are health checks.
 
     Attributes:
@@ -111,7 +112,7 @@ class _CallSlots:
         Raises:
             RefusedError: There is no slot for this caller; none is taken.
         """
-        peer = context.peer()
+        peer = peer_of(context)
         count = self._by_caller.get(caller, 0)
         entry = ENTRY.get()
         limit = self._limits.per_caller if entry is None or entry.quota.calls is None else entry.quota.calls
@@ -126,15 +127,15 @@ class _CallSlots:
             )
         self._by_caller[caller] = count + 1
         self.taken += 1
-        # The call has now ended for gRPC as well: an unread response keeps it open after the handler has returned.
+        # An unread response keeps the call open after the handler has returned.
         self._arrivals.begun(peer)
-        context.add_done_callback(partial(self._release, caller, peer))
+        when_call_ends(partial(self._release, caller, peer))
 
     def _refused(self, peer: str) -> None:
         if not self._are_checks:
             self._arrivals.refused(peer)
 
-    def _release(self, caller: str, peer: str, context: Any) -> None:
+    def _release(self, caller: str, peer: str, task: Any) -> None:
         self._arrivals.ended(peer, is_check=self._are_checks)
         self.taken -= 1
         left = self._by_caller[caller] - 1

@@ -74,6 +74,8 @@ class Quotas:
         Raises:
             RefusedError: The quota is used up; nothing is counted.
         """
+        if self._tokens is None:
+            return
         account = self._account(caller)
         if account is None:
             return

@@ -1,4 +1,4 @@
-"""Example file of all settings, with descriptions and defaults as comments, and the tables of the manual."""
+"""Example file of all settings, with descriptions and defaults as comments."""
 
 import json
 import textwrap
@@ -10,10 +10,8 @@ from robosc_server.operations.settings import (
     Settings,
     default_text,
     description_of,
-    flag_of,
     format_value,
     group_of,
-    variable_of,
 )
 
 _WIDTH = 100
@@ -65,18 +63,3 @@ def _is_number(text: str) -> bool:
     except ValueError:
         return False
     return True
-
-
-def settings_table() -> str:
-    """Return the settings for the manual: a table in Markdown for each group."""
-    parts = []
-    for group in dict.fromkeys(map(group_of, Settings.model_fields)):
-        rows = ["| flag | file | environment | what it is | default |", "|---|---|---|---|---|"]
-        for name in Settings.model_fields:
-            if group_of(name) == group:
-                cells = (f"`{flag_of(name)}`", f"`{name}`", f"`{variable_of(name)}`", description_of(name))
-                rows.append(
-                    f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} | {default_text(name)} |"
-                )
-        parts.append(f"### {group[0].upper()}{group[1:]}\n\n" + "\n".join(rows) + "\n")
-    return "\n".join(parts)

@@ -34,7 +34,7 @@ class ShutdownSignals:
         self._limit_s = drain_s + end_s
         self._is_requested = asyncio.Event()
         self._interrupts = 0
-        # Without standard error, the traceback is lost, but the process still exits.
+        # The process exits without standard error, too, but its traceback is lost.
         self._stderr = sys.__stderr__ or os.open(os.devnull, os.O_WRONLY)
 
     def listen(self) -> None:

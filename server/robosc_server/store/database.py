@@ -214,7 +214,7 @@ class Database:
 
     def _note_failure(self, error: Exception, *, is_write: bool) -> None:
         if self.is_available:
-            # Without the parameters of the statement, which come from a caller.
+            # The parameters of the statement come from a caller and are left out.
             reason = error.orig if isinstance(error, DBAPIError) else type(error).__name__
             _log.error("the database is unavailable: %s", reason)
         self._is_failing[is_write] = True
@@ -224,7 +224,7 @@ class Database:
     def _note_success(self, *, is_write: bool) -> None:
         if self.is_available:
             return
-        # What can be changed can be read.
+        # A database that can be changed can be read.
         self._is_failing = {False: False, True: self._is_failing[True] and not is_write}
         if self.is_available:
             _log.warning("the database is available again")

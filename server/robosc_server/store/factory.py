@@ -146,7 +146,7 @@ def _set_up_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
     cursor = connection.cursor()
     cursor.execute(f"PRAGMA busy_timeout = {round(_BUSY_S * 1000)}")
     # Before there is any table. Later it changes nothing, but is a transaction that writes all the same: a reader's
-    # connection could not be made while the disk is full, or while somebody else writes.
+    # connection could not be made while the disk is full, or while another connection writes.
     if cursor.execute("PRAGMA auto_vacuum").fetchone() != (_INCREMENTAL,):
         cursor.execute(f"PRAGMA auto_vacuum = {_INCREMENTAL}")
     for setting in (

@@ -5,7 +5,7 @@ import errno
 from google.protobuf.message import DecodeError, EncodeError
 
 _PROBE_BYTES = 2**20
-"""Bytes that are asked for to find out whether there is memory left."""
+"""Size of an allocation that tests whether memory is left."""
 
 
 def is_lack_of_memory(error: BaseException) -> bool:

@@ -8,7 +8,7 @@ name. No stage of the core is imported.
 import hashlib
 from collections import OrderedDict
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.metadata import entry_points, version
 from typing import Any
@@ -20,7 +20,7 @@ from robosc.dd_modules import has_cudd
 from robosc.source import visible
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.fields import Nested, has_few_fields, nested_of
-from robosc_server.tasks.task import Reason, RefusedError, Task, TaskKind
+from robosc_server.tasks.task import Reason, RefusedError, Task, TaskKind, own_key
 
 NOT_A_MESSAGE = "the request is not a valid message of this service"
 
@@ -141,33 +141,36 @@ def accept_request(kind: TaskKind, request: bytes, limits: RequestLimits) -> Tas
 
 
 class RequestCache:
-    """Cache of accepted requests by their bytes, since clients often repeat a request.
+    """Cache of accepted requests by their caller and bytes, since clients often repeat a request.
 
     Args:
-        limits: Limits of a request.
+        limits: Limits of a request; they and the versions of what makes results never change in one process.
+        keys: Function that returns the key of a caller's task, from the key of the task and the caller.
     """
 
-    def __init__(self, limits: RequestLimits) -> None:
-        self._limits = limits
-        self._tasks: OrderedDict[tuple[TaskKind, bytes], Task] = OrderedDict()
+    def __init__(self, limits: RequestLimits, keys: Callable[[str, str], str] = own_key) -> None:
+        self._limits, self._keys = limits, keys
+        self._tasks: OrderedDict[tuple[TaskKind, str, bytes], Task] = OrderedDict()
         self._bytes = 0
 
-    def accept(self, kind: TaskKind, request: bytes) -> Task:
-        """Return the task of a request; see `accept_request`.
+    def accept(self, kind: TaskKind, caller: str, request: bytes) -> Task:
+        """Return the task of a request under the key of its caller; see `accept_request`.
 
         Raises:
             RefusedError: The request is invalid.
         """
-        known = self._tasks.get((kind, request))
+        place = kind, caller, request
+        known = self._tasks.get(place)
         if known is not None:
-            self._tasks.move_to_end((kind, request))
+            self._tasks.move_to_end(place)
             return known
         task = accept_request(kind, request, self._limits)
+        task = replace(task, key=self._keys(task.key, caller))
         if len(request) <= _REMEMBERED_BYTES:
-            self._tasks[kind, request] = task
+            self._tasks[place] = task
             self._bytes += len(request) + _ENTRY_BYTES
             while self._bytes > _ALL_REMEMBERED_BYTES:
-                (_, oldest), _ = self._tasks.popitem(last=False)
+                (_, _, oldest), _ = self._tasks.popitem(last=False)
                 self._bytes -= len(oldest) + _ENTRY_BYTES
         return task
 
@@ -178,7 +181,7 @@ def _producer_versions() -> tuple[str, ...]:
 
     It is this distribution, the diagrams, and those distributions whose targets and engines it uses.
     """
-    # Without dd's extension the engine `auto` is another one.
+    # The engine `auto` is another one without dd's extension.
     diagrams = f"dd {version('dd')} {'with' if has_cudd() else 'without'} cudd"
     dists = [point.dist for group in _PLUGINS for point in entry_points(group=group)]
     others = {f"{dist.name} {dist.version}" for dist in dists if dist is not None and dist.name != "robosc"}
@@ -428,7 +431,7 @@ def _verify(message: Any, reader: _RequestReader) -> object:
     deployment, engine, _, *rest, made_states = reader.options(message.options, deployment=unsaid)
     return (
         bundle,
-        # Where one is given, none is made.
+        # A given supervisor needs no synthesis.
         (deployment, engine, rest, None if is_given else made_states),
         reader.content(message.supervisor) if is_given else None,
         [reader.text(text) for text in message.properties],

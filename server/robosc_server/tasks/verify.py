@@ -56,7 +56,7 @@ def verification(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnRep
 
 
 def _verify_given(request: pb.VerifyRequest, maximum_nodes: int, on_report: OnReport) -> pb.VerificationResult:
-    """Verify the given supervisor; if it is right, and only if asked for, verify its robot's properties."""
+    """Verify the given supervisor; if it is right, verify the given properties of its robot, too."""
     engine = resolve_engine(from_proto.engine_name(request.options))
     try:
         supervisor = decode(request.supervisor)

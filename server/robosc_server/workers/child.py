@@ -91,7 +91,7 @@ def _send(connection: socket.socket, outcome: Outcome, limits: TaskLimits) -> No
         size = sum(map(len, messages))
         if size <= limits.result_bytes and len(messages) <= MESSAGES_LIMIT:
             if size <= _SMALL_BYTES:
-                # In one piece, since the server wakes up for each.
+                # One piece wakes up the server once.
                 connection.sendall(b"".join([*(frame(Tag.MESSAGE, message) for message in messages), _RESULT_END]))
                 return
             for message in messages:

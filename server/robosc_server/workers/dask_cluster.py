@@ -25,7 +25,7 @@ CONNECT_S = 5.0
 """Time limit of one attempt to connect to the scheduler, in seconds."""
 
 POLL_S = 0.5
-"""Period at which the cluster is asked for its workers, in seconds."""
+"""Period at which the workers of the cluster are listed, in seconds."""
 
 _TLS = "tls://"
 _ATTEMPTS = 2

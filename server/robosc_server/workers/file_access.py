@@ -19,7 +19,7 @@ _PATH_BENEATH = 1
 _READ_FILE, _READ_FOLDER = 1 << 2, 1 << 3
 # By version of Landlock, the kinds of access to files that it knows: each version the ones before and its own.
 _FILE_ACCESSES = {1: (1 << 13) - 1, 2: (1 << 14) - 1, 3: (1 << 15) - 1, 5: (1 << 16) - 1}
-_NETWORK_FROM, _NETWORK_ACCESSES = 4, 0b11  # To listen, to connect.
+_NETWORK_FROM, _NETWORK_ACCESSES = 4, 0b11  # The accesses to listen and to connect.
 _SCOPES_FROM, _SCOPES = 6, 0b11  # Sockets without a file, and signals, of processes outside.
 
 

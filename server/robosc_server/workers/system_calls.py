@@ -189,7 +189,7 @@ def _conditions(pid: int) -> dict[str, list[_Instruction]]:
             ),
         ],
         "mprotect": [_argument(2), *_if_any_bit(_MAY_EXECUTE, [refused])],
-        # To its connection alone, and not to an address.
+        # The target may write to its connection alone, and to no address.
         "sendto": [_argument(4), *_unless_equal(0, refused), _argument(4, 4), *_unless_equal(0, refused)],
     }
 

@@ -54,7 +54,7 @@ def _percentile(samples_s: list[float], percent: int) -> str:
 
 
 def _waiting_share(path: str) -> float:
-    """Share of a processor that waiting for an answer takes; nobody has the id that is asked."""
+    """Share of a processor that waiting for an answer takes; no device has the id of the request."""
     with SerialLine(path, 1_000_000) as line:
         bus = DynamixelBus(line, str, WAIT_S)
         bus.begin(WAIT_S, repeats=0)
@@ -86,7 +86,7 @@ def _row(name: str) -> list[str]:
         begin_cpu_s, begin_s = time.thread_time(), time.perf_counter()
         for index in range(EXCHANGES):
             commanded_s.clear()
-            # To and fro on the spot: walls would change nothing, but it should not meet one.
+            # The robot turns to and fro on the spot: walls would change nothing, but it should not meet one.
             before_s = time.perf_counter()
             base.exchange(Velocity(0.0, 0.5 if index % 100 < 50 else -0.5))
             exchanges_s.append(time.perf_counter() - before_s)

@@ -32,7 +32,7 @@ AIM_MS = 150.0
 KEPT_S = 1.0
 """A state that lasts so long is seen at last."""
 
-# In the browser: when the row of each entry was painted first, and each change of a component's state.
+# Times in the browser: the first paint of each entry's row, and each change of a component's state.
 WATCH = """() => {
   window.rowsMs = {};
   window.statesMs = [];

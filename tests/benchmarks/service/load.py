@@ -1,7 +1,8 @@
 """The synthesis service under load: calls a second beside those of an empty server, memory, and many who watch.
 
-Client and server are on the same machine and share its processors, in every row alike. A call's time of a processor
-says on a machine with other work, too, how much less the empty server does.
+The empty server gets the same requests by the same kind of call, and answers with as many bytes. Client and server are
+on the same machine and share its processors, in every row alike. A call's time of a processor says on a machine with
+other work, too, how much less the empty server does.
 """
 
 import asyncio
@@ -14,7 +15,7 @@ import time
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -28,7 +29,7 @@ from robosc_client import Check, Client, SynthesisOptions, Synthesize
 from robosc_client.commands.bench import varied
 from robosc_client.convert.requests import request_of
 from robosc_client.load_measurement import Load, Measured, measure
-from service.echo import METHOD, REQUEST, echo_server
+from service.echo import METHOD, echo_server
 from support.long_work import long_work
 from support.models import EXAMPLES, bundle_of
 from support.service import server_process
@@ -43,6 +44,7 @@ _TURNS = 4
 _CONNECTIONS = 20
 _WARM_UP = 20
 _DISTINCT = 2_000
+_NOBODY = Credentials()
 _SERVICE = "/robosc_api.v1.SynthesisService/"
 _WATCHED_S = 10.0
 # No model comes twice in one run: its result would be kept.
@@ -52,10 +54,10 @@ _NUMBERS = itertools.count()
 def table(seconds: float = _SECONDS) -> str:
     """All tables, of one run."""
     with (
-        echo_server() as (echo_process, echo_address),
         server_process("--worker-processes", "2", "--log-level", "warning") as (process, address),
+        echo_server(answer_sizes(address)) as (echo_process, echo_address),
     ):
-        echo, service = _Server(echo_process.pid, echo_address), _Server(process.pid, address)
+        echo, service = Server(echo_process.pid, echo_address), Server(process.pid, address)
         parts = [_calls("The synthesis service under load", echo, service, seconds)]
         with _busy_core():
             parts.append(_calls("The same with a busy loop on one core", echo, service, seconds))
@@ -64,11 +66,17 @@ def table(seconds: float = _SECONDS) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class _Server:
+class Server:
     """A server that is measured."""
 
     pid: int
     address: str
+
+
+def answer_sizes(address: str) -> dict[str, int]:
+    """Return the sizes of the answers of a service by method, in bytes."""
+    loads = (load(1) for load in call_kinds().values())
+    return {load.method.removeprefix(_SERVICE): run_load(address, load, count=1).answer_bytes for load in loads}
 
 
 @contextmanager
@@ -84,15 +92,16 @@ def _busy_core() -> Iterator[None]:
         process.wait()
 
 
-def _calls(title: str, echo: _Server, service: _Server, seconds: float) -> str:
+def _calls(title: str, echo: Server, service: Server, seconds: float) -> str:
     kinds = call_kinds()
     rows = []
     for load in kinds.values():
         run_load(service.address, load(1), count=_WARM_UP)
     for clients in CLIENTS:
-        asked = {"empty echo": (echo, _echo(clients))} | {
-            name: (service, load(clients)) for name, load in kinds.items()
-        }
+        asked = {
+            echo_name(method): (echo, as_echo(kinds[f"{method}, cached"](clients)))
+            for method in ("Check", "Synthesize")
+        } | {name: (service, load(clients)) for name, load in kinds.items()}
         found: dict[str, list[Measured]] = {name: [] for name in asked}
         used_s = dict.fromkeys(asked, 0.0)
         # By turns, since other guests of the same machine make it faster and slower all the time.
@@ -146,22 +155,27 @@ def together(parts: Sequence[Measured]) -> Measured:
     )
 
 
-def _echo(clients: int) -> Load:
-    return Load(METHOD, False, lambda number: REQUEST, clients, channels=min(clients, 4))
+def echo_name(method: str) -> str:
+    return f"empty echo of {method}"
 
 
-def run_load(address: str, load: Load, **amount: Any) -> Measured:
-    chosen = Load(load.method, load.is_stream, load.request, load.concurrency, channels=load.channels, **amount)
-    return asyncio.run(measure(address, Credentials(), chosen))
+def as_echo(load: Load) -> Load:
+    """Return the same load for the empty server."""
+    return replace(load, method=METHOD + load.method.removeprefix(_SERVICE))
+
+
+def run_load(address: str, load: Load, credentials: Credentials = _NOBODY, **amount: Any) -> Measured:
+    return asyncio.run(measure(address, credentials, replace(load, **amount)))
 
 
 def _row(name: str, clients: int, measured: dict[str, Measured], used_s: dict[str, float]) -> list[str]:
-    found, empty = measured[name], measured["empty echo"]
+    echo = name if name.startswith("empty") else echo_name(name.partition(",")[0])
+    found, empty = measured[name], measured[echo]
     times = [found.percentile_s(percent) for percent in (50, 99)]
-    told = ["" if time_s is None else f"{time_s * 1e3:.2f}" for time_s in times]
-    own_s, echo_s = (used_s[each] / max(1, len(measured[each].times_s)) for each in (name, "empty echo"))
+    shown_ms = ["" if time_s is None else f"{time_s * 1e3:.2f}" for time_s in times]
+    own_s, echo_s = (used_s[each] / max(1, len(measured[each].times_s)) for each in (name, echo))
     return [
-        *(name, str(clients), f"{found.calls_per_second:,.0f}", *told),
+        *(name, str(clients), f"{found.calls_per_second:,.0f}", *shown_ms),
         _share(found.calls_per_second, empty.calls_per_second),
         f"{own_s * 1e6:.0f}",
         _share(echo_s, own_s),
@@ -181,7 +195,7 @@ def _memory(address: str, pid: int) -> str:
         found = run_load(address, load, count=CALLS // 4)
         assert len(found.times_s) == CALLS // 4, found.errors
         rows.append([f"after {number * CALLS // 4:,} calls", _megabytes(_resident_bytes(pid))])
-    # What is kept of each request is bounded, too.
+    # The memory kept for each request is bounded, too.
     found = run_load(address, call_kinds()["Check"](8), count=_DISTINCT)
     assert len(found.times_s) == _DISTINCT, found.errors
     rows.append([f"after {_DISTINCT:,} different ones (Check)", _megabytes(_resident_bytes(pid))])
@@ -201,7 +215,7 @@ def _watchers(address: str, pid: int) -> str:
 
 async def _watched(address: str, pid: int, job_id: str) -> list[list[str]]:
     ended: list[float] = []
-    told: list[int] = [0] * WATCHERS
+    revisions: list[int] = [0] * WATCHERS
     messages = 0
     channels = [grpc.aio.insecure_channel(address, (("robosc.bench", number),)) for number in range(_CONNECTIONS)]
     request = jobs_pb2.WatchJobRequest(id=job_id)
@@ -210,13 +224,13 @@ async def _watched(address: str, pid: int, job_id: str) -> list[list[str]]:
         nonlocal messages
         stub = jobs_pb2_grpc.JobServiceStub(channels[place % _CONNECTIONS])  # type: ignore[no-untyped-call]
         async for response in stub.WatchJob(request):
-            told[place] = response.job.revision
+            revisions[place] = response.job.revision
             messages += 1
         ended.append(time.perf_counter())
 
     begun_s = time.perf_counter()
     tasks = [asyncio.create_task(watch(place)) for place in range(WATCHERS)]
-    while not all(told):
+    while not all(revisions):
         await asyncio.sleep(0.01)
     opened_s = time.perf_counter() - begun_s
     resident = _resident_bytes(pid)
@@ -231,10 +245,10 @@ async def _watched(address: str, pid: int, job_id: str) -> list[list[str]]:
     for channel in channels:
         await channel.close()
     return [
-        ["seconds until all were told the state", f"{opened_s:.2f}"],
+        ["seconds until all received the state", f"{opened_s:.2f}"],
         ["messages of progress a second to all", f"{reports / _WATCHED_S:,.0f}"],
         ["server's processor meanwhile", f"{used_s / _WATCHED_S:.1%}"],
-        ["seconds until all were told the end", f"{max(ended) - cancelled_s:.2f}"],
+        ["seconds until all received the end", f"{max(ended) - cancelled_s:.2f}"],
         ["", str(resident)],
     ]
 

@@ -13,7 +13,7 @@ from reaction import Trial, commands, trials  # A folder of programs, not on the
 from robosc_simulated import Record
 from support.lidar_frames import lds01_frame
 
-# As the fact sheets have them.
+# Packets of the fact sheets.
 OPENCR_ZERO = bytes.fromhex("fffffd00c81d00039600" + 24 * "00" + "06a0")
 OPENCR_MOVE = bytes.fromhex("fffffd00c81d000396000a000000" + 16 * "00" + "320000004d37")
 SERVOS_MOVE = bytes.fromhex("fffffd00fe11008368000400013f000000023f000000ce56")

@@ -129,7 +129,7 @@ def test_the_commands_redact_and_replay(tmp_path: Path, capsys: pytest.CaptureFi
     out = capsys.readouterr().out
     assert "base: mavlink-rover at udpout:203.0.113.9:14550\n" in out
     assert 'text="fmuv3 0035002A 31365112 30333036"' in out
-    # Nothing is overwritten, and what is wrong is one line.
+    # No file is overwritten, and the mistake is one line.
     assert main(["redact", str(raw), "-o", str(clean)]) == 2
     assert main(["replay", str(raw), "--line", "scanner"]) == 2
     assert "no line 'scanner'; it has base" in capsys.readouterr().err

@@ -79,7 +79,7 @@ def test_a_face_that_cannot_start_opens_no_device_and_stops_the_others(superviso
     first, second = RecordedEndpoint(made), RecordedEndpoint(made, "the address is in use")
     with pytest.raises(BridgeError, match="the address is in use"):
         made.run([first, second])
-    assert first.told == ["start False", "stop False None"]
+    assert first.calls == ["start False", "stop False None"]
     assert not made.drive.is_alive
 
 
@@ -189,7 +189,7 @@ def test_a_rover_is_driven_within_its_own_limits() -> None:
         assert bridge.limits.separation_m == 0.16
         assert bridge.limits.wheel_m_s == pytest.approx(0.14)
         bridge.until(lambda: bridge.wheels_m_s == pytest.approx((0.1, 0.1), rel=0.05), "the fastest that it may")
-        assert max(speed for _, *wheels in bridge.trace.told for speed in wheels) <= 0.1 * 1.05
+        assert max(speed for _, *wheels in bridge.trace.commanded for speed in wheels) <= 0.1 * 1.05
     with driven("mavlink-rover", safety=patient) as bridge:
         assert bridge.limits.linear_m_s == 0.22
         bridge.moves()
@@ -216,9 +216,9 @@ def test_faces_are_started_before_the_devices_and_stopped_after_them(supervisor:
         endpoint = RecordedEndpoint(made)
         before_s = sys.getswitchinterval()
         assert made.run([endpoint])
-    # While it runs, a busy endpoint must not hold up the other threads; afterwards that is nobody's business.
+    # A busy endpoint must not hold up the other threads while the bridge runs; the interval is restored afterwards.
     assert endpoint.switch_s < 0.001 < before_s == sys.getswitchinterval()
-    assert endpoint.told == ["start False", f"stop False {State.OVER}"]
+    assert endpoint.calls == ["start False", f"stop False {State.OVER}"]
 
 
 class MortalEndpoint(RecordedEndpoint):
@@ -229,7 +229,7 @@ class MortalEndpoint(RecordedEndpoint):
         return self.made.daemon.state is not State.RUNNING
 
     def start(self) -> None:
-        self.told.append("start")
+        self.calls.append("start")
 
 
 def test_the_robot_stops_when_a_face_ends_by_itself(supervisor: Supervisor, caplog: pytest.LogCaptureFixture) -> None:
@@ -240,4 +240,4 @@ def test_the_robot_stops_when_a_face_ends_by_itself(supervisor: Supervisor, capl
         made.run([endpoint])
     assert "has ended" in made.daemon.problem
     assert caplog.text.count("the recorded endpoint has ended unexpectedly: the robot stops") == 1
-    assert endpoint.told == ["start", f"stop False {State.OVER}"]
+    assert endpoint.calls == ["start", f"stop False {State.OVER}"]

@@ -1,4 +1,4 @@
-"""Tests that the camera's sightings and its state reach the model, and that whoever needs a camera has one."""
+"""Tests that the camera's sightings and its state reach the model, and that models that need a camera have one."""
 
 import logging
 

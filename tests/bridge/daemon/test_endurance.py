@@ -28,7 +28,7 @@ def test_a_robot_wanders_on_and_on(base: str, period_s: float) -> None:
     assert found["overruns"] == 0
     assert found["late_s"] < 1e-3
     assert 10 * SECONDS - 10 < found["scans"] <= 10 * SECONDS
-    # As often as the period says, and a few that were hurried.
+    # The exchanges come with the period, and a few were hurried.
     assert 50 * SECONDS - 50 < found["exchanges"] < 60 * SECONDS
     assert found["driven_m"] > 1.0
     assert found["collisions"] == 0

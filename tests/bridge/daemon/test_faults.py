@@ -93,17 +93,17 @@ def test_the_fault_that_a_motor_reports_is_named() -> None:
         bridge.steady()
         bridge.robot.left.overload()
         bridge.ended()
-        bridge.was_told("the motors report: overload")
+        bridge.reports("the motors report: overload")
 
 
 def test_a_voltage_that_is_out_of_range_is_reported_and_stops_nothing() -> None:
     with driven("dynamixel") as bridge:
         bridge.steady()
         bridge.robot.left.brown_out(14.5)
-        bridge.was_told("the motors report: input voltage")
-        before = len(bridge.trace.told)
+        bridge.reports("the motors report: input voltage")
+        before = len(bridge.trace.commanded)
         bridge.until(lambda: len(bridge.trace.heard_s) > 100, "a hundred exchanges")
-        assert (bridge.state, bridge.trace.told[before:]) == (State.RUNNING, [])
+        assert (bridge.state, bridge.trace.commanded[before:]) == (State.RUNNING, [])
 
 
 @pytest.mark.parametrize("base", BASES)
@@ -132,7 +132,7 @@ def test_no_wheel_is_commanded_more_than_its_limit_nor_at_once(base: str, veloci
     with driven(base, velocity=velocity, safety=safety) as bridge:
         bridge.steady()
         half_m = bridge.limits.separation_m / 2
-        commands = bridge.trace.told[1:]
+        commands = bridge.trace.commanded[1:]
         for at_s, left_m_s, right_m_s in commands:
             linear_m_s, angular_rad_s = (left_m_s + right_m_s) / 2, (right_m_s - left_m_s) / 2 / half_m
             # Servos and OpenCR take whole steps: 0.8 mm/s of a wheel, and 0.01 m/s and 0.01 rad/s.
@@ -173,7 +173,7 @@ def test_a_battery_that_is_low_is_reported_and_stops_nothing(base: str, voltage_
             bridge.robot.opencr.set_battery(voltage_v)
         if bridge.robot.rover is not None:
             bridge.robot.rover.charge_state = 2
-        bridge.was_told("The battery will soon be empty.")
+        bridge.reports("The battery will soon be empty.")
         bridge.host.sleep(5.0)
         assert bridge.state is State.RUNNING
         assert bridge.wheels_m_s != (0.0, 0.0)
@@ -236,9 +236,9 @@ def test_a_thread_that_is_halted_between_decision_and_writing_sends_no_old_veloc
         bridge.until(lambda: ends and _orders(bridge, base, ends[0]), "the first order after the gap")
         assert _orders(bridge, base, ends[0])[0]
         # Later requests are decided anew, and begin at standstill.
-        before = len(bridge.trace.told)
+        before = len(bridge.trace.commanded)
         bridge.host.sleep(1.0)
-        assert all(max(map(abs, wheels)) < 0.05 for _, *wheels in bridge.trace.told[before : before + 1])
+        assert all(max(map(abs, wheels)) < 0.05 for _, *wheels in bridge.trace.commanded[before : before + 1])
 
 
 # The loop and the supervisor.
@@ -261,7 +261,7 @@ def test_a_loop_that_hangs_stops_the_wheels_until_it_turns_again(
         bridge.log.hangs = False
         bridge.moves()
         if message:
-            bridge.was_told(message)
+            bridge.reports(message)
 
 
 @pytest.mark.parametrize("base", BASES)
@@ -310,7 +310,7 @@ def test_what_is_stopped_stays_stopped_whatever_others_send_to_opencr(is_off: bo
         if is_off is None:
             bridge.stays(6.0)
             return
-        bridge.was_told(Caution.TORQUE_HELD)
+        bridge.reports(Caution.TORQUE_HELD)
         bridge.moves()
         moved_s = bridge.host.monotonic()
         assert moved_s - begin_s == pytest.approx(3.0 if is_button else 0.0, abs=0.1)
@@ -369,7 +369,7 @@ def test_an_operator_who_is_lost_stops_the_wheels_until_he_is_back() -> None:
         operator.start()
         try:
             bridge.stopped_after(leaves, STATED_S["the operator is lost"])
-            bridge.was_told("The link to the operator is lost.")
+            bridge.reports("The link to the operator is lost.")
             bridge.stays(WHILE_S)
             assert bridge.state is State.RUNNING
             is_there = True
@@ -379,7 +379,7 @@ def test_an_operator_who_is_lost_stops_the_wheels_until_he_is_back() -> None:
             operator.join(LIMIT_S)
 
 
-# The bridge stays if an operator can learn of it; nothing moves before somebody says so.
+# The bridge stays if an operator can learn of it; nothing moves before an operator resumes.
 
 
 def _ordered(bridge: Driven, command: OperatorCommand) -> str:
@@ -463,7 +463,7 @@ def test_whoever_arms_a_rover_learns_how_long_it_goes_on_alone() -> None:
         for command in (OperatorCommand.STANDBY, OperatorCommand.START):
             assert _ordered(bridge, command) == ""
         bridge.moves()
-        bridge.was_told("it drives on for up to 3 s, until its target expires")
+        bridge.reports("it drives on for up to 3 s, until its target expires")
 
 
 @pytest.mark.parametrize("base", [*BASES, "mavlink-rover"])
@@ -517,8 +517,8 @@ def test_a_lidar_that_shows_nothing_stops_the_wheels_until_it_does(base: str, li
     with driven(base, lidar) as bridge:
         row = f"{lidar} is silent" if how == "is_stalled" else f"{lidar} is covered"
         bridge.stopped_after(lambda: setattr(bridge.robot.scanner, how, True), STATED_S[row])
-        bridge.was_told(f"scanner: no full revolution with valid ranges for {SCAN_TIMEOUTS_S[lidar]:g} s")
-        bridge.was_told("The scanner has made no full revolution for too long.")
+        bridge.reports(f"scanner: no full revolution with valid ranges for {SCAN_TIMEOUTS_S[lidar]:g} s")
+        bridge.reports("The scanner has made no full revolution for too long.")
         bridge.stays(WHILE_S)
         assert (bridge.state, bridge.log.events().count("lost.response")) == (State.RUNNING, 1)
         setattr(bridge.robot.scanner, how, False)
@@ -531,7 +531,7 @@ def test_a_lidar_that_is_unplugged_stops_the_wheels_until_it_is_back(base: str) 
     with driven(base) as bridge:
         line = bridge.robot.scanner_line
         bridge.stopped_after(line.disconnect, STATED_S["lds03 is silent"])
-        bridge.was_told(f"scanner: {line.path}: the ")
+        bridge.reports(f"scanner: {line.path}: the ")
         bridge.stays(WHILE_S)
         assert bridge.state is State.RUNNING
         line.reconnect()
@@ -611,10 +611,10 @@ def test_a_base_that_cannot_be_opened_is_reported_once_and_tried_until_it_can(
     fixed: list[Callable[[], object]] = []
     with driven(base, before=lambda robot: fixed.append(happens(robot))) as bridge:
         try:
-            bridge.was_told(message)
+            bridge.reports(message)
             # Two attempts more, at least, which are not reported.
             bridge.stays(2.5 * WHILE_S)
-            bridge.was_told(message)
+            bridge.reports(message)
             assert bridge.state is State.STARTING
         finally:
             fixed[0]()
@@ -627,7 +627,7 @@ def test_another_baud_is_reported_with_what_to_do() -> None:
             servo.table["baud rate"] = 1
 
     with driven("dynamixel", before=slow) as bridge:
-        bridge.was_told(
+        bridge.reports(
             "does not answer at 1000000 baud; does it have power? A motor fresh from the factory speaks 57600"
         )
         bridge.stays(WHILE_S)

@@ -101,22 +101,22 @@ class Twins:
 
     def compare(self, act: Callable[[], None], twin: Callable[[], object]) -> None:
         """Let the same happen to both."""
-        self.caller.told.clear()
-        self.server.told.clear()
+        self.caller.received.clear()
+        self.server.received.clear()
         before = len(self.twin.middleware.sent)
         act()
         twin()
         sent = self.twin.middleware.sent[before:]
         robots = [item for item in sent if item[0] in ("publish", "default", "call", "goal", "cancel")]
         callers = [item for item in sent if item not in robots]
-        found = [item for item in self.server.told if isinstance(item, TOLD_ROBOT)]
+        found = [item for item in self.server.received if isinstance(item, TOLD_ROBOT)]
         for own, other in zip(found, robots, strict=True):
             if isinstance(own, CallMade):
                 self.calls.append((own.number, other[2]))
             elif isinstance(own, GoalMade):
                 self.goals.append((own.number, other[2]))
         assert [self._robot_side(item) for item in found] == robots
-        words = [_caller_side(self.caller.program, item) for item in self.caller.told]
+        words = [_caller_side(self.caller.program, item) for item in self.caller.received]
         assert [item for item in words if item is not None] == callers
 
     def _robot_side(self, item: Any) -> tuple[Any, ...]:

@@ -126,9 +126,9 @@ def test_what_is_allowed_moves_the_wheels_and_what_is_not_is_reported_to_its_sen
     scene.live(0.1, 0.3)
     # Let go by the supervisor: an obstacle.
     assert scene.out == STANDSTILL
-    other.told.clear()
+    other.received.clear()
     assert without_sensors(program.say(MessageRequested, "/cmd_vel", FORWARD)) == [Blocked("/cmd_vel")]
-    assert without_sensors(other.told) == []
+    assert without_sensors(other.received) == []
     assert without_sensors(program.say(MessageRequested, "/cmd_vel", ZERO)) == []
 
 
@@ -157,7 +157,7 @@ def test_sensors_are_passed_on_after_the_supervisor_has_seen_them(scene: Scene, 
     program.cycle()
     assert program.of(PassedOn) == silent.of(PassedOn)[-1:]
     assert program.of(PassedOn)[0].identifier == "/scan"
-    assert PassedOn("/mood", "fine") in silent.told
+    assert PassedOn("/mood", "fine") in silent.received
     assert scene.component("Eyes")["variables"]["way"] == "blocked"
 
 
@@ -323,7 +323,7 @@ def test_in_standby_everything_is_held_back_and_what_was_awaited_is_answered(sce
 def test_a_service_of_a_program_answers_another_programs_call(scene: Scene, program: Connected) -> None:
     server = Connected(scene, "a server", ("think",))
     server.cycle()
-    server.told.clear()
+    server.received.clear()
     program.say(CallRequested, "think", "t", "about it")
     (call,) = server.of(CallMade)
     assert call.data == "about it"
@@ -374,7 +374,7 @@ def test_what_makes_no_sense_is_refused_and_changes_nothing(
     assert reason in why
     scene.live(0.3, 2.0)
     assert (scene.out, scene.daemon.state) == (STANDSTILL, State.RUNNING)
-    assert without_sensors(program.told)[1:] == []
+    assert without_sensors(program.received)[1:] == []
 
 
 @pytest.mark.parametrize("number", [math.nan, math.inf, -math.inf])
@@ -439,10 +439,10 @@ def test_what_who_sends_too_much_has_asked_for_ends(
         scene.daemon.post(MessageRequested(program.program, "/nowhere", None))
     # It may have been this one that is lost.
     scene.daemon.post(CancelRequested(program.program, "face", "g"))
-    program.told.clear()
+    program.received.clear()
     scene.live(0.3, 2.0)
     assert scene.out == STANDSTILL
-    assert any("too much at once" in why for why in refused(program.told))
+    assert any("too much at once" in why for why in refused(program.received))
     if make is GoalRequested:
         assert program.of(GoalOver) == [GoalOver("g", "cancelled", None)]
     if make is CallRequested:
@@ -568,13 +568,13 @@ def test_programs_may_come_and_go_in_the_middle_of_everything(steps: list[tuple[
     for program in programs:
         program.leave()
     scene.exchange()
-    # Nobody is there who wants anything to move.
+    # The caller has gone, so no motion is wanted.
     assert scene.out == STANDSTILL
     scene.live(1.0, 2.0)
     assert (scene.out, scene.daemon.state) == (STANDSTILL, State.RUNNING)
     # A program that comes finds everything free.
     late = come()
     late.say(GoalRequested, "face", "1", {"angle": 10})
-    assert GoalTaken("1") in late.told
+    assert GoalTaken("1") in late.received
     scene.live(3.0, 2.0)
     assert [item.outcome for item in late.of(GoalOver)] == ["succeeded"]

@@ -131,7 +131,7 @@ def test_silent_steps_that_never_end_are_refused_unless_they_are_allowed(bridge:
     file.write_text("robot: burger\ndrive: {driver: opencr, port: /dev/none}\nchannels: {/go: {channel: log}}\n")
     assert robosc(["synth", str(model), "--allow-livelock", "-o", str(supervisor)]) == 0
     for path in (model, supervisor):
-        # If they are allowed, the next fault is reported.
+        # The next fault is reported once they are allowed.
         command_line = ("run", "--standby", "--model", str(path), "--config", str(file))
         refused, allowed = bridge(*command_line), bridge(*command_line, "--allow-livelock")
         assert (refused.returncode, allowed.returncode) == (2, 2)
@@ -146,7 +146,7 @@ def test_what_a_server_made_is_kept_unasked(bridge: Bridge, tmp_path: Path, monk
     model, file = tmp_path / "r.rscd", tmp_path / "bridge.yaml"
     model.write_text('robot R { component C { incoming message go with identifier: "/go", type: none } }')
     file.write_text("robot: burger\ndrive: {driver: opencr, port: /dev/none}\nchannels: {/go: {channel: log}}\n")
-    # With a supervisor, the next thing that is wrong is reported.
+    # The next fault is reported once there is a supervisor.
     command_line = ["run", "--standby", "--model", str(model), "--config", str(file), "--server"]
     with served() as address:
         first = bridge(*command_line, address)

@@ -500,7 +500,7 @@ def test_a_fault_outlives_a_drive_that_is_lost_and_back() -> None:
     assert executor is not None
     executor.stop("broken", is_fault=True)
     scene.daemon.cycle()
-    # While it is being stopped.
+    # The drive fails while the robot is being stopped.
     scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
     scene.daemon.cycle()
     scene.daemon.post(DeviceUp(Device.DRIVE))

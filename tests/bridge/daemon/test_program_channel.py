@@ -250,7 +250,7 @@ def test_what_a_program_was_asked_for_fails_when_it_is_gone(start: Any) -> None:
     # Later messages of it belong to no request.
     server.say(Replied, asked.number, True)
     server.say(MessageReceived, "/go", 0)
-    assert (len(server.told), variable(scene, "wanted")) == (0, 2 if start is called else 3)
+    assert (len(server.received), variable(scene, "wanted")) == (0, 2 if start is called else 3)
 
 
 def test_what_is_served_already_is_not_served_by_another() -> None:
@@ -271,9 +271,9 @@ def test_a_run_that_ends_takes_its_numbers_with_it() -> None:
     scene = helped()
     server, goal = fetching(scene)
     scene.daemon.post(OperatorCommand.STANDBY)
-    server.told.clear()
+    server.received.clear()
     scene.live(0.3, 2.0)
-    # It had not been accepted: the program learns all the same that nobody wants it any more.
+    # It had not been accepted: the program learns all the same that it is not wanted any more.
     assert server.of(CancelMade) == [CancelMade("fetch", goal.number)]
     assert len(why(server.say(GoalAccepted, goal.number))) == 1
     scene.daemon.post(OperatorCommand.START)
@@ -395,8 +395,8 @@ def test_who_sends_too_much_loses_it_and_learns_it_and_others_are_not_held_up() 
     assert len(heard) < 60
     for _ in range(10):
         scene.daemon.cycle()
-    assert why(loud.told) == ["this program sends too much at once: 30 of it were not looked at"]
-    assert why(quiet.told) == []
+    assert why(loud.received) == ["this program sends too much at once: 30 of it were not looked at"]
+    assert why(quiet.received) == []
     loud.say(MessageReceived, "/go", 7)
     assert variable(scene, "wanted") == 7
 

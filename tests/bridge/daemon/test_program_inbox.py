@@ -61,7 +61,7 @@ def test_the_memory_of_what_waits_is_bounded(data: Any, monkeypatch: pytest.Monk
     try:
         for _ in range(20):
             box.put(MessageReceived(sender, "/mood", data()))
-        # With what is no data of theirs.
+        # The messages have data of another type.
         assert tracemalloc.get_traced_memory()[0] < 1.3 * limit + 50_000
     finally:
         tracemalloc.stop()

@@ -1,4 +1,4 @@
-"""Words with systemd: datagrams as sd_notify(3) has them, and none where nobody asks for them."""
+"""Words with systemd: datagrams as sd_notify(3) has them, and none where they are not wanted."""
 
 import socket
 from collections.abc import Iterator

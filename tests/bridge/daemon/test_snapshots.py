@@ -8,7 +8,7 @@ from support.daemons import PERIOD_S, Scene
 
 
 class Watched(Scene):
-    """A scene with somebody who looks."""
+    """A scene with an observer."""
 
     def __init__(self, *, starts_itself: bool = True) -> None:
         super().__init__(starts_itself=starts_itself, stays=True)
@@ -112,7 +112,7 @@ def test_entries_of_the_log_and_of_the_bridge_are_reported_and_the_log_knows_onl
 
 
 def test_a_late_watcher_receives_all_the_same() -> None:
-    """Also where no log is written: whether anybody wants entries is asked anew each time."""
+    """Also where no log is written: the need for entries is looked up anew each time."""
     scene = Watched()
     scene.subscription.close()
     scene.log.is_active = False

@@ -146,7 +146,7 @@ def test_a_supervisor_for_another_deployment_is_refused_if_its_model_has_actions
         assert f"made for the deployment {made}, not {wanted}, and its model has actions" in refusal(
             Source(file, wanted)
         )
-        # Without actions, both are the same.
+        # Both deployments are the same without actions.
         supervisor = supervisor_of(written(tmp_path), made)
         file.write_bytes(encode(supervisor))
         assert obtain(Source(file, wanted)) == supervisor
@@ -287,7 +287,7 @@ def test_a_signature_that_is_not_trusted_is_none(signed: Signed, tmp_path: Path)
     problem = "is not signed by a trusted key, and the model that it is checked against is missing"
     assert problem in refusal(signed.source(signed.others))
     assert "the model that it is checked against is missing" in refusal(signed.source())
-    # With its model, the verifier decides.
+    # The verifier decides with its model.
     written(tmp_path)
     messages: list[str] = []
     obtain(signed.source(signed.others), messages.append)
@@ -312,7 +312,7 @@ def test_a_byte_that_is_changed_is_refused(signed: Signed, place: int, change: i
 
 
 def test_a_changed_file_is_refused_though_the_verifier_would_pass_it(signed: Signed, tmp_path: Path) -> None:
-    """Somebody has been at it: that is not passed over."""
+    """A changed file is not passed over."""
     written(tmp_path)
     signed.file.write_bytes(signed.file.read_bytes().replace(b"\n", b" \n"))
     assert obtain(signed.source())

@@ -259,7 +259,7 @@ def test_without_another_velocity_nothing_is_commanded_within_an_exchange() -> N
     scene.step()
     assert scene.taken() == [("exchange", FORWARD)]
     assert len(scene.gate.asked) == 1
-    # Something else was to be done at once.
+    # The base wakes the worker during the exchange.
     scene.base.meanwhile = scene.worker.wake
     scene.step()
     assert scene.taken() == ["wake", ("exchange", FORWARD)]

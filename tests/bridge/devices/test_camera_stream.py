@@ -107,7 +107,7 @@ def test_whoever_ends_is_gone_and_can_come_again(served: Served) -> None:
         served.camera.receive(0.0)
     served.camera.open()
     again, _ = served._listener.accept()
-    # Nothing is left of the half picture.
+    # The half picture is gone.
     again.sendall(picture(7))
     assert shade(served.camera.receive(LIMIT_S)) == 7
     again.close()
@@ -203,7 +203,7 @@ def test_a_process_that_cannot_be_started_is_reported(tmp_path: Path, monkeypatc
 
 
 def test_a_camera_process_whose_host_hears_no_more_ends(tmp_path: Path) -> None:
-    """A camera process ends that writes into a pipe that nobody reads."""
+    """A camera process ends that writes into a pipe without a reader."""
     path = film(tmp_path / "film.avi", 300, 20.0)
     command = [sys.executable, "-m", "robosc_bridge.devices.camera_process", str(path)]
     with subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:

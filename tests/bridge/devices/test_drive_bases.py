@@ -389,7 +389,7 @@ def test_heading_is_within_half_a_turn(any_bench: Rig) -> None:
 def test_torque_is_not_switched_on_while_the_wheels_turn(kind: str, torque_on: str) -> None:
     with rig(kind) as bench:
         bench.base.open()
-        # Somebody pushes it, whatever its motor does.
+        # A push moves it, whatever its motor does.
         bench.robot.left._drive = lambda: None  # type: ignore[method-assign]
         wheel = bench.robot.world.left
         wheel.is_driven = True

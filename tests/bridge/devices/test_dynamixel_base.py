@@ -349,7 +349,7 @@ def test_a_motor_that_shuts_down_stops_the_other_one_at_once(bench: Rig, provoke
     assert bench.stops_within(0.1)
     assert bench.tap.packets[2] == HARDWARE
     assert bench.tap.packets[3] == ZERO
-    # Whatever is wanted then, nothing moves.
+    # The motors stand still, whatever is wanted then.
     assert fault in bench.drive(FORWARD, 0.2).faults
     assert bench.goals_rad_s() == (0.0, 0.0)
     with pytest.raises(DeviceFaultError, match=rf"motor 1 \(left\) reports {fault}; it must be reset"):

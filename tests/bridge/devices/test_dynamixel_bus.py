@@ -289,7 +289,7 @@ def test_where_the_answer_is_lost_behind_which_something_was_interjected_the_req
         _Interrupter(bus, _line_of(bus), b"new")
         begin_s = peer.time.monotonic()
         assert bus.read(1, 132, 4).data == bytes((132, 133, 134, 135))
-        # Answers keep their order: nobody waits for one once the next one is there.
+        # Answers keep their order: none is awaited once the next one is there.
         assert peer.time.monotonic() - begin_s == pytest.approx(0.04)
         assert (bus.counters.unanswered, bus.counters.repeated) == (1, 1)
 

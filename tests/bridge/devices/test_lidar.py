@@ -214,7 +214,7 @@ def test_a_frame_with_a_wrong_checksum_is_counted_and_dropped(rig: Rig) -> None:
 
 
 def test_of_several_turns_in_one_read_the_newest_is_reported(rig_lds01: Rig) -> None:
-    # The line holds more than one turn; whoever was late wants what is now.
+    # The line holds more than one turn; a late reader wants the present one.
     stream = b"".join(_lds01_revolution(500) + _lds01_revolution(600))[:4000]
     rig_lds01.pty.send(stream)
     first = rig_lds01.lidar.receive(LIMIT_S)
@@ -237,7 +237,7 @@ def test_a_turned_or_hanging_lidar(front_deg: float, is_upside_down: bool, found
     made = Rig(KITS["lds03"], front_rad=math.radians(front_deg), is_upside_down=is_upside_down)
     try:
         revolution = _lds03_revolution(0)
-        # Something at 90 degrees clockwise of its front.
+        # An object at 90 degrees clockwise of its front.
         revolution[5] = lds03_frame(80, 99, [(0, 0)] * 10 + [(1000, 200)] + [(0, 0)] * 9)
         [scan] = made.scans(revolution + revolution[:1])
         assert [k for k in range(BINS) if not math.isnan(scan.ranges_m[k])] == [found]

@@ -174,7 +174,7 @@ def test_a_stalled_one_reports_nothing_and_goes_on_without_a_mixture(name: str) 
         seen.lidar.open()
         assert seen.scans(0.5)
         seen.robot.scanner.is_stalled = True
-        seen.scans(0.0)  # What is under way still.
+        seen.scans(0.0)  # Bytes under way still arrive.
         assert seen.scans(1.0) == []
         # Meanwhile the robot was turned: ranges of before would be beside the walls.
         seen.robot.world.heading_rad += 1.0

@@ -183,7 +183,7 @@ def test_torque_off_is_after_a_stop_and_on_again_without_motion(bench: Bench) ->
 def test_a_vehicle_of_a_driver_that_died_is_left_at_rest_when_opened(bench: Bench) -> None:
     bench.start()
     bench.drive(FORWARD, 0.2)
-    bench.base._is_torque_wanted = False  # As a process that is gone, which closes nothing.
+    bench.base._is_torque_wanted = False  # A process that is gone has closed nothing.
     bench.base._release()
     assert bench.rover.is_armed
     bench.base.open()

@@ -167,7 +167,7 @@ def test_the_gyroscope_is_calibrated_at_rest_if_asked_to() -> None:
 
 def test_a_late_answer_to_another_programs_calibration_is_none_of_ours() -> None:
     with rig("opencr", answer_limit_s=0.1, calibration_s=2.0) as bench:
-        # Somebody calibrates and leaves; the board is silent until it is done, and answers all of it then.
+        # Another program calibrates and leaves; the board is silent until it is done, and answers all of it then.
         port = bench.host.open_port(bench.robot.base_path, 1_000_000)
         port.write(bytes.fromhex(CALIBRATE))
         bench.until(lambda: CALIBRATE in bench.tap.packets)
@@ -469,7 +469,7 @@ def test_torque_that_is_gone_is_a_fault_that_stays_until_torque_is_switched_on_a
     assert bench.host.monotonic() - begin_s < 0.2
     assert not reading.is_torque_on
     assert bench.stops_within(0.1)
-    # Whatever is wanted then, nothing moves.
+    # The motors stand still, whatever is wanted then.
     reading = bench.drive(Velocity(0.1), 0.2)
     assert reading.faults == {MotorFault.TORQUE_LOST}
     assert bench.goals_rad_s() == (0.0, 0.0)
@@ -546,7 +546,7 @@ def test_a_button_that_is_pressed_shortly_and_often_is_not_warned_of(
 
 
 def test_commands_that_change_at_once_are_followed(bench: Rig) -> None:
-    """No stop and no turn is taken for a motion that nobody has commanded."""
+    """No stop and no turn is taken for a motion without a command."""
     bench.start()
     for velocity in (Velocity(0.2), Velocity(-0.2), Velocity(0.0, 2.0), Velocity(), Velocity(0.2, -1.0)):
         assert bench.drive(velocity, 0.8).faults == frozenset()
@@ -626,7 +626,7 @@ def test_a_command_is_not_repeated_after_a_newer_one(lost: int) -> None:
         bench.hurry()
         _Source(bench, STANDSTILL)
         bench.robot.base_line.faults.drop_next = lost
-        # Without any answer, it is sent a stop.
+        # A stop is sent when there was no answer at all.
         with pytest.raises(DeviceSilentError) if lost == 2 else contextlib.nullcontext():
             bench.base.exchange(Velocity(0.1, 0.5))
         bench.host.sleep(0.02)
@@ -678,7 +678,7 @@ def test_a_board_that_loses_what_comes_before_it_has_answered_is_sent_no_more_of
         bench.tap.device = board = _Forgetful(_board(bench))
         for number in range(5):
             velocity = Velocity(0.1, 0.1 * number)
-            # Behind a read; behind a write nobody knows which of the two was lost.
+            # Behind a read; behind a write it is unknown which of the two was lost.
             _Source(bench, velocity, BLOCK)
             assert bench.base.exchange(STANDSTILL).is_torque_on
             reading = bench.base.exchange(velocity)

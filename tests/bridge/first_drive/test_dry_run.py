@@ -83,7 +83,7 @@ def test_its_readings_are_those_of_a_robot_that_moves() -> None:
     base = Base()
     dry = DryBase(base, 0.16, lambda: base.now_s)  # type: ignore[arg-type]
     dry.open()
-    # Without torque nothing would move.
+    # The robot would not move without torque.
     base.now_s = 1.0
     dry.exchange(Velocity(0.2))
     base.now_s = 2.0

@@ -71,7 +71,7 @@ def test_two_servos_from_the_factory_become_wheels_that_drive(
     assert "servo 1 at 57600 baud" in out
     assert "baud rate (address 8): 57600 -> 1000000" in out
     assert "written: servo 2 at 1000000 baud" in out
-    # Once more: nothing differs, and nobody is asked.
+    # Once more: nothing differs, and no question is asked.
     assert bench.run(wheel="right") == 0
     assert "nothing is to be written" in capsys.readouterr().out
     bench.close()

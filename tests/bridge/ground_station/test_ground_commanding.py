@@ -54,7 +54,7 @@ def test_an_arming_that_is_not_answered_is_undone(talk: Talk) -> None:
     assert [ack.result for ack in of_type("COMMAND_ACK", found)] == [4]
     assert "Not armed: the bridge's loop does not answer." in joined_texts(found)
     assert talk.daemon.commands == [OperatorCommand.START, OperatorCommand.STANDBY]
-    # A late answer concerns nobody.
+    # A late answer has no effect.
     talk.daemon.orders[0].answer("")
     assert of_type("COMMAND_ACK", talk.live(1.0)) == []
 
@@ -188,7 +188,7 @@ def test_a_flood_of_others_is_bounded(talk: Talk) -> None:
 
 
 def test_modes(talk: Talk) -> None:
-    # Nothing is stopped: nothing is to be done, and a mode arms nothing.
+    # The robot is not stopped: resuming has no effect, and a mode arms nothing.
     assert talk.results(176, 1.0, 10.0) == [0]
     assert talk.daemon.orders == []
     talk.daemon.show(state=State.RUNNING, reasons=(Reason.OPERATOR_STOP,))

@@ -24,7 +24,7 @@ def _target(station: Station, speed_m_s: float, yaw_rate_rad_s: float = 0.0) -> 
 def _requested(talk: Talk) -> list[tuple[float, float]]:
     return [
         (item.data["linear"]["x"], item.data["angular"]["z"])
-        for item in talk.daemon.told
+        for item in talk.daemon.received
         if isinstance(item, MessageRequested)
     ]
 
@@ -32,7 +32,7 @@ def _requested(talk: Talk) -> list[tuple[float, float]]:
 def test_a_layer_is_asked_for_motion() -> None:
     talk = layer_talk()
     talk.say(_target(talk.station, 0.125, 0.5))
-    attached, requested = talk.daemon.told
+    attached, requested = talk.daemon.received
     assert isinstance(attached, Attached)
     assert attached.program.may_request
     assert isinstance(requested, MessageRequested)
@@ -46,18 +46,18 @@ def test_a_layer_is_asked_for_motion() -> None:
 def test_who_no_longer_drives_stands_still_within_half_a_second() -> None:
     talk = layer_talk()
     talk.say(_target(talk.station, 0.125))
-    assert len(talk.daemon.told) == 2
+    assert len(talk.daemon.received) == 2
     talk.live(0.45)
-    assert len(talk.daemon.told) == 2
+    assert len(talk.daemon.received) == 2
     found = talk.live(0.1)
     assert _requested(talk) == [(0.125, 0.0), (0.0, 0.0)]
-    assert isinstance(talk.daemon.told[-1], Detached)
+    assert isinstance(talk.daemon.received[-1], Detached)
     assert "No set-point any more: the robot stands." in joined_texts(found)
     talk.live(2.0)
-    assert len(talk.daemon.told) == 4
+    assert len(talk.daemon.received) == 4
     # And again.
     talk.say(_target(talk.station, 0.125))
-    assert isinstance(talk.daemon.told[4], Attached)
+    assert isinstance(talk.daemon.received[4], Attached)
 
 
 def test_a_line_that_is_lost_ends_driving_at_once() -> None:
@@ -65,7 +65,7 @@ def test_a_line_that_is_lost_ends_driving_at_once() -> None:
     talk.say(_target(talk.station, 0.125))
     talk.session.lost()
     assert _requested(talk) == [(0.125, 0.0), (0.0, 0.0)]
-    assert isinstance(talk.daemon.told[-1], Detached)
+    assert isinstance(talk.daemon.received[-1], Detached)
 
 
 def test_a_stick_at_rest_ends_in_silence() -> None:
@@ -73,7 +73,7 @@ def test_a_stick_at_rest_ends_in_silence() -> None:
     talk.say(_target(talk.station, 0.0))
     found = talk.live(1.0)
     assert _requested(talk) == [(0.0, 0.0)]
-    assert isinstance(talk.daemon.told[-1], Detached)
+    assert isinstance(talk.daemon.received[-1], Detached)
     assert [text for text in joined_texts(found) if "set-point" in text] == []
 
 
@@ -94,20 +94,20 @@ def test_set_points_that_are_not_heeded_are_reported_once(is_layer: bool, values
         texts += joined_texts(talk.say(_target(talk.station, 0.1), after_s=0.1))
         talk.daemon.show()
     assert len([text for text in texts if why in text and "set-points" in text.lower()]) == 1
-    assert talk.daemon.told == []
+    assert talk.daemon.received == []
 
 
 def test_a_layer_whose_drive_is_not_tied_is_not_driven() -> None:
     talk = Talk(PlayedDaemon(is_layer=True, configuration=CONFIGURATION.replace("channel: drive", "channel: log")))
     talk.daemon.show(state=State.RUNNING)
     assert any("whose drive is mapped" in text for text in joined_texts(talk.say(_target(talk.station, 0.1))))
-    assert talk.daemon.told == []
+    assert talk.daemon.received == []
 
 
 def test_what_a_layer_refuses_is_reported() -> None:
     talk = layer_talk()
     talk.say(_target(talk.station, 0.1))
-    attached = talk.daemon.told[0]
+    attached = talk.daemon.received[0]
     assert isinstance(attached, Attached)
     attached.program.send(Refused("somebody else drives"))
     assert "somebody else drives" in joined_texts(talk.live(0.2))

@@ -294,10 +294,10 @@ def test_a_lost_line_ends_driving_at_once(host: VirtualHost) -> None:
         station = Station()
         stick = station.codec.manual_control_encode(1, 500, 0, 0, 0, 0)
         connection.write(station.pack(stick))
-        assert host.wait(lambda: len(daemon.told) == 2, TURN_S)
+        assert host.wait(lambda: len(daemon.received) == 2, TURN_S)
         connection.close()
         begin_s = host.monotonic()
-        assert host.wait(lambda: isinstance(daemon.told[-1], Detached), TURN_S)
+        assert host.wait(lambda: isinstance(daemon.received[-1], Detached), TURN_S)
         assert host.monotonic() == begin_s
 
 
@@ -328,7 +328,7 @@ def test_it_may_be_stopped_at_any_time(host: VirtualHost) -> None:
     link = GroundLink(PlayedDaemon().operations, GroundSettings(LISTENING, FASTEST), host)
     link.stop()
     for passed_s in (0.0, 0.01, 1.0, 100.0):
-        # Also between two attempts to find somebody.
+        # Also between two attempts to find a station.
         link = GroundLink(PlayedDaemon().operations, GroundSettings("tcp:127.0.0.1:1", FASTEST), host)
         assert not link.is_alive
         link.start()

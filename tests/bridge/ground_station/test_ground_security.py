@@ -211,7 +211,7 @@ def test_another_computer_without_a_key_may_look_and_stop(number: int, parameter
     assert daemon.seen == 0
     stick = station.codec.manual_control_encode(1, 500, 0, 0, 0, 0)
     found = station.hear(session.step(BEGIN_S + 1.0, station.pack(stick)))
-    assert daemon.told == []
+    assert daemon.received == []
 
 
 def test_another_station_may_stop_and_nothing_more() -> None:

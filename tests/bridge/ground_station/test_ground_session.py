@@ -261,7 +261,7 @@ def test_only_ground_stations_are_operators(talk: Talk) -> None:
     assert talk.daemon.seen == 0
 
 
-# Whatever comes.
+# Bytes of the line.
 
 
 def test_the_worked_arming_is_answered_byte_for_byte() -> None:
@@ -304,6 +304,6 @@ def test_any_contents_of_any_message_are_survived(number: int, payload: bytes, i
     talk.session.step(talk.now_s, packet, is_datagram=True)
     talk.session.step(talk.now_s, packet)
     talk.session.receive_from_other(talk.now_s, packet)
-    for item in talk.daemon.told:
+    for item in talk.daemon.received:
         if isinstance(item, MessageRequested):
             assert all(map(math.isfinite, (item.data["linear"]["x"], item.data["angular"]["z"])))

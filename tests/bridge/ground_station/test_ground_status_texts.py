@@ -129,7 +129,7 @@ def test_the_grave_makes_others_wait_and_what_was_dropped_is_reported_later() ->
         texts.say(0.0, Severity.NOTICE, f"notice {number}")
     for number in range(25):
         texts.say(0.0, Severity.CRITICAL, f"critical {number}")
-    # Nothing makes room for what is not graver, and what was never sent is sent when it is said again.
+    # Graver texts stay; a text that was never sent is sent when it is said again.
     texts.say(0.0, Severity.NOTICE, "too much")
     texts.say(0.0, Severity.NOTICE, "notice 25")
     found = []

@@ -31,7 +31,7 @@ LDS03_CAPTURED = bytes.fromhex(
     "68 9d 0a 78 8d 0a 88 81 0a 98 79 0a 98 75 0a 84 6d 0a 90 65 0a a4 4d 0a a8 41 0a ac 3d 0a d4 35 0a e8 29 0a"
     "14 22 0a b8 a5 0a a8 ce 0a f4 e6 0a"
 )
-# What an LDS-03 says before its first frame: noise, its name, and an answer.
+# The bytes of an LDS-03 before its first frame: noise, its name, and an answer.
 LDS03_GREETING = bytes.fromhex(
     "a5 5a fa fa a5 5a 14 00 e3 02 01 43 4f 49 4e 2d 44 34" + "00" * 12 + "01 a5 5a 00 00 80 01 81"
 )
@@ -159,7 +159,7 @@ def test_the_tests_own_encoders_make_the_worked_frames() -> None:
     assert lidar_frames.xor16(LDS03_CAPTURED) == LDS03_CAPTURED[8:10]
 
 
-# What is valid
+# Valid frames
 
 
 @pytest.mark.parametrize(

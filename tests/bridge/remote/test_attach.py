@@ -96,7 +96,7 @@ class TestHello:
         assert code is grpc.StatusCode.INVALID_ARGUMENT
         assert words in details
         assert len(details) < 200
-        assert daemon.told == []
+        assert daemon.received == []
 
     def test_it_is_the_first_message(self, daemon: FakeDaemon, stub: Any) -> None:
         program = Attachment(stub)

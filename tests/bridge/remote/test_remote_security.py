@@ -8,7 +8,7 @@ from typing import Any
 import grpc
 import pytest
 
-from robosc_api.security import Credentials, Guard, Scope, ServerSecurity, make_token
+from robosc_api.security import Credentials, Scope, ServerSecurity, make_token
 from robosc_api.v1 import bridge_pb2 as pb
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_bridge.remote import RemoteSettings
@@ -100,7 +100,7 @@ def test_scopes_over_tls(tmp_path: Path, authority: Authority) -> None:
         assert outcomes(address, ca=ca) == unknown
         assert outcomes(address, ca=ca, token_file=wrong) == unknown
         assert len(daemon.orders) == before
-        # Without TLS, not even a stop is heard.
+        # Not even a stop is heard without TLS.
         assert outcomes(address) == dict.fromkeys(CALLS, "UNAVAILABLE")
 
 
@@ -133,15 +133,9 @@ def test_client_certificates_are_enough(tmp_path: Path, authority: Authority) ->
         assert outcomes(address, ca=authority.file) == dict.fromkeys(CALLS, "UNAVAILABLE")
 
 
-class _Away(Guard):
-    """Sees every caller on another machine: tests have only this one."""
-
-    def _refusal(self, rule: Any, method: str, metadata: Any, peer: str) -> Any:
-        return super()._refusal(rule, method, metadata, "ipv4:192.0.2.1:4711")
-
-
 def test_without_tokens_other_machines_may_watch_and_stop(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robosc_bridge.remote.endpoint.Guard", _Away)
+    # The guard sees every caller on another machine: tests have only this one.
+    monkeypatch.setattr("robosc_api.security.guard.peer_of", lambda context: "ipv4:192.0.2.1:4711")
     with bridge(ServerSecurity()) as (daemon, address):
         denied = "PERMISSION_DENIED"
         assert outcomes(address) == {**ALL, "Command": denied, "Attach": denied}

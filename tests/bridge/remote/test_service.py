@@ -213,7 +213,7 @@ class TestCommands:
         wait_until(lambda: daemon.orders)
         call.cancel()
         daemon.refusal = ""
-        # Whatever was cancelled, the loop's thread may answer.
+        # The loop's thread may answer, whatever was cancelled.
         wait_until(lambda: command(stub, pb.COMMAND_KIND_RESET) == "")
         daemon.orders[0].answer("")
 

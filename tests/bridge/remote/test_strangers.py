@@ -75,7 +75,7 @@ def test_a_call_without_its_request_is_ended(path: str, daemon: FakeDaemon, monk
     monkeypatch.setattr(endpoint_module, "REQUEST_LIMIT_S", 0.1)
     with served(daemon) as endpoint, strangers(endpoint.address, 1) as (stranger,):
         stranger.call(1, path)
-        wait_until(lambda: stranger.was_told(b"within 0.1 seconds"))
+        wait_until(lambda: stranger.has_received(b"within 0.1 seconds"))
 
 
 def test_a_stream_about_what_is_served_is_ended_when_it_says_nothing_more(
@@ -85,7 +85,7 @@ def test_a_stream_about_what_is_served_is_ended_when_it_says_nothing_more(
     with served(daemon) as endpoint, strangers(endpoint.address, 1) as (stranger,):
         stranger.call(1, REFLECTION_METHODS[-1])
         stranger.message(1, reflection_pb2.ServerReflectionRequest(list_services="").SerializeToString())
-        wait_until(lambda: stranger.was_told(b"each further one within 0.1"))
+        wait_until(lambda: stranger.has_received(b"each further one within 0.1"))
 
 
 def test_health_is_not_watched(endpoint: RemoteEndpoint) -> None:
@@ -190,5 +190,5 @@ def test_the_messages_of_a_program_are_no_flood(daemon: FakeDaemon, monkeypatch:
             program.send(give=pb.Message(identifier="/order", data=value_of({"x" * 30_000: 1})))
             assert "a name of more than" in program.receive().refused.why
             made[0].look()
-        assert not made[0].closed
+        assert not made[0].closed.total()
         program.end()

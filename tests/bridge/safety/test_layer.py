@@ -136,7 +136,7 @@ def test_an_output_holds_for_a_while_and_motion_begins_anew_after_it(after_s: fl
         return bench.layer.output(bench.now_s).velocity
 
     assert bench.last.velocity.until_s == bench.now_s + 0.0625
-    # As long as it holds, the next one goes on from it.
+    # The next velocity goes on from it while it holds.
     assert next_output(after_s) == near(0.1 + after_s)
     assert next_output(0.0626) == STANDSTILL
     assert next_output(0.03) == near(0.03)

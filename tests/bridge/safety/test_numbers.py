@@ -18,7 +18,7 @@ from support.safety_numbers import BY_ROBOT, PAGE, shipped, table
 OF_SCHEMA = schema()["$defs"]["Safety"]["properties"]
 # Beside those of the layer: the share of damaged frames is the scanner's thread's.
 OTHERS = {"bad_frames_share"}
-# What must be changed with a key, so that it still goes together with the others.
+# Numbers that must be changed with a key, so that it still goes together with the others.
 TOGETHER = {
     "angular_acceleration_rad_s2": {"angular_deceleration_rad_s2"},
     "linear_acceleration_m_s2": {"linear_deceleration_m_s2"},
@@ -87,7 +87,7 @@ def test_what_the_schema_takes_the_layer_takes_and_what_not_not(name: str, key: 
             replace(shipped(), **changes)
 
 
-# What a drive decides.
+# Numbers that depend on the drive.
 
 
 @pytest.mark.parametrize(("base", "is_off"), [("opencr", True), ("dynamixel", False), ("mavlink-rover", False)])
@@ -107,7 +107,7 @@ def test_after_an_operators_stop_a_board_with_own_controls_lets_go(base: str, is
         ("burger", "dynamixel", "", (7.0, 6.5)),
         ("waffle", "dynamixel", "", (10.5, 10.0)),
         ("burger", "mavlink-rover", "", (None, None)),
-        # What is chosen counts, and a warning never comes after the end.
+        # Chosen numbers count, and a warning never comes after the end.
         ("burger", "dynamixel", "battery_stop_v: 9.9", (9.9, 9.9)),
         ("burger", "dynamixel", "battery_warning_v: 10.5, battery_stop_v: 9.9", (10.5, 9.9)),
         ("burger", "opencr", "battery_stop_v: 10.5", (11.5, 10.5)),

@@ -80,7 +80,7 @@ def test_silence_stops_it_in_time_and_ends_by_itself(fact: str, reason: Reason, 
         if fact == "command":
             break
         assert bench.last.reasons == (reason,)
-    # The motors hold, and nobody needs to be asked.
+    # The motors hold, and no operator is needed.
     assert bench.last.is_torque_wanted
     bench.silent.clear()
     seen = [bench.cycle() for _ in range(3)]

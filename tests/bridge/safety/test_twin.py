@@ -130,7 +130,7 @@ class Sequence(RuleBasedStateMachine):
             battery_level=level,
         )
         self.layer.on_drive_reading(found)
-        self.twin.tells(found)
+        self.twin.answers(found)
         if faults - {MotorFault.VOLTAGE, MotorFault.UNCOMMANDED}:
             self.stopped.add(Reason.MOTOR_FAULT)
         if MotorFault.UNCOMMANDED in faults:

@@ -58,7 +58,7 @@ def host(line: DatagramLine | None = None) -> Iterator[socket.socket]:
 
 def test_it_answers_whoever_was_heard_last(time: Timebase) -> None:
     with DatagramLine(Echo(time), time) as line, host(line) as first, host(line) as second:
-        # Nobody was heard: it has nowhere to send to.
+        # No sender was heard: it has nowhere to send to.
         time.advance(1.5)
         first.send(b"abc")
         assert first.recv(100) == b"cba"
@@ -86,7 +86,7 @@ def test_a_host_that_is_gone_does_not_end_it(time: Timebase) -> None:
         with host(line) as gone:
             gone.send(b"abc")
             assert gone.recv(100) == b"cba"
-        # The system reports that nobody listens there.
+        # The system reports that there is no listener.
         time.advance(3.0)
         other.send(b"de")
         assert other.recv(100) == b"ed"

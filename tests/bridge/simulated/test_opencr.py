@@ -307,7 +307,7 @@ def test_a_low_battery_cuts_the_motors_off(station: Station) -> None:
     station.opencr.set_battery(12.0)
     station.robot.advance(1.5)
     station.update(2.0)
-    # The servos have restarted; nobody switches their torque on.
+    # The servos have restarted; their torque stays off.
     assert station.robot.left.answers
     assert station.read(149, "B") == 0
     assert 0 <= station.read(136, "i") <= 4095

@@ -105,7 +105,7 @@ def test_the_other_wheel_rotates_on_until_the_pass_after_the_last_heartbeat(
         board.port.ask(beat)
     board.robot.left.brown_out(0.0)
     begin_s = board.time.monotonic()
-    # Whatever is sent now is handled at the end of the pass.
+    # Bytes sent now are handled at the end of the pass.
     if not is_beat_handled:
         board.port.send(beat)
     board.port.send(ZERO)
@@ -126,7 +126,7 @@ def test_a_button_that_is_held_for_three_seconds_drives(board: Bench) -> None:
     board.time.sleep(2.95)
     assert board.body() == (0.0, 0.0)
     board.time.sleep(0.2)
-    # Without a host that is connected.
+    # No host is connected.
     assert board.body() == pytest.approx((0.05, 0.0), abs=0.001)
     board.time.sleep(10.0)
     assert board.body() == (0.0, 0.0)

@@ -148,9 +148,9 @@ class Navigator(Companion):
 
     def take[Kind](self, kind: type[Kind]) -> Kind | None:
         """Return the oldest item of a kind, which is done with then."""
-        for item in self.told:
+        for item in self.received:
             if isinstance(item, kind):
-                self.told.remove(item)
+                self.received.remove(item)
                 return item
         return None
 
@@ -214,7 +214,7 @@ class Keeper:
 
     def __init__(self, run: ScenarioRun, settings: HouseSettings) -> None:
         self.house = House(settings)
-        self.told: list[str] = []
+        self.received: list[str] = []
         self._run = run
         self._new: list[ToProgram] = []
         self._program = Program("keeper", self._new.append, frozenset())
@@ -231,8 +231,8 @@ class Keeper:
             while self._new:
                 item = self._new.pop(0)
                 if isinstance(item, MessageSent):
-                    self.told.append(item.identifier)
-                    self.house.tell(item.identifier)
+                    self.received.append(item.identifier)
+                    self.house.receive(item.identifier)
             x_m, y_m, _ = robot.world.pose
             reported = self.house.advance(robot.world.time.world_s(), x_m, y_m)
             robot.world.put_obstacle("door", not self.house.is_door_open)
@@ -252,12 +252,12 @@ def test_a_courier_makes_its_rounds_answers_and_charges() -> None:
 
         run.until(lambda: is_near(1.5, 2.0), "the kitchen", 60.0)
         keeper.say("/order", "office")
-        run.until(lambda: "/tray/unlock" in keeper.told, "the tray to be unlocked", 300.0)
+        run.until(lambda: "/tray/unlock" in keeper.received, "the tray to be unlocked", 300.0)
         assert is_near(3.5, 0.0)
         assert run.is_standing
-        run.until(lambda: "/tray/lock" in keeper.told, "the tray to be locked")
+        run.until(lambda: "/tray/lock" in keeper.received, "the tray to be locked")
         run.until(lambda: keeper.house.battery_v < 11.4, "a low battery", 300.0)
-        assert "/door/open" in keeper.told
+        assert "/door/open" in keeper.received
         run.until(lambda: is_near(0.0, 0.0) and run.is_standing, "the dock", 300.0)
         run.until(lambda: keeper.house.battery_v > 12.3, "a full battery", 60.0)
         run.until(lambda: not is_near(0.0, 0.0), "the robot to go on")
@@ -266,7 +266,7 @@ def test_a_courier_makes_its_rounds_answers_and_charges() -> None:
 def test_a_courier_waits_safely_before_a_door_that_never_opens() -> None:
     with scenario_run("courier/courier", load_scene("rooms"), HOUSE, factor=FACTOR) as run:
         keeper = Keeper(run, HouseSettings(opens_after_s=math.inf, drain_v_s=0.0))
-        run.until(lambda: "/door/open" in keeper.told, "the door to be told", 300.0)
+        run.until(lambda: "/door/open" in keeper.received, "the door to receive it", 300.0)
         run.live(3.0)
         run.stand("the robot to wait")
         place = run.robot.world.pose

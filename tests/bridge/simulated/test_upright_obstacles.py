@@ -32,7 +32,7 @@ from robosc_simulated.scene import parse_scene
 from robosc_simulated.textures import PLAIN, Shades
 
 WALL, FLOOR = 130, PLAIN.shade
-# Of the way to a thing and of its edges: within it, rounding decides.
+# Tolerance of the way to a thing and of its edges: within it, rounding decides.
 _NEAR = 1e-7
 
 Ray = tuple[float, float, float]

@@ -14,7 +14,7 @@ def test_datagrams_come_whole_and_in_order_to_who_listens() -> None:
         assert (listens.port, listens.is_datagram) == (14550, True)
         with pytest.raises(LineBusyError):
             host.open_network("udpin:127.0.0.1:14550")
-        # Until it was called by somebody, it has nobody to write to.
+        # A listener has no one to write to until it was called.
         listens.write(b"lost")
         one, other = (host.open_network("udpout:127.0.0.1:14550") for _ in range(2))
         one.write(b"first")
@@ -59,7 +59,7 @@ def test_a_connection_carries_bytes_both_ways_until_one_end_is_closed() -> None:
         assert takes.read(1.0) == b"ask"
         takes.write(b"answer")
         takes.close()
-        # Everything sent before is read before the end is reported.
+        # All bytes sent before are read before the end is reported.
         assert calls.read(1.0) == b"answer"
         for use in (lambda: calls.read(1.0), lambda: calls.write(b"x")):
             with pytest.raises(LineLostError):

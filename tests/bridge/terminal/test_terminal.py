@@ -63,4 +63,4 @@ def test_without_a_terminal_it_is_wrong_use(daemon: FakeDaemon) -> None:
         command = [sys.executable, "-m", "robosc_bridge.command", "teleop", "--address", endpoint.address]
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)
         assert (done.returncode, done.stderr) == (2, "robosc-bridge: keys need a terminal, and there is none\n")
-    assert not daemon.told
+    assert not daemon.received

@@ -58,7 +58,7 @@ def test_a_sender_hears_what_comes_back(peer: socket.socket) -> None:
 
 
 def test_nobody_at_the_other_end_of_udp_is_no_loss() -> None:
-    # One of the ports that the system hands out to nobody.
+    # One of the ports that the system does not hand out.
     line = NetworkLine("udpout:127.0.0.1:1")
     for _ in range(5):
         line.write(b"hello")
@@ -104,7 +104,7 @@ def test_a_connection_carries_bytes_both_ways_and_reports_its_end(server: socket
 
 def test_nobody_serves_there() -> None:
     with socket.socket() as silent:
-        # It is taken, and nobody listens.
+        # It is taken, without a listener.
         silent.bind(("127.0.0.1", 0))
         with pytest.raises(LineMissingError, match="no program listens there"):
             NetworkLine(f"tcp:127.0.0.1:{_port(silent)}")

@@ -144,11 +144,11 @@ async def test_a_command_needs_the_token_and_a_stop_none(
 ) -> None:
     async with opened(endpoint.url) as page:
         await page.send(type="command", command="standby", token=token)
-        answer = await page.told("refused")
+        answer = await page.receive("refused")
         assert answer["what"] == "standby"
         assert "token" in answer["why"]
         await page.send(type="stop")
-        assert (await page.told("done"))["what"] == "stop"
+        assert (await page.receive("done"))["what"] == "stop"
     assert [order.command for order in robot.orders] == [OperatorCommand.STOP]
 
 
@@ -156,16 +156,16 @@ async def test_with_the_token_the_robot_is_commanded(endpoint: ViewEndpoint, rob
     async with opened(endpoint.url) as page:
         for command in ("standby", "start", "resume", "reset"):
             await page.send(type="command", command=command, token=token_of(endpoint.url))
-            assert (await page.told("done"))["what"] == command
+            assert (await page.receive("done"))["what"] == command
         robot.refusal = "the motors are hot"
         await page.send(type="command", command="start", token=token_of(endpoint.url))
-        assert (await page.told("refused"))["why"] == "the motors are hot"
+        assert (await page.receive("refused"))["why"] == "the motors are hot"
     assert [str(order.command) for order in robot.orders] == ["standby", "start", "resume", "reset", "start"]
     assert all("127.0.0.1" in order.by for order in robot.orders)
 
 
 async def test_a_command_is_taken_back_when_its_page_leaves(endpoint: ViewEndpoint, robot: LiveRobot) -> None:
-    robot.refusal = None  # Nobody answers.
+    robot.refusal = None  # The command is not answered.
     async with opened(endpoint.url) as page:
         await page.send(type="command", command="resume", token=token_of(endpoint.url))
         await until(lambda: bool(robot.orders))
@@ -199,9 +199,9 @@ async def test_what_makes_no_sense_is_refused_and_nothing_more(
     async with opened(endpoint.url) as page:
         for text in WRONG:
             await page.socket.send_str(text)
-            answer = await page.told("refused")
+            answer = await page.receive("refused")
             assert answer["why"].isprintable()
-        await page.told("update")
+        await page.receive("update")
     assert robot.orders == []
 
 
@@ -257,13 +257,13 @@ def test_there_is_a_limit_of_pages_and_of_connections(
                 except aiohttp.WSServerHandshakeError as error:
                     assert error.status == 503
                     await asyncio.sleep(0.005)
-            await page.told("update")
+            await page.receive("update")
 
     asyncio.run(pages())
     assert MAXIMUM_VIEWERS > 3
     runner = endpoint._server._runner
     assert runner is not None
-    # While those of the pages still end, they would take the places of the next two.
+    # Connections of pages that still end would take the places of the next two.
     wait_until(lambda: runner.server is not None and not runner.server.connections)
     monkeypatch.setattr(server_module, "MAXIMUM_CONNECTIONS", 2)
     host, _, port = endpoint.address.rpartition(":")

@@ -70,7 +70,7 @@ async def serving(*words: str) -> AsyncIterator[str]:
 async def done(page: Any, kind: str, **request: Any) -> dict[str, Any]:
     """Ask for something, and return the answer about the run."""
     await page.send(type=kind, **request)
-    answer: dict[str, Any] = await page.told("run")
+    answer: dict[str, Any] = await page.receive("run")
     return answer
 
 
@@ -93,7 +93,7 @@ def model(text: str, name: str = "tank.cif") -> watched_model.SynthesizedModel:
 
 async def test_what_is_shown(tmp_path: Path) -> None:
     async with serving(played(tmp_path / "tank.cif")) as url, opened(url) as page:
-        answer = await page.told("definition")
+        answer = await page.receive("definition")
         assert (answer["robot"], answer["deployment"], answer["source"]) == ("tank", "automata", "model")
         assert [(item["name"], item["role"]) for item in answer["components"]] == [
             ("sensor", "input variable"),
@@ -122,18 +122,18 @@ async def test_what_is_shown(tmp_path: Path) -> None:
         # The supervisor does not let it begin at 4. Input variables change at any time.
         assert play["beginnings"] == [f"tank.level = {level}" for level in range(4)]
         assert (play["forms"], play["language"], unpacked(play["link"])) == ([], "cif", TANK_AND_BELT)
-        first = await page.told("run")
+        first = await page.receive("run")
         assert first["lines"] == [
             "there are 4 states to begin in, and this begins where tank.level = 0: choose another one, and restart"
         ]
-        update = await page.told("update")
+        update = await page.receive("update")
         assert update["components"]["tank"] == {"state": "*", "variables": {"level": 0}}
         assert update["components"]["line.belt"]["state"] == "run"
 
 
 async def test_events_happen_and_the_others_say_why_not(tmp_path: Path) -> None:
     async with serving(played(tmp_path / "tank.cif")) as url, opened(url) as page:
-        answer = await page.told("run")
+        answer = await page.receive("run")
         assert answer["blocked"] == {
             "tank.u_drain": ["tank: tank.level > 1 does not hold (tank.level is 0)"],
             "line.belt.c_turn": ["line.belt is in run, not in jam"],
@@ -157,17 +157,17 @@ async def test_events_happen_and_the_others_say_why_not(tmp_path: Path) -> None:
         assert answer["lines"] == ["value of 'sensor' is 3, and must be boolean"]
         answer = await done(page, "undo")
         assert (answer["redo"], answer["entries"]) == ("tank.c_fill", 3)
-        assert (await page.told("update"))["components"]["tank"]["variables"] == {"level": 2}
+        assert (await page.receive("update"))["components"]["tank"]["variables"] == {"level": 2}
         answer = await done(page, "redo")
         assert (answer["redo"], answer["entries"]) == ("", 4)
         await page.send(type="save", form="log")
-        answer = await page.told("run")
+        answer = await page.receive("run")
         assert answer["lines"] == ["a run of automata is not saved: event logs and tests are of robots"]
 
 
 async def test_of_several_outcomes_one_is_chosen(tmp_path: Path) -> None:
     async with serving(played(tmp_path / "tank.cif")) as url, opened(url) as page:
-        await page.told("run")
+        await page.receive("run")
         answer = await done(page, "event", line="line.belt.u_go")
         assert (answer["kind"], answer["steps"]) == ("choose", 0)
         assert answer["lines"] == ["line.belt.u_go can lead to 2 states: choose one beside its button"]
@@ -189,8 +189,8 @@ async def test_of_several_outcomes_one_is_chosen(tmp_path: Path) -> None:
 async def test_many_outcomes_are_not_all_offered(tmp_path: Path) -> None:
     text = "input int[0..199] count;\nplant p: disc int[0..149] x in any; location: initial; marked; end\n"
     async with serving(played(tmp_path / "many.cif", text)) as url, opened(url) as page:
-        assert len((await page.told("definition"))["play"]["beginnings"]) == MAXIMUM_WAYS
-        assert "of which the first 100 are offered" in (await page.told("run"))["lines"][0]
+        assert len((await page.receive("definition"))["play"]["beginnings"]) == MAXIMUM_WAYS
+        assert "of which the first 100 are offered" in (await page.receive("run"))["lines"][0]
         answer = await done(page, "event", line="count")
         assert "200 states" in answer["lines"][0] and "offers the first 100" in answer["lines"][0]
         assert len(answer["choice"]["ways"]) == MAXIMUM_WAYS
@@ -200,13 +200,13 @@ async def test_many_outcomes_are_not_all_offered(tmp_path: Path) -> None:
 async def test_a_state_to_begin_in_is_chosen_and_kept(tmp_path: Path) -> None:
     async with serving(played(tmp_path / "tank.cif")) as url:
         async with opened(url) as page:
-            await page.told("run")
+            await page.receive("run")
             await page.send(type="resume", page="one")
             answer = await done(page, "restart", beginning=4)
             assert (answer["kind"], answer["lines"]) == ("wrong", ["there is no such state to begin in"])
             answer = await done(page, "restart", beginning=2)
             assert (answer["beginning"], answer["steps"]) == (2, 0)
-            assert (await page.told("update"))["components"]["tank"]["variables"] == {"level": 2}
+            assert (await page.receive("update"))["components"]["tank"]["variables"] == {"level": 2}
             await done(page, "event", line="line.belt.u_go", way=0)
             await done(page, "event", line="sensor", way=1)
             answer = await done(page, "restart")
@@ -214,9 +214,9 @@ async def test_a_state_to_begin_in_is_chosen_and_kept(tmp_path: Path) -> None:
             await done(page, "event", line="line.belt.u_go", way=0)
             assert (await done(page, "event", line="sensor true"))["steps"] == 2
         async with opened(url) as page:
-            await page.told("run")
+            await page.receive("run")
             await page.send(type="resume", page="one")
-            answer = await page.told("run")
+            answer = await page.receive("run")
             assert (answer["lines"], answer["beginning"]) == (["what this page did before is here again"], 2)
             assert (answer["steps"], [entry["event"] for entry in page.entries()]) == (
                 2,
@@ -226,7 +226,7 @@ async def test_a_state_to_begin_in_is_chosen_and_kept(tmp_path: Path) -> None:
 
 async def test_chance_and_findings(tmp_path: Path) -> None:
     async with serving(played(tmp_path / "tank.cif")) as url, opened(url) as page:
-        await page.told("run")
+        await page.receive("run")
         answer = await done(page, "walk", steps=30, seed=2)
         assert (answer["steps"], answer["lines"]) == (30, ["30 events by chance, seed 2"])
         assert all(entry["transitions"] for entry in page.entries())
@@ -243,8 +243,8 @@ async def test_the_page_follows_the_file_and_what_it_imports(tmp_path: Path, mon
     imported = f'import "rule.cif";\n{head}\n'
     async with serving(played(file, imported)) as url, opened(url) as page:
         # A link does not hold the files that the model imports.
-        assert (await page.told("definition"))["play"]["link"] is None
-        await page.told("run")
+        assert (await page.receive("definition"))["play"]["link"] is None
+        await page.receive("run")
         await done(page, "restart", beginning=1)
         await done(page, "event", line="line.belt.u_go", way=0)
         await done(page, "event", line="tank.c_fill")
@@ -260,7 +260,7 @@ async def test_the_page_follows_the_file_and_what_it_imports(tmp_path: Path, mon
         update = await page.until(lambda message: message["type"] == "update" and message["warnings"])
         (warning,) = update["warnings"]
         assert "this is not what it says" in warning["text"] and "rule.cif:1:" in warning["text"]
-        # Without a supervisor the page says what is to blame.
+        # The page says what is to blame where there is no supervisor.
         played(rule, "requirement invariant tank.level > 4;")
         update = await page.until(
             lambda message: (
@@ -283,7 +283,7 @@ async def test_a_link_names_the_language_and_reads_no_file(tmp_path: Path) -> No
     played(secret, "plant Secret: location: initial; marked; end")
     async with serving(played(tmp_path / "gate.gen", GEN)) as url, opened(url) as page:
         token = token_of(url)
-        assert (await page.told("definition"))["play"]["language"] == "gen"
+        assert (await page.receive("definition"))["play"]["language"] == "gen"
         await page.send(type="model", packed=packed(TANK_AND_BELT), language="cif", token=token)
         assert await changed(page) == ["this is the model of the link"]
         importing = f'import "{secret}";\n{TANK_AND_BELT}'
@@ -317,9 +317,9 @@ def test_names_may_be_anything(tmp_path: Path) -> None:
 
     async def run() -> None:
         async with serving(played(tmp_path / "odd.wmod", ODD)) as url, opened(url) as page:
-            answer = await page.told("definition")
+            answer = await page.receive("definition")
             assert [item["event"] for item in answer["play"]["events"]] == ["constructor", odd]
-            await page.told("run")
+            await page.receive("run")
             assert (await done(page, "event", line="constructor"))["steps"] == 1
             answer = await done(page, "event", line=odd)
             assert answer["choice"] == {"event": odd, "line": odd, "ways": ["a b = <i>on</i>", "a b = x, y = 1"]}

@@ -50,8 +50,8 @@ def test_a_log_is_served_until_a_signal_comes(files: tuple[Path, Path]) -> None:
 
         async def look() -> None:
             async with opened(url) as page:
-                assert (await page.told("definition"))["log"]["count"] == 50
-                assert (await page.told("update"))["enabled"]
+                assert (await page.receive("definition"))["log"]["count"] == 50
+                assert (await page.receive("update"))["enabled"]
 
         asyncio.run(look())
         process.send_signal(signal.SIGINT)
@@ -66,7 +66,7 @@ def test_it_ends_with_its_input_where_it_is_asked_to(files: tuple[Path, Path]) -
 
         async def look() -> None:
             async with opened(url) as page:
-                await page.told("update")
+                await page.receive("update")
 
         asyncio.run(look())
         process.stdin.close()

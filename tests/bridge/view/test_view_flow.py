@@ -105,7 +105,7 @@ async def test_every_event_comes_once_and_in_its_order(
     robot = large_robot()
     async with way(robot) as url, opened(url) as page:
         assert (await page.next())["type"] == "definition"
-        await page.told("update")
+        await page.receive("update")
         taken = await lived(page, robot, EVENTS)
         await page.until(is_final(robot))
         check_whole(page, robot, taken)
@@ -115,7 +115,7 @@ async def test_the_lit_transitions_lead_from_state_to_state() -> None:
     robot = large_robot()
     async with viewed_meanwhile(robot) as endpoint, opened(endpoint.url) as page:
         definition = await page.next()
-        await page.told("update")
+        await page.receive("update")
         edges = {
             (component["name"], edge["id"]): edge
             for component in definition["components"]
@@ -146,7 +146,7 @@ async def test_who_does_not_read_loses_entries_learns_how_many_and_is_heard_all_
     note = {"time": time.time(), "kind": "device", "what": "x" * 250}
     count = 12 * MAXIMUM_EVENTS
     async with viewed_meanwhile(robot) as endpoint, opened(endpoint.url) as page:
-        await page.told("update")
+        await page.receive("update")
         # No byte is taken off the connection from now on.
         connection = page.socket._response.connection
         assert connection is not None and connection.transport is not None
@@ -179,5 +179,5 @@ async def test_a_reader_that_is_gone_without_a_word_holds_up_nobody() -> None:
         with socket.create_connection((host, port)) as silent:
             silent.sendall(b"GET /stream HTTP/1.1\r\nHost: ")
             async with opened(endpoint.url) as page:
-                await page.told("update")
+                await page.receive("update")
                 await lived(page, robot, 20)

@@ -112,7 +112,7 @@ def test_the_initial_state_is_on_top_and_what_it_leads_to_below(seed: int) -> No
             if item.source == name and item.target not in reached:
                 reached.add(item.target)
                 waiting.append(item.target)
-    # Whatever can be reached hangs on something above it.
+    # Every reachable state hangs on something above it.
     for name in reached - {initial}:
         assert any(item.target == name and layers[item.source] < layers[name] for item in ways) or any(
             item.source == name and layers[item.target] < layers[name] for item in ways

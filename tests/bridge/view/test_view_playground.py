@@ -110,9 +110,9 @@ def components(update: dict[str, Any]) -> set[str]:
 async def test_what_is_shown_first() -> None:
     files = Files()
     async with looking(files) as page:
-        definition = await page.told("definition")
+        definition = await page.receive("definition")
         assert (definition["source"], definition["can_command"]) == (str(SourceKind.MODEL), False)
-        update = await page.told("update")
+        update = await page.receive("update")
         assert update["enabled"] and not update["warnings"]
         assert not page.entries()
         await files.look()
@@ -122,14 +122,14 @@ async def test_what_is_shown_first() -> None:
 async def test_a_change_is_shown_and_what_is_wrong_is_reported() -> None:
     files = Files()
     async with looking(files) as page:
-        await page.told("definition")
-        before = components(await page.told("update"))
+        await page.receive("definition")
+        before = components(await page.receive("update"))
         files.content = "second"
         await files.look()
         files.made.set_result(SynthesizedModel(SECOND))
         await files.look()
-        await page.told("definition")
-        after = components(await page.told("update"))
+        await page.receive("definition")
+        after = components(await page.receive("update"))
         assert before < after
         files.content = "third"
         await files.look()
@@ -152,7 +152,7 @@ async def test_a_change_is_shown_and_what_is_wrong_is_reported() -> None:
 async def test_a_change_ends_the_synthesis_of_the_one_before_and_so_does_the_end() -> None:
     files = Files()
     async with looking(files) as page:
-        await page.told("update")
+        await page.receive("update")
         for content in ("second", "third"):
             files.content = content
             await files.look()
@@ -199,7 +199,7 @@ def test_nothing_of_the_folder_that_one_works_in_is_run(tmp_path: Path, monkeypa
 
 
 async def test_one_that_is_not_wanted_any_more_is_ended(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    # Reading it never ends, since nobody writes.
+    # Reading it never ends without a writer.
     model = tmp_path / "pipe.rscd"
     os.mkfifo(model)
     started = []
@@ -250,7 +250,7 @@ async def test_the_command_follows_its_file(tmp_path: Path, suffix: str, monkeyp
     command.add_parser(parser.add_subparsers())
     make, is_shared, robot = command._source(parser.parse_args(["view", "--model", str(file)]))
     async with served(make, is_shared=is_shared, robot=robot) as server, opened(server.url) as page:
-        before = components(await page.told("update"))
+        before = components(await page.receive("update"))
         write(SECOND, 3)
         await page.until(lambda message: message["type"] == "update" and components(message) > before)
         file.write_bytes(b"robot {")
@@ -306,18 +306,18 @@ class Playing(Files):
 async def done(view: Any, kind: str, **request: Any) -> dict[str, Any]:
     """Ask for something, and return the answer about the run."""
     await view.send(type=kind, **request)
-    answer: dict[str, Any] = await view.told("run")
+    answer: dict[str, Any] = await view.receive("run")
     return answer
 
 
 async def test_events_happen_with_their_data_and_are_taken_back() -> None:
     async with looking(Playing()) as page:
-        definition = await page.told("definition")
+        definition = await page.receive("definition")
         events = {item["event"]: item for item in definition["play"]["events"]}
         assert [name for name, item in events.items() if item["controllable"]] == ["open.request", "shut.request"]
         (field,) = events["light.response"]["fields"]
         assert field == {"path": [], "type": "Light", "choices": ["day", "night"], "is_boolean": False}
-        first = await page.told("run")
+        first = await page.receive("run")
         assert (first["steps"], first["undo"], first["redo"], first["is_marked"]) == (0, "", "", True)
         assert first["blocked"]["shut.request"] == ["Gate is in closed, not in opened"]
         answer = await done(page, "event", line="open")
@@ -354,7 +354,7 @@ async def test_events_happen_with_their_data_and_are_taken_back() -> None:
 
 async def test_chance_and_findings() -> None:
     async with looking(Playing()) as page:
-        answer = await page.told("run")
+        answer = await page.receive("run")
         answer = await done(page, "walk", steps=12, seed=3)
         assert (answer["steps"], answer["lines"]) == (12, ["12 events by chance, seed 3"])
         twin = Run(supervisor_in(playable_automata(GATE)))
@@ -374,17 +374,17 @@ async def test_chance_and_findings() -> None:
 
 async def test_a_run_is_kept_as_a_log_and_as_a_test() -> None:
     async with looking(Playing()) as page:
-        await page.told("run")
+        await page.receive("run")
         await done(page, "event", line="light day")
         await done(page, "event", line="open")
         twin = Run(supervisor_in(playable_automata(GATE)))
         twin.step("light.response", "day")
         twin.step("open.request")
         await page.send(type="save", form="log")
-        answer = await page.told("saved")
+        answer = await page.receive("saved")
         assert (answer["name"], answer["text"]) == ("gate.jsonl", event_log(twin))
         await page.send(type="save", form="test")
-        answer = await page.told("saved")
+        answer = await page.receive("saved")
         assert answer["name"] == "test_gate.py"
         assert "MODEL = FOLDER / 'gate.rscd'" in answer["text"]
         assert "'open.request'" in answer["text"]
@@ -398,8 +398,8 @@ async def test_each_page_has_a_run_of_its_own() -> None:
         opened(server.url) as one,
         opened(server.url) as other,
     ):
-        await one.told("run")
-        await other.told("run")
+        await one.receive("run")
+        await other.receive("run")
         assert (await done(one, "event", line="light day"))["steps"] == 1
         assert (await done(other, "undo"))["steps"] == 0
 
@@ -407,7 +407,7 @@ async def test_each_page_has_a_run_of_its_own() -> None:
 async def test_a_saved_file_says_what_has_changed_and_the_run_happens_again() -> None:
     files = Playing()
     async with looking(files) as page:
-        await page.told("run")
+        await page.receive("run")
         await done(page, "event", line="light day")
         await done(page, "event", line="open")
         files.content = "second"
@@ -439,10 +439,10 @@ async def test_a_link_holds_the_model() -> None:
     files = Playing()
     async with served(files.source, is_shared=False, robot=files.robot) as server, opened(server.url) as page:
         token = token_of(server.url)
-        link = (await page.told("definition"))["play"]["link"]
+        link = (await page.receive("definition"))["play"]["link"]
         assert unpacked(link) == GATE
-        await page.told("run")
-        # Somebody else's link does not set this machine to work.
+        await page.receive("run")
+        # The link of another user does not set this machine to work.
         for shown in (None, "x", 3):
             await page.send(type="model", packed=packed("robot Other { }"), token=shown)
             answer = await page.until(lambda message: message["type"] in ("refused", "run"))
@@ -465,23 +465,23 @@ async def test_a_page_that_comes_back_goes_on_with_its_run() -> None:
     files = Playing()
     async with served(files.source, is_shared=False, robot=files.robot) as server:
         async with opened(server.url) as page:
-            await page.told("run")
-            # Nothing was kept of it yet.
+            await page.receive("run")
+            # The run has not been kept yet.
             await page.send(type="resume", page="one")
             await done(page, "event", line="light day")
             assert (await done(page, "event", line="open"))["steps"] == 2
         async with opened(server.url) as page, opened(server.url) as other:
-            await page.told("run")
+            await page.receive("run")
             answer = await done(page, "resume", page="one")
             assert (answer["steps"], answer["lines"]) == (2, ["what this page did before is here again"])
             assert [entry["event"] for entry in page.entries()] == ["light.response", "open.request"]
-            await other.told("run")
+            await other.receive("run")
             await other.send(type="resume", page="two")
             assert (await done(other, "event", line="seen 1"))["steps"] == 1
             await page.send(type="model", packed=packed("robot Other { }"), token=token_of(server.url))
             await page.until(lambda message: message["type"] == "run" and message["kind"] == "changed")
         async with opened(server.url) as page:
-            first = components(await page.told("update"))
+            first = components(await page.receive("update"))
             await page.send(type="resume", page="one")
             # The model of the link is kept, too.
             await page.until(lambda message: message["type"] == "update" and components(message) != first)
@@ -522,7 +522,7 @@ async def test_what_is_shown_live_is_not_led_by_hand() -> None:
     recording = Recording(log, supervisor_in(made))
     async with served(lambda: Replay(recording), is_shared=False) as server, opened(server.url) as page:
         await page.send(type="undo")
-        assert "only a model alone is" in (await page.told("refused"))["why"]
+        assert "only a model alone is" in (await page.receive("refused"))["why"]
 
 
 def test_changes_of_the_supervisor_are_reported() -> None:
@@ -573,7 +573,7 @@ async def test_the_command_plays_with_a_file_a_text_or_a_link(
     make, is_shared, robot = command._source(arguments)
     assert (is_shared, robot is not None and robot.shape.name) == (False, "Gate")
     async with served(make, is_shared=is_shared, robot=robot) as server, opened(server.url) as page:
-        await page.told("run")
+        await page.receive("run")
         assert (await done(page, "event", line="light day"))["steps"] == 1
 
 

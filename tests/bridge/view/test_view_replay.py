@@ -86,7 +86,7 @@ async def test_every_place_shows_the_state_after_the_last_entry_before_it(tmp_pa
         served(lambda: Replay(recording), is_shared=False, robot=recording.robot) as server,
         opened(server.url) as page,
     ):
-        definition = await page.told("definition")
+        definition = await page.receive("definition")
         assert definition["source"] == "log"
         assert definition["can_command"] is False
         assert definition["log"] == {
@@ -94,7 +94,7 @@ async def test_every_place_shows_the_state_after_the_last_entry_before_it(tmp_pa
             "end_s": pytest.approx(BEGIN_S + STEP_S * 399),
             "count": 400,
         }
-        await page.told("update")
+        await page.receive("update")
         for _ in range(12):
             number = dice.randrange(1, 400)
             time_s = BEGIN_S + STEP_S * (number - 1) + 0.05
@@ -120,23 +120,23 @@ async def test_it_plays_to_the_end_and_every_entry_comes_once(tmp_path: Path) ->
         opened(server.url) as page,
         opened(server.url) as other,
     ):
-        await page.told("update")
-        await other.told("update")
+        await page.receive("update")
+        await other.receive("update")
         await page.send(type="play", speed=40)
         await page.until(_stands_at(BEGIN_S + STEP_S * 299))
         await page.until(lambda message: message["type"] == "update" and shown(message) == written.states[-1])
         assert [entry["number"] for entry in page.entries()] == list(range(1, 301))
         assert [entry["event"] for entry in page.entries()] == written.events
         # Each page has a place of its own.
-        assert shown(await other.told("update")) == written.states[1]
+        assert shown(await other.receive("update")) == written.states[1]
         await page.send(type="play", speed=0.5)
-        begun = await page.told("position")
+        begun = await page.receive("position")
         # It stood at the end, 29.9 s later.
         assert begun["is_playing"] and begun["time_s"] < BEGIN_S + 20.0
         await page.send(type="pause")
         await page.until(lambda message: message["type"] == "position" and not message["is_playing"])
         await page.send(type="stop")
-        assert (await page.told("refused"))["what"] == "stop"
+        assert (await page.receive("refused"))["what"] == "stop"
 
 
 def _is_update_of(time_s: float) -> Any:

@@ -72,7 +72,7 @@ def test_without_the_model_the_automata_are_shown_all_the_same(large: Supervisor
 def test_a_node_of_before_does_not_report_where_services_are(large: Supervisor, tmp_path: Path) -> None:
     text = Node(large, tmp_path).system.report()
     state = json.loads(text)
-    # In C++ it is sent in the same words: the test of those nodes has this list, too.
+    # The words are the same in C++: the test of those nodes has this list, too.
     assert list(state) == ["current", "communications", "transitions", "definition"]
     assert state.pop("communications") == {"hold2": "idle", "hold5": "idle"}
     reader = StateReader(large)

@@ -94,7 +94,7 @@ def frame(**request: str) -> bytes:
 
 
 def fill(endpoint: ViewEndpoint, robot: LiveRobot, pages: int, pass_by: Callable[[float], None]) -> None:
-    """Tell more than the buffers on the way hold: until the server has something for each that nobody takes."""
+    """Send more than the buffers on the way hold, until the server has an unread message for each page."""
     note = {"time": time.time(), "kind": "device", "what": "x" * 280}
     end_s = time.monotonic() + LIMIT_S
     while sum(item.get_write_buffer_size() > 0 for item in tuple(endpoint._server._sockets.values())) < pages:
@@ -109,7 +109,7 @@ def see_a_place(endpoint: ViewEndpoint, loop: HeldLoop) -> None:
 
     async def look() -> None:
         async with opened(endpoint.url) as page:
-            arrival = asyncio.create_task(page.told("update"))
+            arrival = asyncio.create_task(page.receive("update"))
             while not arrival.done():
                 await asyncio.to_thread(loop.advance, server_module.BATCH_S)
             await arrival
@@ -208,5 +208,5 @@ def test_the_server_ends_beside_those_who_take_nothing(robot: LiveRobot, monkeyp
     with viewed(robot) as endpoint, slow(endpoint):
         fill(endpoint, robot, 1, time.sleep)
         endpoint.stop()
-        # A busy machine may take longer for it than whoever stops it waits.
+        # A busy machine may take longer for it than its stop waits.
         wait_until(lambda: not endpoint.is_alive)

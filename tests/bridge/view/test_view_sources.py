@@ -36,19 +36,19 @@ async def test_a_bridge_that_ends_is_reported_and_found_again(
     endpoint = serve(robot.operations, RemoteSettings("127.0.0.1:0"))
     try:
         async with remotely_viewed(endpoint.address) as server, opened(server.url) as page:
-            await page.told("definition")
-            await page.told("update")
+            await page.receive("definition")
+            await page.receive("update")
             await asyncio.to_thread(endpoint.stop)
-            assert (await page.told("gone"))["why"]
+            assert (await page.receive("gone"))["why"]
             await page.send(type="stop")
-            assert "bridge" in (await page.told("refused"))["why"]
+            assert "bridge" in (await page.receive("refused"))["why"]
             # A page that comes now learns it, too.
             async with opened(server.url) as late:
                 assert (await late.next())["type"] == "gone"
             again = serve(robot.operations, RemoteSettings(endpoint.address))
             try:
-                await page.told("definition")
-                await page.told("update")
+                await page.receive("definition")
+                await page.receive("update")
                 robot.step()
                 await page.until(lambda message: message["type"] == "events" and message["entries"])
             finally:
@@ -76,17 +76,17 @@ def test_a_bridge_elsewhere_is_commanded(robot: LiveRobot) -> None:
 
     async def look() -> None:
         async with remotely_viewed(endpoint.address) as server, opened(server.url) as page:
-            await page.told("definition")
+            await page.receive("definition")
             await page.send(type="stop")
-            assert (await page.told("done"))["what"] == "stop"
+            assert (await page.receive("done"))["what"] == "stop"
             await page.until(lambda message: "OPERATOR_STOP" in json.dumps(message.get("reasons")))
             await page.send(type="command", command="resume", token=token_of(server.url))
-            assert (await page.told("done"))["what"] == "resume"
+            assert (await page.receive("done"))["what"] == "resume"
             robot.refusal = "not now"
             await page.send(type="command", command="start", token=token_of(server.url))
-            assert (await page.told("refused"))["why"] == "not now"
+            assert (await page.receive("refused"))["why"] == "not now"
             await page.send(type="play", speed=1)
-            assert (await page.told("refused"))["what"] == "play"
+            assert (await page.receive("refused"))["what"] == "play"
 
     try:
         asyncio.run(look())
@@ -129,8 +129,8 @@ async def test_at_rest_there_is_a_sign_of_life_and_nothing_is_executed(
     robot.state = State.STANDBY
     robot.show()
     async with viewed_meanwhile(robot) as endpoint, opened(endpoint.url) as page:
-        await page.told("definition")
-        first, second = await page.told("update"), await page.told("update")
+        await page.receive("definition")
+        first, second = await page.receive("update"), await page.receive("update")
         assert second["number"] > first["number"]
         assert second["age_s"] > first["age_s"]
         assert (second["state"], second["components"], second["enabled"]) == ("standby", {}, [])
@@ -141,11 +141,11 @@ async def test_the_feed_is_asked_only_while_somebody_looks(robot: LiveRobot) -> 
     async with served(lambda: RunningBridge(robot.operations)) as server:
         assert not robot.feed.is_watched
         async with opened(server.url) as page:
-            await page.told("update")
+            await page.receive("update")
             assert robot.feed.is_watched
         await until(lambda: not robot.feed.is_watched)
         async with opened(server.url) as page:
-            await page.told("update")
+            await page.receive("update")
 
 
 def update(builder: MessageBuilder, status: Status) -> Any:

@@ -130,7 +130,7 @@ async def test_who_comes_and_goes_and_hammers_on_the_button_starts_few_threads(r
             await press(page, 3)
             gate.is_open.set()
             await until_stopped(robot, 1)
-            assert (await page.told("done"))["what"] == "stop"
+            assert (await page.receive("done"))["what"] == "stop"
         assert {order.command for order in robot.orders} == {OperatorCommand.STOP}
 
 
@@ -147,7 +147,7 @@ async def test_a_stop_that_is_wanted_while_one_is_under_way_follows_it(
             gate.is_open.set()
             await until_stopped(robot, 2)
             for _ in range(31):
-                assert (await page.told("done"))["what"] == "stop"
+                assert (await page.receive("done"))["what"] == "stop"
         # One for the first, and one for all who came after it, also for who has left.
         assert [order.command for order in robot.orders] == [OperatorCommand.STOP] * 2
         async with opened(server.url) as page:
@@ -160,7 +160,7 @@ async def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(
 ) -> None:
     assert remote_bridge.FOLLOW_S <= 0.5
     monkeypatch.setattr(remote_bridge, "FOLLOW_S", 0.01)
-    # Whatever ends one, it is not its time.
+    # The time limit ends neither of them.
     monkeypatch.setattr(client, "STOP_LIMIT_S", 10 * LIMIT_S)
     async with Gate(address).standing() as gate, remotely_viewed(gate.address) as server, opened(server.url) as page:
         # The definition and a stop come first; then one after the other, each on a way of its own.
@@ -170,9 +170,9 @@ async def test_a_stop_that_hangs_holds_up_the_next_one_only_shortly(
         await press(page, 1)
         assert not any(message.get("what") == "stop" for message in page.messages)
         assert robot.orders == []
-        # In the end who wanted it learns that nobody has heard it.
+        # The page that wanted it learns in the end that the robot has not heard it.
         gate.fall()
-        assert (await page.told("refused"))["what"] == "stop"
+        assert (await page.receive("refused"))["what"] == "stop"
 
 
 async def test_who_comes_and_goes_asks_a_bridge_once_what_it_is(robot: LiveRobot, address: str) -> None:
@@ -183,4 +183,4 @@ async def test_who_comes_and_goes_asks_a_bridge_once_what_it_is(robot: LiveRobot
         assert asking() <= 1
         async with opened(server.url) as page:
             gate.is_open.set()
-            await page.told("definition")
+            await page.receive("definition")

@@ -198,7 +198,7 @@ def test_what_is_remembered_of_missions_reads_as_sentences(model: Model) -> None
         "detour 2 of mission rounds is at visit 1",
     ]
     assert expression_text(owed.aims[-2].condition) == "detour 2 of mission rounds is not at visit 1"
-    # Whatever a mission is called: the verb is the last one.
+    # The verb is the last one, whatever the name of a mission.
     (place,) = journey(Mission("is", (ATOMS[0], ATOMS[1])), 0).exclusive[0]
     assert expression_text(journey(Mission("is", (ATOMS[0],)), 0).aims[0].condition).startswith("holds(")
     named = journey(Mission("is", (ATOMS[0], ATOMS[1])), 0).aims[1].condition

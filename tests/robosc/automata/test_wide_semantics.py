@@ -140,7 +140,7 @@ def test_a_plant_condition_bars_an_event_whoever_controls_it(event: str, states:
     assert not any(Semantics(strict).bad(("l", n)) for n in (2, 3))
     result = synthesize(strict)
     assert (result.statistics.states, result.added) == (states, ())
-    # As a requirement it is a duty, which nobody can fulfil here.
+    # The requirement is a duty that cannot be fulfilled here.
     only_required = replace(counting("u_count"), conditions=(EventCondition("u_count", below(2)),))
     assert synthesize(only_required).status is SynthesisStatus.EMPTY
 
@@ -206,7 +206,7 @@ def test_choices_between_edges_are_reported() -> None:
     assert str(choices(made)[0]) == "A: go has several edges that can be taken in one state of a"
     assert {item.event for item in edge_choices(made)} == {"go", "u_back"}
     assert [str(item)[:1] for item in edge_choices(made, is_controllable=False)] == ["A"]
-    # There is no choice if the other automaton blocks the event, or if an edge leaves a range.
+    # No choice remains if the other automaton blocks the event, or if an edge leaves a range.
     blocking = replace(made, automata=(made.automata[0], automaton("B", ["m -x-> m"], blocks=["go"])))
     assert choices(replace(blocking, events=(*made.events, Event("x", True)))) == ()
     narrow = DiscreteVariable("n", IntegerType(0, 1), (0,))
@@ -262,6 +262,6 @@ def test_an_input_variable_has_any_value_at_any_time() -> None:
     assert len(semantics.initial_states) == 4
     assert semantics.targets(("here", 0, "a"), "sensor.changes") == {("here", value, "a") for value in range(4)}
     assert [semantics.condition(("here", value, "a"), "go") for value in range(4)] == [False, False, True, True]
-    # Whatever the sensor says may change to 3, so the supervisor never lets the plant go.
+    # Every value of the sensor may change to 3, so the supervisor never lets the plant go.
     assert synthesize(made).statistics.states == 4
     assert synthesize(replace(made, invariants=(TRUE,))).statistics.states == 8

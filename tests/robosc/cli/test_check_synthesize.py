@@ -76,7 +76,7 @@ def test_synth_prints_the_warnings_and_the_exit_status_stays(capsys: pytest.Capt
 def test_deployment_and_engine_are_those_of_the_synthesis(
     capsys: pytest.CaptureFixture[str], write: Any, engine: str
 ) -> None:
-    # As a layer it needs to tell the two messages apart.
+    # A layer needs to tell the two messages apart.
     recognized_by_data = LIGHTS.replace('"/light", type: none', '"/light", type: boolean')
     recognized_by_data = recognized_by_data.replace("type: boolean", "type: boolean, when: value", 1)
     model = write(recognized_by_data)

@@ -61,7 +61,7 @@ def content(name: str) -> str:
     return Path(name).read_bytes().decode("utf-8")
 
 
-# In place
+# Formatting in place
 
 
 def test_files_are_written_in_place_and_listed(files: Files, capsys: pytest.CaptureFixture[str]) -> None:

@@ -229,8 +229,8 @@ def test_a_controller_follows_its_strategy(capsys: pytest.CaptureFixture[str], m
     monkeypatch.setattr("sys.stdin", typed("arrived\ncall\nundo\ncall\narrived\nstrategy 1\nredo\nundo\nquit\n"))
     assert main(["simulate", "lift.rscd"]) == 0
     lines = capsys.readouterr().out.splitlines()
-    told = [line.partition(" ")[2].strip() for line in lines if line.startswith(("goals ", "strategy "))]
-    assert told == [
+    goals = [line.partition(" ")[2].strip() for line in lines if line.startswith(("goals ", "strategy "))]
+    assert goals == [
         *("1 not yet", "call.request"),  # a message that means nothing
         *("1 not yet", "waits"),  # called
         *("1 not yet", "call.request"),  # taken back
@@ -331,3 +331,78 @@ def test_help_lists_every_command_of_the_shell(folder: Path) -> None:
     shell: Any = Shell(Run(made), ModelOfTest(folder / "gate.rscd"))
     listed = {word for line in HELP.splitlines() for word in re.findall(r"[a-z-]+", line)}
     assert set(shell._commands) <= listed
+
+
+DENIED = """robot Gate {
+    component Door {
+        incoming message open with type: none
+        incoming message call with type: none
+        outgoing message opened with type: none
+        behaviour {
+            initial marked state shut { on request to open goto opening }
+            state opening { on response from opened goto ajar }
+            marked state ajar { on request to call goto shut }
+        }
+    }
+    goal always eventually Door.ajar
+}
+"""
+
+
+@pytest.fixture
+def denied(folder: Path) -> str:
+    (folder / "denied.rscd").write_text(DENIED, encoding="utf-8")
+    return "denied.rscd"
+
+
+def test_the_surroundings_play_against_the_user(
+    denied: str, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("sys.stdin", io.StringIO("help\nenabled\nopen\nwait 2\nwhy opened\nundo\n"))
+    assert main(["simulate", denied, "--counter-strategy"]) == 0
+    found = capsys.readouterr().out
+    assert "wait [N]" in found and "strategy N" not in found
+    assert "   1  you           open.request: Door = opening" in found
+    assert "denied    goal 1, whatever you do" in found
+    assert "the surroundings wait, too" in found and "the surroundings decide it" in found
+    assert "can come" not in found
+    assert "taken back: open.request" in found
+
+
+def test_scripts_against_the_surroundings_say_whose_each_event_is(
+    denied: str, folder: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (folder / "moves.txt").write_text("wait\nopen\nwait\n", encoding="utf-8")
+    assert main(["simulate", denied, "--counter-strategy", "--json", "--events", "moves.txt"]) == 0
+    *steps, end = map(json.loads, capsys.readouterr().out.splitlines())
+    assert [(item["event"], item["by"]) for item in steps] == [("open.request", "you")]
+    assert (end["denied"], end["assumptions"], end["goals"]) == ("goal 1", [], [False])
+    (folder / "moves.txt").write_text("opened\n", encoding="utf-8")
+    assert main(["simulate", denied, "--counter-strategy", "--events", "moves.txt"]) == 1
+    assert "the surroundings decide it" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    ("words", "status", "message"),
+    [
+        (["denied.rscd", "--counter-strategy", "--random", "3", "--strategy"], 2, "--strategy: there is none"),
+        (["denied.rscd", "--counter-strategy", "--until-finding", "3"], 2, "--until-finding"),
+        (["denied.rscd", "--counter-strategy", "--deployment", "layer"], 2, "for controllers"),
+        (["gate.rsup", "--counter-strategy"], 2, "for the model of a robot"),
+        (["gate.rscd", "--counter-strategy"], 1, "the model has no goals"),
+        (["reached.rscd", "--counter-strategy"], 1, "every goal can be reached"),
+        (["broken.rscd", "--counter-strategy"], 1, "syntax-error"),
+        (["broken.rscd", "--counter-strategy", "--json", "--random", "1"], 1, ""),
+    ],
+)
+def test_no_counter_strategy(
+    denied: str, folder: Path, capsys: pytest.CaptureFixture[str], words: list[str], status: int, message: str
+) -> None:
+    (folder / "reached.rscd").write_text(DENIED.replace("Door.ajar", "Door.shut or Door.opening"), encoding="utf-8")
+    (folder / "broken.rscd").write_text("robot", encoding="utf-8")
+    try:
+        found = main(["simulate", *words])
+    except SystemExit as error:
+        found = int(str(error.code))
+    assert found == status
+    assert message in capsys.readouterr().err

@@ -8,6 +8,7 @@ import pytest
 
 from robosc.cli.main import main
 from robosc.supervisor import decode, encode
+from support.goal_porter import PORTER
 from support.models import EXAMPLES
 from support.mutants import change
 
@@ -83,6 +84,39 @@ def test_what_is_not_checked_is_said_and_counts_where_it_is_to(capsys: pytest.Ca
     assert main(["verify", right, NAVIGATION, "--limit", "0", "--strict"]) == 1
     assert "not checked: safe, controllable, nonblocking, maximally permissive" in capsys.readouterr().out
     assert _json(capsys, right, NAVIGATION, "--limit", "0")[1]["status"] == "not checked"
+
+
+def test_a_strategy_is_checked_and_it_is_said_where_it_is_not(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    (tmp_path / "porter.rscd").write_text(PORTER)
+    model, right, idle = (str(tmp_path / name) for name in ("porter.rscd", "porter.rsup", "idle.rsup"))
+    assert main(["synth", model, "-o", right]) == 0
+    capsys.readouterr()
+    assert main(["verify", right, model]) == 0
+    assert "  goals                 passed" in capsys.readouterr().out.splitlines()
+    # Its states are few enough, but not its positions under the strategy: a tenth of the limit.
+    assert main(["verify", right, model, "--limit", "100"]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == f"{right}: not checked: goals"
+    assert "  nonblocking           passed" in lines and "  goals                 not checked" in lines
+    assert lines[-1] == "note: the certificate says 'passed' for what was not checked here: goals"
+    status, document = _json(capsys, right, model, "--limit", "100")
+    assert (status, document["status"], document["checks"]["goals"]) == (1, "not checked", "not checked")
+    # A strategy that requests nothing keeps callers waiting.
+    supervisor = decode(Path(right).read_bytes())
+    assert supervisor.strategy is not None
+    Path(idle).write_bytes(encode(change(supervisor, strategy=change(supervisor.strategy, modes=((), ())))))
+    assert main(["verify", "-q", idle, model]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[0] == f"{idle}: failed: no right supervisor of {model}"
+    assert lines[1] == "certificate: it says 'goals: passed', which is false"
+    assert lines[2].startswith("goals: under the strategy goal 1 may never come true again")
+    assert lines[3] == "  after (there may be shorter runs): call.response"
+    assert lines[4] == "  in: Door = shut, Base = outside, Caller = waiting"
+    status, document = _json(capsys, idle, model)
+    assert (status, document["status"], document["checks"]["goals"]) == (1, "failed", "failed")
+    assert document["faults"][-1]["trace"] == ["call.response"]
 
 
 def test_a_supervisor_without_its_model_is_wrong_use(capsys: pytest.CaptureFixture[str], right: str) -> None:
@@ -197,3 +231,11 @@ def test_synthesis_verifies_up_to_the_given_limit(capsys: pytest.CaptureFixture[
     assert main(["synth", NAVIGATION, "--verify-limit", "0", "--json"]) == 0
     document = json.loads(capsys.readouterr().out)
     assert document["summary"]["certificate"]["safe"] == "not checked"
+
+
+def test_synthesis_checks_a_strategy_up_to_the_given_limit(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    (tmp_path / "porter.rscd").write_text(PORTER)
+    for limit, outcome in (("100", "not checked"), ("1000", "passed")):
+        assert main(["synth", str(tmp_path / "porter.rscd"), "--verify-limit", limit, "--json"]) == 0
+        certificate = json.loads(capsys.readouterr().out)["summary"]["certificate"]
+        assert (certificate["nonblocking"], certificate["goals"]) == ("passed", outcome)

@@ -1,4 +1,4 @@
-"""Tests that any printed output arrives, or its loss is reported; a reader who left is nobody's fault."""
+"""Tests that any printed output arrives, or its loss is reported; a reader who left is no fault."""
 
 import os
 import subprocess
@@ -18,7 +18,7 @@ COMMANDS = {
 }
 """The first word is the program's."""
 
-# Where writing fails at once, and where it does when all that was kept is written at the end.
+# Output that fails at once, and output that fails when all that was kept is written at the end.
 BUFFERED = {True: "", False: "1"}
 EACH = [*((command, True) for command in COMMANDS), ("list", False)]
 EACH_OTHER = [*((command, False) for command in COMMANDS), ("list", True)]

@@ -41,7 +41,7 @@ def test_random_sets(seed: int) -> None:
     [
         ([0, 1], [2], "A.n <= 1"),
         ([0, 1, 7], [4], "A.n != 4"),
-        # What lies between does not matter.
+        # Values between do not matter.
         ([0, 3], [8], "A.n <= 3"),
         ([1, 4], [0, 9], "A.n >= 1 and A.n <= 4"),
         ([0, 6], [7, 9], "A.n <= 6"),

@@ -211,7 +211,7 @@ def test_the_effort_of_all_formulas_together_is_bounded() -> None:
     assert len(diagram.nodes) > 3
     assert formulas.formula(diagram) is None
     assert Formulas(DOMAINS).formula(diagram) is not None
-    # What is constant takes no effort.
+    # A constant takes no effort.
     assert formulas.formula(DecisionDiagram((), 1)) is not None
 
 

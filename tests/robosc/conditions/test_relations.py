@@ -111,7 +111,7 @@ MODE: dict[Subject, SubjectDomain] = {("X", None): SubjectDomain(("on", "off", "
             lambda x, a, b: {"on": a <= b, "off": True, "mid": a == 2}[x],
             "X.off or X.mid and A.n = 2 or X.on and A.n <= B.m",
         ),
-        # With as many operands, tests of single places read better.
+        # Tests of single places read better when the operands are as many.
         (TWO, lambda a, b: a == b == 0, "A.n = 0 and B.m = 0"),
         (integers(An=(0, 1), Bm=(0, 1)), lambda a, b: a < b, "A.n = 0 and B.m = 1"),
         (integers(An=(0, 1), Bm=(0, 1)), lambda a, b: a == b, "A.n = B.m"),
@@ -263,7 +263,7 @@ def test_descriptions_between_what_must_be_and_what_must_not(data: st.DataObject
 
 
 def check_descriptions(domains: Domains, compared: tuple[Subject, ...], holds: Predicate, matters: Predicate) -> None:
-    """Each description is right where it matters, whether the values of the places are all told apart or not."""
+    """Each description is right where it matters, whether the values of the places are all distinguished or not."""
     sets = [
         diagram_of(domains, lambda *values: matters(*values) and holds(*values)),
         diagram_of(domains, lambda *values: matters(*values) and not holds(*values)),

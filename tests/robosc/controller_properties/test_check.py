@@ -284,7 +284,7 @@ OWN = robot(INTERFACE, AGAIN, "requirement reach needs Arm.home or Arm.again")
 
 
 def test_what_the_request_itself_makes_false_never_cancels() -> None:
-    """The supervisor would allow the cancel at once, but only a requirement that somebody else turns cancels."""
+    """The supervisor would allow the cancel at once, but only a requirement on another's turn cancels."""
     found = properties(OWN)
     assert outcomes(found) == ("passed", "passed", "failed")
     assert found.blocking is not None
@@ -462,7 +462,7 @@ def test_too_many_orders_are_not_called_confluent() -> None:
     assert not all_.is_exhausted
 
 
-# What people see
+# Reports for people
 
 
 def test_a_livelock_is_an_error_unless_it_is_allowed() -> None:

@@ -60,7 +60,7 @@ def spins(first: str, second: str, *types: str, topic: str = "sample") -> bool:
         ("value = 1.0", "value != 1.0", False),
         ("value > 1.0 and value < 2.0", "value <= 1.0 or value >= 2.0", False),
         ("value > 1.0 and value < 2.0", "value <= 1.0 or value > 1.5", True),
-        # What is not looked into is the same where it is written alike, else it can be anything.
+        # Subterms that are not analysed are equal where they are written alike, else they can be anything.
         ("value * 2.0 < 1.0", "!(value * 2.0 < 1.0)", False),
         ("value * 2.0 < 1.0", "value * 2.0 > 3.0", False),
         ("value * 2.0 < 1.0", "value > 2.0", True),
@@ -68,7 +68,7 @@ def spins(first: str, second: str, *types: str, topic: str = "sample") -> bool:
 )
 def test_a_number(first: str, second: str, can_be: bool) -> None:
     assert spins(first, second, "double") is can_be
-    # Of two messages each brings what it likes.
+    # Each of two messages brings its own data.
     assert spins(first, second, "double", topic="other")
 
 
@@ -80,7 +80,7 @@ def test_a_number(first: str, second: str, can_be: bool) -> None:
         ("value > 3", "value < 4", ("integer",), False),
         ("value > 2", "value < 4", ("integer",), True),
         ("value > 2.5", "value < 3", ("integer",), False),
-        # What is out of range is clamped to it: 1 is 4 for the second one.
+        # Values out of range are clamped to it: 1 is 4 for the second one.
         ("value < 3", "value > 3", ("integer(0..10)", "integer(4..9)"), True),
         ("value < 3", "value > 3", ("integer(0..10)", "integer(0..9)"), False),
         ("value", "!value", ("boolean",), False),

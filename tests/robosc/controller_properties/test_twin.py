@@ -234,7 +234,7 @@ def test_what_is_proved_by_structure_is_true(record_property: Callable[[str, obj
 
 @pytest.mark.parametrize("seed", range(0, 60, 3))
 def test_any_supervisor_is_judged(seed: int) -> None:
-    """Supervisors that nobody synthesized, with everything that the language has; the same whatever came before."""
+    """Supervisors that no synthesis made, with everything that the language has; the same whatever came before."""
     supervisor = random_supervisor(seed)
     used = Semantics(supervisor.executable.automata)
     before = verify_explicitly(used.system, {}, limit=150, semantics=used)

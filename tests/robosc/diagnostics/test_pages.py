@@ -46,7 +46,7 @@ def findings(item: Page, blocks: tuple[Block, ...]) -> tuple[Diagnostic, ...]:
         return check_automata(bundle).diagnostics
     # The definitions of ROS's own types come with what the tests are installed with.
     texts = (file.text for file in bundle.files)
-    # Some packages of other pages are made up, and nobody looked for them.
+    # Some packages of other pages are made up, and their definitions are not searched for.
     searched = (".",) if item.code == "definition-not-found" else ()
     bundle = replace(bundle, searched=searched, interfaces=find_interfaces(texts, interface_folders()))
     if item.stage in (Stage.TEXT, Stage.MODEL):

@@ -1,4 +1,4 @@
-"""Fixes of findings: each makes the text right that somebody meant."""
+"""Fixes of findings: each makes the text that its author meant."""
 
 import pytest
 

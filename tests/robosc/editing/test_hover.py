@@ -1,4 +1,4 @@
-"""Names in goals, assumptions, missions and preferences: who uses them is told by the statement."""
+"""Names in goals, assumptions, missions and preferences: the statement names their uses."""
 
 import pytest
 

@@ -75,7 +75,7 @@ def test_no_request_starves(case: tuple[int, list[set[int]]]) -> None:
         policy.close(enabled)
         for request in range(count):
             waiting[request] = waiting[request] + 1 if request in enabled and request != chosen else 0
-        # Of N decisions at most N - 1 go to others for being new; each of the others is longest-ago issued once.
+        # At most N - 1 of N decisions go to others for being new; each of the others is longest-ago issued once.
         assert waiting[0] <= count * count
 
 

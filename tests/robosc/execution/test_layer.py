@@ -210,7 +210,7 @@ TWO = ROBOT.replace(
 def test_a_release_does_not_wait_in_a_layer() -> None:
     b = layer(TWO)
     b.request("/cmd_vel", ON)
-    # In a controller it would wait for `halt`, which is enabled.
+    # A controller would wait for `halt`, which is enabled.
     assert ZERO in b.receive("/scan", False)
     assert b.system.enabled("halt.request")
 
@@ -393,7 +393,7 @@ def test_a_model_that_cannot_tell_its_messages_apart_is_refused() -> None:
     text = ENUM.replace(", when: value = happy", "")
     with pytest.raises(DeploymentError, match=r"'smile' or 'cry'.*'when: CONDITION'"):
         LayerBench(system_of(text))
-    # As a controller it sends them itself.
+    # A controller sends them itself.
     Bench(system_of(text))
 
 

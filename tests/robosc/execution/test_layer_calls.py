@@ -225,7 +225,7 @@ def test_a_goal_that_takes_too_long_is_cancelled_and_aborted_at_once() -> None:
     b = driving(action_timeout_s=2.0)
     assert b.wait(1.75) == []
     assert sorted(b.wait(0.25)) == [("cancel", "drive", 1), *end("aborted")]
-    # What its server makes of it is nothing to the caller any more.
+    # The caller learns no more of its server's answers.
     assert b.feedback(1, {"left": 0.5}) == []
     assert b.end(1, "succeeded", RESULT) == []
 

@@ -85,7 +85,7 @@ def test_after_a_fault_it_stays_stopped_until_a_restart_in_the_initial_state() -
 def test_a_restart_without_a_stop_brings_the_robot_to_rest_first() -> None:
     b = moving()
     assert b.during(b.executor.restart) == ZEROS
-    # What acted before acts no longer.
+    # Actions of before act no longer.
     assert b.wait(10.0) == []
 
 

@@ -100,7 +100,7 @@ class Pair:
         if twin.is_endless:
             return
         left, right = sent, twin.reported
-        # What ends for the caller at one moment has no order of its own.
+        # Ends for the caller at one moment have no order of their own.
         assert sorted(map(repr, left)) == sorted(map(repr, right))
         ends = ("end", "no answer", "answer", "feedback")
         assert [x for x in map(repr, left) if x[2:].split("'")[0] not in ends] == [

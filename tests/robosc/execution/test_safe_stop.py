@@ -110,7 +110,7 @@ def test_a_call_that_cannot_be_made_stops_the_robot(request_: str, method: str) 
     b.middleware.failing.add(method)
     assert b.tick() == ZEROS
     assert b.executor.is_faulty
-    # Nothing is awaited from a call that was never made.
+    # A call that was never made has no answer to await.
     assert b.status() is Status.STOPPED
     b.middleware.failing.clear()
     b.executor.restart()

@@ -345,7 +345,7 @@ class Nasty:
 
 
 def hostile() -> st.SearchStrategy[Any]:
-    """Return data that a sensor, or somebody on its topic, might send."""
+    """Return data that a sensor, or another node on its topic, might send."""
     leaves = st.one_of(
         st.none(),
         st.booleans(),

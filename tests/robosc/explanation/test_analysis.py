@@ -42,7 +42,7 @@ class Twin:
         self.semantics = Semantics(self.system)
         self.constraints = relaxable_constraints(self.system)
         self.ranges = [item for item in self.constraints if item.kind is ConstraintKind.RANGE]
-        # As if the environment did it: no range holds it back.
+        # The events count as the environment's: no range holds them back.
         events = tuple(replace(event, is_controllable=False) for event in system.events)
         self.wanted = Semantics(replace(system, events=events))
         self.unrestricted = replace(system, plant_invariants=())
@@ -75,7 +75,7 @@ class Twin:
         met.update(str(kind) for kind, _ in expected)
         met.update(name for _, cause in expected for name in WIDE if isinstance(cause, str) and cause.startswith(name))
         met["several ranges"] += sum(kind is BlockingCauseKind.RANGE for kind, _ in expected) > 1
-        # Whatever keeps it from happening is named, and nothing where it can happen.
+        # All causes that block the event are named, and none where it can happen.
         can_happen = here & self.analysis.possible(event) != self.false
         assert can_happen == (not expected)
         if can_happen and self.system.event(event).is_controllable:

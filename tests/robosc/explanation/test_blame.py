@@ -290,7 +290,7 @@ def _check_what_is_broken(
             assert ((condition.event, place) in counterexample.forbidden) == expected
             met["condition"] += expected
     for event, constraint in counterexample.leaving:
-        # With all other ranges left out and no condition or invariant, the state is still bad because of this one.
+        # This range alone makes the state bad: the others, conditions and invariants are left out.
         others = [item for item in relaxable_constraints(system) if item != constraint]
         assert Semantics(without(system, others)).bad_reason(last) is not None
         assert not system.event(event).is_controllable

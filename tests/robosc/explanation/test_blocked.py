@@ -38,7 +38,7 @@ def wander(supervisor: Supervisor, dice: Random, steps: int) -> Any:
     for _ in range(steps if events else 0):
         yield system
         event = dice.choice(events)
-        # What the supervisor would not let through is taken, too: its states are judged as well.
+        # Events that the supervisor would not let through are taken, too: their states are judged as well.
         system.step(event, system.read(event, random_data(dice)))
     yield system
 

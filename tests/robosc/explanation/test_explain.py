@@ -186,7 +186,7 @@ def test_a_condition_on_cancel_that_is_to_blame() -> None:
     ]
 
 
-# Why an event cannot happen
+# Reasons why an event cannot happen
 
 
 def test_free_and_restricted_by_a_requirement() -> None:
@@ -248,14 +248,14 @@ def test_never_because_of_behaviours_requirements_or_the_supervisor() -> None:
     report = event(robot(door), "slam")
     assert (report.status, [item.kind for item in report.reasons]) == ("never", ["behaviour"])
     assert report.stopped is None
-    # There is a way, but it is forbidden: that is reported.
+    # A way exists, but it is forbidden: that is reported.
     reachable = door.replace("to shut goto closed", "to shut goto ajar")
     report = event(robot(reachable, "requirement shut needs Door.closed"), "slam")
     assert report.status == "never"
     assert report.stopped is not None
     assert (report.stopped.events, report.stopped.stopped_at) == (("open.request", "shut.request"), 1)
     assert [item.kind for item in report.stopped.reasons] == ["requirement"]
-    # Of three requirements two are enough.
+    # Two of three requirements are enough.
     bell = "component Bell { incoming message ring with type: none }"
     needs = [f"requirement ring needs {item}" for item in ("Door.closed", "!Door.opened", "Door.opened")]
     report = event(robot(DOOR, bell, *needs), "ring")
@@ -293,7 +293,7 @@ def test_ways_that_take_too_long_to_find(monkeypatch: pytest.MonkeyPatch) -> Non
     assert (report.status, report.stopped, report.unfound) == ("never", None, unfound)
     assert f"slam.request: can never happen\n  {report.reasons[0].message}" in str(explained(reachable, event="slam"))
     assert f"\n  {unfound}" in str(explained(reachable, event="slam"))
-    # Where it is known that there is none, that is reported.
+    # The absence of a way is reported where it is known.
     (ajar, *_) = explained(
         robot(DOOR.replace("marked state opened", "marked state ajar { }\n marked state opened"))
     ).remarks
@@ -311,7 +311,7 @@ def test_a_guard_that_is_not_true() -> None:
     assert [reason.message for reason in item.reasons] == ["C is here, where C.b is not true"]
 
 
-# In a state
+# Explanations of a state
 
 
 def test_in_a_state_and_after_a_run() -> None:

@@ -100,7 +100,7 @@ POSSIBLE_ROLES = {
     "moved": ("moved", "inside", "closing", "trailing", "own"),
     "trailing": ("trailing", "own"),
     "inside": ("inside",),
-    # Nothing else stands on the line of a closing bracket.
+    # The line of a closing bracket has nothing else on it.
     "closing": ("closing", "trailing", "own"),
 }
 
@@ -437,7 +437,7 @@ def test_indentation_ends_somewhere() -> None:
     ],
 )
 def test_comments_and_blank_lines(item: str, expected: str) -> None:
-    # Without the indentation that the inner lines of a comment do not have.
+    # Inner lines of a comment have no indentation.
     expected_text = "robot R {\n" + "\n".join(
         line if not line or line.startswith(" *") else f"    {line}" for line in expected.split("\n")
     )

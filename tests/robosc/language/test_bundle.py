@@ -168,7 +168,7 @@ def test_a_byte_order_mark_is_no_part_of_the_text(tmp_path: Path) -> None:
         ('robot R { component C { incoming message m with identifier: "library Not {" } }', set()),
         ("'it\\'s library Not' library Lib {", {"Lib"}),
         ("/* library Not */", set()),
-        # Where something is never closed, more may have been meant.
+        # A text or comment that is never closed may hide more.
         ("/* library /* Lib", {"Lib"}),
         ("'\nlibrary Lib { 'it' }", {"Lib"}),
         ("mylibrary Not { ^library Not", set()),

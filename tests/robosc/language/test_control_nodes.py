@@ -343,7 +343,7 @@ def leaf_of(text: str, state: syntax.State) -> tuple[str, dict[bool, str | None]
             if not is_request or item.communication.text in ("go", "halt"):
                 targets[item.kind != "error"] = target
     assert len(names) <= 1, state
-    # Nothing is written of a condition that leads nowhere else.
+    # A condition that leads nowhere else is not written.
     return next(iter(names), ""), targets
 
 

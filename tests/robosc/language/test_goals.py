@@ -77,7 +77,7 @@ def test_what_nobody_can_mend_is_left_to_a_person() -> None:
     found = first_error(text)
     assert found is not None
     assert "has no 'never'" in found.message
-    # Without the word, it would say the opposite.
+    # The text would say the opposite without the word.
     assert obeyed(text, found) is None
 
 

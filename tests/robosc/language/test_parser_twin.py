@@ -31,7 +31,7 @@ UNFIT = re.compile(
     "so it has no|what must never be|has no 'allow'|stands here twice|stands behind 'always'|or 'leads to' behind|"
     "in one statement|expected a condition|'and then' does not fit|needs a name before 'while'"
 )
-"""Messages about goals and missions that are told of a word before the one that fits nowhere."""
+"""Messages about goals and missions whose place is a word before the one that fits nowhere."""
 
 OPTIONS = ("qos", "depth", "max_age", "stamped", "when")
 
@@ -46,22 +46,22 @@ def compare(text: str) -> syntax.File | None:
     if faults and may_differ(faults[0], text, twin):
         return None
     if not twin.stopped:
-        assert reported(own.diagnostics) == reported(twin.findings), text
+        assert reported(own.diagnostics) == reported(twin.faults), text
         assert own.tree == twin.tree, text
         return own.tree
     assert faults, text
-    assert reported(faults[:1]) == reported(twin.findings), (text, faults[0].message)
+    assert reported(faults[:1]) == reported(twin.faults), (text, faults[0].message)
     return None
 
 
-def reported(findings: Iterable[Diagnostic | textx_parser.Finding]) -> list[tuple[str, int, int]]:
+def reported(faults: Iterable[Diagnostic | textx_parser.TextFault]) -> list[tuple[str, int, int]]:
     """Codes and places, up to the first syntax error: the parser leaves out the rest of the item."""
     found = []
-    for finding in findings:
-        place = finding.location if isinstance(finding, Diagnostic) else finding
+    for fault in faults:
+        place = fault.location if isinstance(fault, Diagnostic) else fault
         assert place is not None
-        found.append((finding.code, place.line, place.column))
-        if finding.code == "syntax-error":
+        found.append((fault.code, place.line, place.column))
+        if fault.code == "syntax-error":
             break
     return found
 
@@ -70,7 +70,7 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
     """Return True if the parser's first error is, on purpose, elsewhere than the first token that fits nowhere."""
     assert fault.location is not None
     here = (fault.location.line, fault.location.column)
-    stops = (twin.findings[0].line, twin.findings[0].column) if twin.stopped else None
+    stops = (twin.faults[0].line, twin.faults[0].column) if twin.stopped else None
     if fault.code in HIDDEN:
         # One quote too few turns all behind it inside out: reported is its own line.
         return stops is not None and (stops <= here or fault.code in ("empty-file", "unclosed-string"))
@@ -110,7 +110,7 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
         # The grammar does not say that an option stands once.
         return True
     if token == "if" and tokens.texts[at - 1] == "not":
-        # Without its end it is no conditional, so that `not` is a name.
+        # A conditional without its end is none, so that `not` is a name.
         return True
     # The next token shows that `3 needs x` wants a name, and `integer < x` something else than this word; and that an
     # item begins behind a name `not`.

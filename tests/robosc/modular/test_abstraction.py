@@ -72,7 +72,7 @@ def test_states_that_are_surely_blocked_become_one() -> None:
     # A silent step leads to where nothing is marked, and then so does every way out of the first state but b.
     found = certain_conflicts(graph_of([[("a", 1), ("a", 2), ("b", 2)], [(SILENT, 3), ("a", 2)], [], []], {1, 2}))
     assert found == graph_of([[("a", 1), ("b", 2)], [], []], {2})
-    # Without b, there is none left.
+    # No edge is left without b.
     assert certain_conflicts(graph_of([[("a", 1), ("a", 2)], [], []], {2})).edges == [[]]
 
 
@@ -106,7 +106,7 @@ def test_states_that_the_same_leads_to_become_one_where_silent_steps_leave_them(
     edges: Edges = [[("a", 1), ("a", 2)], [(SILENT, 3), ("b", 0)], [(SILENT, 4), ("c", 0)], [("d", 0)], [("e", 0)]]
     assert len(silent_continuation(graph_of(edges, {0})).edges) == 4
     assert len(weak_bisimulation(graph_of(edges, {0})).edges) == 5
-    # What leads to them is not the same.
+    # The ways to them are not the same.
     edges[0] = [("a", 1), ("b", 2)]
     assert len(silent_continuation(graph_of(edges, {0})).edges) == 5
 

@@ -104,7 +104,7 @@ def test_an_event_that_changes_nothing_is_dropped(monkeypatch: pytest.MonkeyPatc
     sizes = compositions(monkeypatch)
     lamps = [graph(["x"], [(0, "x", 0)]), graph(["x"], [(0, "x", 0)])]
     assert is_nonconflicting(lamps, limit=50)
-    # Who always lets it happen, and does not care, is not asked; a state that is blocked anyway does not count.
+    # Modules that always let it happen, and do not care, are not asked; a state that is blocked anyway does not count.
     careless = graph(["xy"], [(0, "x", 0), (0, "y", 1)])
     moving = graph(["x"], [(0, "x", 1), (1, "x", 0)])
     assert not is_nonconflicting([careless, moving], limit=50)

@@ -14,6 +14,9 @@ VALUES = [
         "Choice",
         "Condition",
         "Conditions",
+        "CounterRun",
+        "DetourProgress",
+        "MissionProgress",
         "Deployment",
         "Diagnostic",
         "Explained",
@@ -31,7 +34,16 @@ VALUES = [
         "SystemSupervisor",
         "SystemSynthesis",
     ),
-    *("GoalApproach", "GoalSummary", "Goals", "Verification", "VerificationStatus", "WalkFinding", "WalkFindingKind"),
+    *(
+        "GoalApproach",
+        "GoalExplanation",
+        "GoalSummary",
+        "Goals",
+        "Verification",
+        "VerificationStatus",
+        "WalkFinding",
+        "WalkFindingKind",
+    ),
 ]
 ERRORS = [
     *(
@@ -46,6 +58,7 @@ ERRORS = [
     *(
         "InvalidSystemError",
         "LanguageError",
+        "NoCounterStrategyError",
         "NoStrategyError",
         "NodeLimitError",
         "NothingGeneratedError",

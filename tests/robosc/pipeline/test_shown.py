@@ -1,4 +1,4 @@
-"""Results show themselves: on one line, as a text, in a notebook; and nobody changes them."""
+"""Results show themselves: on one line, as a text, in a notebook; and they cannot be changed."""
 
 import pickle
 import re

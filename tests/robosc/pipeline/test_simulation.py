@@ -289,7 +289,7 @@ def test_what_the_strategy_chooses_in_a_random_run_is_what_its_check_says(seed: 
 
 
 def test_a_walk_that_follows_the_strategy_requests_what_it_chooses_alone() -> None:
-    # Nothing is in the way of waving, and no goal needs it.
+    # The way to waving is free, and no goal needs it.
     waving = LIFT.replace(
         "    component Base {\n", "    component Base {\n        incoming message wave with type: none\n"
     )

@@ -40,7 +40,7 @@ def as_bytes(value: Any) -> bytes:
 
 def test_there_and_back(tmp_path: Path) -> None:
     supervisor = supervised(MACHINE)
-    print(supervisor.conditions)  # What it has worked out for people is not part of it.
+    print(supervisor.conditions)  # The conditions in words are no part of it.
     path = supervisor.write(tmp_path / "line.rsup")
     found = robosc.SystemSupervisor.read(path)
     assert (found, found.statistics) == (supervisor, supervisor.statistics)

@@ -51,7 +51,7 @@ def test_a_machine_and_a_buffer() -> None:
     verification = robosc.verify(supervisor)
     assert verification.passed
     assert verification.report["states"] == supervisor.states == 4
-    # Nothing is believed: without its condition, the buffer is lost.
+    # The verifier believes no claim: without its condition, the buffer is lost.
     broken = robosc.verify(replace(supervisor, added=()))
     assert broken.status is robosc.VerificationStatus.FAILED
     (fault,) = broken.report["faults"]

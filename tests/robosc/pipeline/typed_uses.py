@@ -51,7 +51,7 @@ def wrong(system: System, model: robosc.LoadedModel, result: robosc.Synthesis, r
     robosc.synthesize(model, deployment="layer")  # type: ignore[call-overload]
     robosc.SynthesisOptions(deployment="layer")  # type: ignore[arg-type]
     robosc.SynthesisOptions(robosc.Deployment.LAYER)  # type: ignore[call-arg]
-    # There may be no supervisor.
+    # The supervisor may be missing.
     robosc.simulate(result.supervisor)  # type: ignore[arg-type]
     robosc.generate(result.supervisor, "ros2")  # type: ignore[arg-type]
     print(result.supervisor.conditions)  # type: ignore[union-attr]

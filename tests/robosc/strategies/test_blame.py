@@ -17,6 +17,7 @@ from robosc.strategies.blame import EFFORT, LEAST_EFFORT, without_needless
 from robosc.synthesis import SynthesisStatus, synthesize
 from support.goal_twin import LOST, Game, Item, game_of, winning_positions
 from support.models import bundle_of
+from support.random_goals import random_text
 
 LIMIT = 2_000
 
@@ -90,39 +91,8 @@ def is_reached_explicitly(model: Model, kept: frozenset[int], result: StrategyRe
     return game.first in winning_positions(asked)
 
 
-def _random_text(dice: Random) -> str:
-    """A robot whose components go from state to state by requests and by responses, with requirements and goals."""
-    sizes = [dice.randint(2, 4) for _ in range(dice.randint(2, 3))]
-    lines: list[str] = []
-    requests: list[str] = []
-    for number, size in enumerate(sizes):
-        messages, states = [], []
-        for state in range(size):
-            marks = "initial marked" if state == 0 else "marked"
-            steps = ""
-            for place in range(dice.randint(1, 2)):
-                name, target = f"m{number}{state}{place}", (state + 1) % size if place == 0 else dice.randrange(size)
-                is_request = dice.random() < 0.8
-                messages.append(f"{'incoming' if is_request else 'outgoing'} message {name} with type: none")
-                steps += f" on {'request to' if is_request else 'response from'} {name} goto s{target}"
-                requests += [name] if is_request else []
-            states.append(f"{marks} state s{state} {{{steps} }}")
-        lines.append(f"component C{number} {{ {' '.join(messages)} behaviour {{ {' '.join(states)} }} }}")
-
-    def test() -> str:
-        number = dice.randrange(len(sizes))
-        return f"C{number}.s{dice.randrange(sizes[number])}"
-
-    lines += [f"requirement {name} needs {test()}" for name in dice.sample(requests, min(len(requests), 5))]
-    if dice.random() < 0.6:
-        lines.append(f"requirement never {test()} and {test()}")
-    lines += [f"goal always eventually {test()} and {test()}" for _ in range(dice.randint(1, 2))]
-    lines += [f"assume {test()} leads to {test()}" for _ in range(dice.randint(0, 1))]
-    return "robot R {\n" + "\n".join(lines) + "\n}"
-
-
 def compare(seed: int, met: Counter[str]) -> None:
-    problem = prepare(bundle_of(_random_text(Random(seed))), Deployment.CONTROLLER)
+    problem = prepare(bundle_of(random_text(Random(seed))), Deployment.CONTROLLER)
     if not isinstance(problem, SynthesisProblem):
         return
     model, executable = problem.model, problem.system

@@ -1,57 +1,48 @@
 """Strategies of random robots against an explicit game, which is solved and checked another way."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from random import Random
 from typing import Any
 
 import pytest
 
 from robosc.automata import ExecutableSystem
-from robosc.automata.goal_memory import Obligations
 from robosc.controller_properties.goals import check_strategy
 from robosc.model.structure import Deployment, Model
 from robosc.strategies.counter_strategy import CounterPlayer, CounterStage, CounterStrategy
 from robosc.strategies.gr1 import solve
 from robosc.strategies.synthesize import StrategyResult, StrategySynthesis
 from robosc.supervisor import AddedCondition, DecisionDiagram, Strategy
-from robosc.supervisor.predicates import state_predicate
 from robosc.synthesis.workspace import workspace
 from support.counter_twin import fault_of_counter
-from support.goal_twin import LOST, NEVER, Game, Position, distances, game_of, unfair_goal, winning_positions
-from support.random_controllers import random_controller
+from support.goal_twin import (
+    LOST,
+    NEVER,
+    Decide,
+    Game,
+    Item,
+    Position,
+    deciding,
+    distances,
+    game_of,
+    unfair_goal,
+    values_of,
+    winning_positions,
+)
 from support.random_couriers import random_courier
-from support.random_goals import with_random_goals
+from support.random_goals import wanting_robot
 
 LIMIT = 3_000
 
 Robot = tuple[Model, tuple[AddedCondition, ...]]
 """A model, and what its supervisor adds."""
 
-Decide = Callable[[Position, int], tuple[str | None, int]]
-"""The request that a strategy chooses in a position and a mode, None for none, and the mode after it."""
-
-
-def values_of(game: Game, position: Position, owed: Obligations) -> tuple[Any, ...]:
-    """Return a position of the explicit game as a state of the automata with their memory."""
-    state, held = position[0]
-    memory = game.memory(position)
-    for cancel, mask in zip(owed.cancels, held, strict=True):
-        memory |= {place.name: bool(mask >> bit & 1) for bit, place in enumerate(cancel.places)}
-    return (*state, "only", *(memory[place.name] for place in owed.places))
-
-
-def next_mode(game: Game, position: Position, mode: int) -> int | None:
-    """Return the mode after those goals that are true, or None if all are."""
-    holding = game.holding(position, game.goals)
-    following = [(mode + step) % len(holding) for step in range(len(holding))]
-    return next((number for number in following if not holding[number]), None)
-
 
 def random_goals(seed: int) -> Robot | None:
-    """Return a random robot with goals and missions, and what its supervisor adds, or None if there is none."""
-    supervisor = random_controller(seed)
-    return None if supervisor is None else (with_random_goals(supervisor.model, Random(seed)), supervisor.added)
+    """Return a random robot with goals, and what its supervisor adds, or None if there is none."""
+    supervisor, model = wanting_robot(seed)
+    return None if supervisor is None else (model, supervisor.added)
 
 
 def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> None:
@@ -81,7 +72,7 @@ def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> N
     assert (strategy is not None) == is_won, seed
     if game.first != LOST:
         compare_reasons(game, result, result.unreached, seed, met)
-        prevented = [item for item in every if winning_positions(game.asking([game.assumptions[item]], [NEVER]))]
+        prevented = [number for number, item in enumerate(game.assumptions) if is_prevented(game, item)]
         assert list(preventable) == prevented, seed
         met["preventable"] += bool(prevented)
     met["models"] += 1
@@ -91,18 +82,10 @@ def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> N
         compare_counter(game, executable, counter, result.unreached, seed, met)
     if strategy is None:
         return
-    modes = [[(item.event, state_predicate(system, item.condition)) for item in mode] for mode in strategy.modes]
-    met["with requests"] += any(modes)
+    met["with requests"] += any(strategy.modes)
     check = check_strategy(executable, added, strategy)
     assert check.result == "passed", (seed, check)
-
-    def decide(position: Position, mode: int) -> tuple[str | None, int]:
-        number = next_mode(game, position, mode)
-        if number is None:
-            return None, mode
-        values = values_of(game, position, owed)
-        return next((event for event, condition in modes[number] if condition(values)), None), number
-
+    decide = deciding(game, executable, strategy)
     assert unfair_goal(game, decide) is None, seed
     compare_preferences(game, won, model, decide, seed, met)
     # A strategy that was damaged is judged alike: without any request, or with some forgotten, for other goals.
@@ -110,21 +93,17 @@ def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> N
     kept = [[item for item in mode if dice.random() < 0.6] for mode in strategy.modes]
     dice.shuffle(kept)
     for damaged in (Strategy(((),) * len(kept)), Strategy(tuple(map(tuple, kept)))):
-        modes = [[(item.event, state_predicate(system, item.condition)) for item in mode] for mode in damaged.modes]
-        if all(request in game.choices[position] for position, request in _chosen(game, decide)):
-            is_missed = unfair_goal(game, decide) is not None
-            found = check_strategy(executable, added, damaged)
-            assert found.result == ("failed" if is_missed else "passed"), seed
-            met["damaged, missed" if is_missed else "damaged, still reached"] += 1
+        is_missed = unfair_goal(game, deciding(game, executable, damaged)) is not None
+        found = check_strategy(executable, added, damaged)
+        assert found.result == ("failed" if is_missed else "passed"), seed
+        met["damaged, missed" if is_missed else "damaged, still reached"] += 1
 
 
-def _chosen(game: Game, decide: Decide) -> Iterator[tuple[Position, str]]:
-    """Yield every request that may be chosen somewhere, with the position."""
-    for position in game.choices:
-        for mode in range(len(game.goals)):
-            request, _ = decide(position, mode)
-            if request is not None:
-                yield position, request
+def is_prevented(game: Game, assumption: Item) -> bool:
+    """Return True if the robot can keep an assumption from coming true, in a position in which that is possible."""
+    won, possible = winning_positions(game.asking([assumption], [NEVER])), game.possible(assumption)
+    hopeless = set(game.choices) - possible
+    return any(position in won or hopeless & {*game.choices[position].values()} for position in possible)
 
 
 def compare_preferences(
@@ -205,15 +184,15 @@ def compare_counter(
     met["idle, seen"] += bool(fault(CounterStrategy((idle,))))
 
 
-@pytest.mark.parametrize("first", range(0, 2_400, 400))
+@pytest.mark.parametrize("first", range(0, 480, 80))
 def test_random_robots_agree(first: int, record_property: Callable[[str, object], None]) -> None:
     met: Counter[str] = Counter()
-    for seed in range(first, first + 400):
+    for seed in range(first, first + 80):
         compare(random_goals(seed), seed, "auto", met)
     for name, count in sorted(met.items()):
         record_property(name, count)
-    assert met["models"] > 100 and min(met["won"], met["lost"]) > 30, met
-    assert met["counter-strategies"] > 30 and met["idle, seen"] > 2, met
+    assert met["models"] > 40 and min(met["won"], met["lost"]) > 5 and met["with requests"] > 30, met
+    assert met["counter-strategies"] > 5 and met["idle, seen"] > 0, met
 
 
 @pytest.mark.parametrize("first", range(0, 300, 100))
@@ -229,7 +208,7 @@ def test_random_couriers_agree(first: int, record_property: Callable[[str, objec
 
 def test_engines_agree() -> None:
     met: Counter[str] = Counter()
-    for seed in range(60):
+    for seed in range(40):
         compare(random_goals(seed), seed, "autoref", met)
     for seed in range(20):
         compare(random_courier(seed), seed, "autoref", met)

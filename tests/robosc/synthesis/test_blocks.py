@@ -156,7 +156,7 @@ def test_a_million_values_are_compared_and_added(engine: str, relation: Expressi
     million = 10**6 + 1
     result = synthesize(sensors(10**6, relation), engine=engine)
     assert result.status is SynthesisStatus.SUPERVISOR
-    # Whatever is measured, and what is measured where the request is allowed.
+    # Pairs of values: all of them, and those where the request is allowed.
     allowed = million * (million + 1) // 2 if relation == operation(a, "<=", b) else million**2 - 500_000 * 500_001 // 2
     assert result.statistics.states == million**2 + allowed
     assert result.statistics.peak_nodes < 500

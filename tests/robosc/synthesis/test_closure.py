@@ -74,7 +74,7 @@ class Sets:
         """The step by substitution of what is above: it is asked about parts of diagrams, too."""
 
         def add(predicate: Any) -> Any:
-            # Of a part every variable above is free, and so it is in what comes of it.
+            # Every variable above a part is free in it, and so it is in the result.
             return self.predicate({target for state in self.states(predicate) for target in move(state)})
 
         # All that it leads to, where every other variable is free.

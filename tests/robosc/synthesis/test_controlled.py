@@ -372,7 +372,7 @@ def test_causes_of_what_is_cut_by_invariants_and_by_synthesis(engine: str) -> No
         NeverEnabled("climb", Cause.SUPERVISOR, False),
         NeverEnabled("jump", Cause.SUPERVISOR, True),
     )
-    # Without the invariant it would be just as lost.
+    # The system would be lost without the invariant, too.
     answers = synthesize(replace(dry, automata=(lost,)), engine=engine, questions=questions).answers
     assert answers.never == (
         NeverEnabled("climb", Cause.SUPERVISOR, False),

@@ -86,7 +86,7 @@ def test_the_kernel_takes_diagrams_apart_as_python_does(condition: Expression, t
                 answers.append(extract(encoding, predicate, maximum))
             except UnsupportedModelError as error:
                 answers.append(str(error))
-        # What is made on the way is given back.
+        # Intermediate diagrams are given back.
         assert len(encoding.manager) == nodes
     assert answers[0] == answers[1]
 

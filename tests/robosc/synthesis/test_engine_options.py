@@ -23,7 +23,7 @@ def test_a_synthesis_beyond_its_nodes_is_given_up(engine: str) -> None:
     for maximum in (1, 50, 300):
         with pytest.raises(NodeLimitError, match=f"BDD node limit {maximum} exceeded"):
             synthesize(made, engine=EngineOptions(engine, maximum_nodes=maximum))
-    # Nothing is left behind that another synthesis would stumble over.
+    # The manager leaves nothing behind that another synthesis would stumble over.
     gc.collect()
     assert synthesize(made, engine=EngineOptions(engine, maximum_nodes=1_000_000)) == synthesize(made, engine=engine)
 

@@ -40,7 +40,7 @@ SWITCH = """component Switch {
         marked state on_ { }
     }
 }"""
-"""A switch that somebody else flips."""
+"""A switch that the environment flips."""
 
 MOTOR = """component Motor {
     action drive with request: none, response: none, feedback: none links i
@@ -214,7 +214,7 @@ def test_of_a_call_that_is_never_made_only_the_request_is_reported() -> None:
 def test_cancel_counts_where_a_behaviour_reacts_to_it() -> None:
     """Without requirements it is free; with one that holds as long as the action runs it never happens."""
     assert found(robot(MOTOR)) == ()
-    # While it drives, nobody can shut the door.
+    # The door cannot be shut while it drives.
     requirements = ("requirement drive needs Door.opened", "requirement shut needs Motor.still")
     item = only(robot(MOTOR.replace("action drive", "action §drive"), DOOR, *requirements))
     assert item.message == (
@@ -222,7 +222,7 @@ def test_cancel_counts_where_a_behaviour_reacts_to_it() -> None:
     )
     without_reaction = MOTOR.replace("on cancel to drive goto still", "")
     assert found(robot(without_reaction, DOOR, *requirements)) == ()
-    # In a layer the caller may always cancel.
+    # The caller of a layer may always cancel.
     assert found(robot(MOTOR, DOOR, *requirements), Deployment.LAYER) == ()
 
 
@@ -293,7 +293,7 @@ def test_a_requirement_that_must_always_hold() -> None:
     assert found(robot(DOOR, MOTOR, "requirement always Door.closed or Motor.still")) == ()
     used, unused = "requirement never Door.opened and Motor.driving", "§requirement never Door.opened and Door.closed"
     assert only(robot(DOOR, MOTOR, used, unused)).message == "this requirement never restricts anything"
-    # With the first one the second, though it says less, forbids nothing more; the first one does.
+    # The second requirement, though it says less, forbids nothing more than the first; the first one does.
     weaker = "§requirement never Door.opened and Motor.driving and Switch.on_"
     assert only(robot(DOOR, MOTOR, SWITCH, used, weaker)).code == "unused-requirement"
 
@@ -427,7 +427,7 @@ def test_what_happens_once_on_the_way_is_no_part_of_the_loop() -> None:
     assert item.related == ()
 
 
-# What is sound, and what has no supervisor
+# Sound models, and models without a supervisor
 
 
 def test_a_state_that_no_transition_leads_to() -> None:
@@ -637,7 +637,7 @@ class Twin:
                         return False
         rest = tuple(item for place, item in enumerate(self.model.requirements) if place not in (number, *removed))
         other = to_automata(msgspec.structs.replace(self.model, requirements=rest), deployment)
-        # What is left out must not change when the action may be cancelled.
+        # Omissions must not change when the action may be cancelled.
         conditions = [
             *(item for item in other.conditions if not item.event.endswith(".cancel")),
             *(item for item in self.system.conditions if item.event.endswith(".cancel")),

@@ -88,7 +88,7 @@ def random_step(manager: Manager, dice: Random) -> Step:
         hidden=HIDDEN if dice.random() < 0.7 else (),
         outside=source,
     )
-    # Without hidden variables that are quantified, the result would depend on them.
+    # The result would depend on hidden variables if they were not quantified.
     return Step(image, frozenset(names) | (frozenset() if image.hidden else frozenset(HIDDEN)))
 
 

@@ -93,7 +93,7 @@ def assert_verified(system: System, result: SynthesisResult) -> None:
 @pytest.mark.parametrize("make", [random_system, wide_system])
 def test_random_systems(make: Callable[[int], System], part: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in seeds(15):
-        # With so few steps at first, small systems are searched either way, too.
+        # The few first steps let small systems be searched either way, too.
         monkeypatch.setattr(fixed_point, "_FIRST_STEPS", (16_000, 1, 2, 5)[seed % 4])
         # The seeds are the same in every part, the systems are not.
         system = make(seed * PARTS + part)

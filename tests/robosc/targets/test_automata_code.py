@@ -295,7 +295,7 @@ def test_where_the_supervisor_does_not_let_it_begin(tmp_path: Path) -> None:
 
 
 def test_where_the_system_may_not_begin(tmp_path: Path) -> None:
-    """An input that would lead at once to what nobody can prevent is refused at the beginning, not later."""
+    """An input that would lead at once to an inevitable fault is refused at the beginning, not later."""
     supervisor = supervisor_of(
         "input bool hot; uncontrollable u; plant p: location a: initial; marked; edge u when hot goto b;"
         " location b: marked; end\ninitial not hot; plant invariant p.a or hot; requirement invariant p.a;"
@@ -347,7 +347,7 @@ def test_what_has_no_code(target: str, made: System, message: str) -> None:
 
 @pytest.mark.parametrize("target", ["c99", "python"])
 def test_what_is_nested_too_deeply_has_no_code(target: str) -> None:
-    # As deep as a front end may let it become, and deeper than compilers take brackets.
+    # The depth is the most that a front end may produce, and deeper than compilers take brackets.
     allow_depth(5_000, 4)
     deep: Expression = VariableRead("A", "x")
     for number in range(500):

@@ -67,7 +67,7 @@ class Twins:
             allowed = self.interpreted.enabled(event)
             assert self.generated.enabled(event) is allowed, event
             self.seen["enabled" if allowed else "disabled"] += 1
-        # What the generated class remembers is what it would find if it asked for each event.
+        # The generated class must remember the answers that it would give if it asked for each event.
         assert self.generated.enabled_requests() == self.interpreted.enabled_requests()
         assert self.generated.enabled_silent() == self.interpreted.enabled_silent()
         for item in self.model.communications:
@@ -337,7 +337,7 @@ def test_the_file_alone_runs_in_another_program(interpreter: str, tmp_path: Path
     files = generate(example_supervisor("maze_solver/maze_solver"), "python", GenerateOptions(package="maze"))
     write_files(files, tmp_path)
     (tmp_path / "program.py").write_text(ASYNC_PROGRAM)
-    # Nothing of this environment is seen: no RoboSC, no installed package.
+    # The program sees nothing of this environment: no RoboSC, no installed package.
     done = subprocess.run(
         [interpreter, "-W", "error", "-s", "program.py"],
         cwd=tmp_path,

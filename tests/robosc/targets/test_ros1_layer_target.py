@@ -75,7 +75,7 @@ def test_the_launch_file_starts_the_layer_and_an_existing_controller(files: Gene
     for parent in (node.find("node"), included):
         assert parent is not None
         assert [(item.get("from"), item.get("to")) for item in parent.findall("remap")] == expected
-    # What a group renames is what comes after that in it.
+    # A group renames the names that come after that in it.
     assert included[-1].tag == "include"
 
 

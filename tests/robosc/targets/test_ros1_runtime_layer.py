@@ -237,7 +237,7 @@ class Message:
     [
         ({}, True),
         ({"header": Header(7)}, True),
-        # What was received has tuples where a new message has lists.
+        # A received message has tuples where a new message has lists.
         ({"numbers": (0.0, -0.0), "places": ()}, True),
         ({"numbers": (0.0, 5e-324)}, False),
         ({"place": Point(0.0, -0.001)}, False),

@@ -14,7 +14,7 @@ pytestmark = pytest.mark.ros2
 
 def messages() -> Any:
     with warnings.catch_warnings():
-        # As in support.ros2: a parser that rclpy loads uses a module that Python deprecates.
+        # A parser that rclpy loads uses a module that Python deprecates, as in support.ros2.
         warnings.simplefilter("ignore", DeprecationWarning)
         import rosidl_generator_py  # type: ignore[import-untyped]  # noqa: F401
     from geometry_msgs import msg

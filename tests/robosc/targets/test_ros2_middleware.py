@@ -52,7 +52,7 @@ class Client:
 
 def test_every_stamped_field_of_a_goal_gets_time_and_frame(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     with warnings.catch_warnings():
-        # As in support.ros2: a parser that rclpy loads uses a module that Python deprecates.
+        # A parser that rclpy loads uses a module that Python deprecates, as in support.ros2.
         warnings.simplefilter("ignore", DeprecationWarning)
         import rosidl_generator_py  # type: ignore[import-untyped]  # noqa: F401
     from builtin_interfaces.msg import Time

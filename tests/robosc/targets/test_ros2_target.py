@@ -194,7 +194,7 @@ def test_a_package_says_who_maintains_it_under_which_licence() -> None:
     assert (given["license"], given["version"]) == (metadata.license, metadata.version)
 
 
-# What is refused.
+# Refused models.
 
 
 @pytest.mark.parametrize(("target", "package"), [("ros2", "rclpy"), ("ros2", "robosc_msgs"), ("ros1", "rospy")])

@@ -192,7 +192,7 @@ def test_what_a_controller_sends_may_be_read_as_an_enum(ros: Ros) -> None:
 
 def test_parameters_about_decisions_do_not_exist(ros: Ros, files: GeneratedFiles) -> None:
     content = yaml.safe_load(files["config/parameters.yaml"])
-    others = {USE_SIM_TIME: False}  # Which all nodes of ROS 1 share, and launch files of ROS 2 give.
+    others = {USE_SIM_TIME: False}  # All nodes of ROS 1 share it, and launch files of ROS 2 give it.
     extra = (AUTOSTART, STATE_MESSAGE) if ros.target == "ros2" else ()
     content = content["/**"]["ros__parameters"] if ros.target == "ros2" else content
     expected = {item.name: item.default for item in (*declarations(("/cmd_vel",), "layer"), *extra)}

@@ -151,7 +151,7 @@ def test_a_node_that_waits_for_its_servers_loses_nothing_and_its_stop_reaches_lo
 ) -> None:
     pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
     with warnings.catch_warnings():
-        # As in support.ros2: a parser that rclpy loads uses a module that Python deprecates.
+        # A parser that rclpy loads uses a module that Python deprecates, as in support.ros2.
         warnings.simplefilter("ignore", DeprecationWarning)
         import rosidl_generator_py  # type: ignore[import-untyped]  # noqa: F401
     missing: list[str] = ["/ask"]

@@ -71,7 +71,7 @@ def test_a_package_may_be_called_as_one_likes(target: str) -> None:
     assert "my_robot/node.py" in files
 
 
-# What is refused.
+# Refused models.
 
 
 @BOTH

@@ -55,7 +55,7 @@ def _agrees(made: System, added: Mapping[str, Decision], engine: str = "cudd") -
         assert failure.state in replay(made, added, failure.trace)
         assert failure.is_shortest
         if failure.property != "controllable":
-            # Of several events that are disabled, either names the first it meets.
+            # Each verifier names the first of several disabled events that it meets.
             assert len(failure.trace) == len(traces[failure.property])
     return symbolic
 

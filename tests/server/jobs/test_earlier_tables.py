@@ -45,7 +45,7 @@ def test_each_version_is_migrated_with_all_that_is_in_it(
 ) -> None:
     log_migrations(caplog)
     file = made(tmp_path / "old", version)
-    # Who only looks changes nothing.
+    # Reading changes nothing.
     content = file.read_bytes()
     assert inspect_sqlite(file) == version
     assert file.read_bytes() == content

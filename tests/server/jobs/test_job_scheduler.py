@@ -124,7 +124,7 @@ async def test_all_addresses_of_one_network_stand_in_one_line() -> None:
     with pytest.raises(RefusedError, match="of this caller"):
         scheduler.enter("2001:db8::4")
     others = [scheduler.enter(name) for name in ("2001:db8:0:1::1", "192.0.2.1", "192.0.2.2", "robot")]
-    # One after the other: whoever has had a turn goes to the end.
+    # One after the other: a caller who has had a turn goes to the end.
     assert [scheduler.tasks_ahead(place) for place in (waiting[0], *others, waiting[1])] == list(range(6))
     for place in (taken, *waiting, *others):
         scheduler.leave(place)

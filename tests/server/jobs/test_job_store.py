@@ -118,7 +118,7 @@ async def test_a_transaction_that_takes_too_long_is_cut_off_and_the_next_one_is_
 
 
 def test_a_connection_for_reading_is_made_without_writing(tmp_path: Path) -> None:
-    """Else it could not be made while the disk is full, or while somebody else writes."""
+    """Else it could not be made while the disk is full, or while another connection writes."""
     store = open_store(tmp_path)
     writer = sqlite3.connect(tmp_path / "jobs.sqlite", isolation_level=None)
     try:

@@ -1,4 +1,4 @@
-"""Tests of the caller who gives back where too much is kept: as an obvious twin, and nobody at another's cost."""
+"""Tests of the caller who gives back where too much is kept: as in an obvious twin, and no caller at another's cost."""
 
 import asyncio
 import contextlib
@@ -127,7 +127,7 @@ async def test_a_greedy_caller_pushes_out_nothing_of_others(tmp_path: Path, monk
             return await made.store.find_result("greedy 3") is not None
 
         await until(is_written)
-        # Jobs refer to as much as may stay: whoever comes has to wait until there is room, which is soon.
+        # Jobs refer to as much as may stay: new jobs wait until there is room, which is soon.
         with pytest.raises(RefusedError, match="storage for job results is full") as refused:
             await made.manager.submit(task_of("more"), you)
         assert refused.value.reason is Reason.SERVER_BUSY
@@ -154,7 +154,7 @@ async def test_beyond_the_bound_of_jobs_those_of_a_caller_are_forgotten_that_end
         choices.times.wall_s += 1.0
         second, _ = await made.manager.submit(task_of("fail CPU_LIMIT"), ME)
         await ended(made.manager, second.id)
-        # Which began first, but has not ended.
+        # The third one began first, but has not ended.
         third, _ = await made.manager.submit(task_of(_NEVER), ME)
         with pytest.raises(RefusedError, match="no job with this id"):
             await made.manager.get(first.id, ME)

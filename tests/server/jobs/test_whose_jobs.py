@@ -165,7 +165,7 @@ async def test_a_server_that_has_counted_on_is_not_taken_for_dead(store: Store) 
     assert await store.beat("living")
     assert not await store.beat("dead")
     assert await store.other_servers("ours") == ({"living": 2}, False)
-    # Nothing is left for a second one that found the same.
+    # The second server that found the same has nothing left to adopt.
     assert await store.adopt("living", {"dead": 0}) == []
 
 

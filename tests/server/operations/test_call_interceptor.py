@@ -17,6 +17,7 @@ from robosc_server.operations.logs import REQUEST_ID
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.settings import LogLevel
 from robosc_server.operations.tracing import OtlpTracing
+from support.held_time import HeldLoop
 from support.small_server import MARKER, SERVICE, Ended, answer, call, logged, small_server
 from support.waiting import PATIENCE_S, limited, until
 
@@ -127,15 +128,14 @@ class CancelledContext:
     """The context of a call that is cancelled while its handler waits.
 
     Args:
-        given_s: Time left when it begins, in seconds; None: it has no deadline.
-        left_s: The same when it is cancelled.
+        left_s: Time left when it is cancelled, in seconds; None: it has no deadline.
     """
 
-    def __init__(self, given_s: float | None, left_s: float | None) -> None:
-        self._remaining = iter((given_s, left_s))
+    def __init__(self, left_s: float | None) -> None:
+        self._left_s = left_s
 
     def time_remaining(self) -> float | None:
-        return next(self._remaining)
+        return self._left_s
 
     def set_trailing_metadata(self, metadata: Any) -> None:
         pass
@@ -161,20 +161,17 @@ class CancelledContext:
         (0.01, 0.009, "CANCELLED"),
     ],
 )
-def test_a_call_that_is_cancelled_where_its_deadline_passes_has_reached_it(
-    given_s: float | None, left_s: float | None, code: str
+async def test_a_call_that_is_cancelled_where_its_deadline_passes_has_reached_it(
+    loop: HeldLoop, given_s: float | None, left_s: float | None, code: str
 ) -> None:
     async def stuck(request: bytes, context: Any) -> bytes:
+        await loop.passed(1.0 if given_s is None or left_s is None else given_s - left_s)
         raise asyncio.CancelledError
 
-    async def run() -> None:
-        handler = CallInterceptor(Metrics("1")).wrap(grpc.unary_unary_rpc_method_handler(stuck), f"/{SERVICE}/Unary")
-        with pytest.raises(asyncio.CancelledError):
-            await handler.unary_unary(b"", CancelledContext(given_s, left_s))
-
     REQUEST_ID.set("")
-    with logged() as log:
-        asyncio.run(run())
+    with logged() as log, pytest.raises(asyncio.CancelledError):
+        handler = CallInterceptor(Metrics("1")).wrap(grpc.unary_unary_rpc_method_handler(stuck), f"/{SERVICE}/Unary")
+        await handler.unary_unary(b"", CancelledContext(left_s))
     assert [line["code"] for line in log.lines("call")] == [code]
 
 

@@ -217,7 +217,8 @@ def test_tables_of_another_version_are_reported_and_nothing_is_left_behind(
     assert open_now == [("warning", f"{state / DATABASE_FILE} is in use by another robosc-server")]
     assert found() == [("ok", f"SQLite in {state / DATABASE_FILE}")]
     newer = "UPDATE robosc_migrations SET version_num = '999'"
-    # In the log of changes, which a server that was killed leaves, and later in the file itself.
+    # The newer version stands in the log of changes, which a server that was killed leaves, and later in the file
+    # itself.
     with contextlib.closing(sqlite3.connect(state / DATABASE_FILE)) as connection:
         connection.execute(newer)
         connection.commit()
@@ -257,7 +258,7 @@ def test_a_database_that_a_running_server_has(capsys: pytest.CaptureFixture[str]
         checked = Checked(capsys, "--database-url", f"sqlite:///{state / DATABASE_FILE}")
         assert checked.grade("database") == "warning"
         assert {path.name for path in state.iterdir()} == before
-        # It has kept its lock, and lost it to nobody.
+        # It has kept its lock to the end.
         with pytest.raises(StoreError, match="in use by another robosc-server"):
             open_store(state)
     before = {path.name for path in state.iterdir()}

@@ -216,7 +216,7 @@ async def test_a_large_answer_that_was_sent_is_waited_for(loop: HeldLoop) -> Non
         ports.append(server.add_insecure_port("127.0.0.1:0"))
 
     async with small_server(interceptors=[calls], unary=large, setup=listen) as (_, server):
-        # More than is taken over the line before somebody reads: the handler is long done by then.
+        # More than is taken over the line before the client reads: the handler is long done by then.
         options = [("grpc.http2.lookahead_bytes", 65535), ("grpc.http2.bdp_probe", 0)]
         async with grpc.aio.insecure_channel(f"127.0.0.1:{ports[0]}", options) as slow:
             method: Any = slow.unary_stream(f"/{SERVICE}/Unary")

@@ -1,5 +1,7 @@
-"""Tests of the limit on open calls, with real calls: silent ones, watches, answers that nobody reads."""
+"""Tests of the limit on open calls, with real calls: silent ones, watches, answers that are not read."""
 
+import gc
+from collections import Counter
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -11,14 +13,19 @@ from grpc_health.v1 import health_pb2, health_pb2_grpc
 
 from robosc_api.connection_watch import Arrivals, CallsSince
 from robosc_api.failures import reason_of
+from robosc_api.layers import Layers
+from robosc_api.request_timeouts import RequestTimeouts
 from robosc_api.security import Quota, Scope, make_token
 from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc, synthesis_pb2_grpc
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server import application
+from robosc_server.operations.interceptor import CallInterceptor
+from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.open_calls import HEALTH_CALLS_PER_CALLER, CallLimits, OpenCalls
 from robosc_server.tasks.task import Reason, RefusedError
 from support.job_workers import StartedWorkers
 from support.service import served
+from support.small_server import answer, call, small_server
 from support.strangers import Stranger, strangers
 from support.waiting import PATIENCE_S, eventually
 
@@ -111,7 +118,7 @@ def test_a_caller_has_its_places_and_no_more(small: str, all_are_free: Callable[
         hold(first, 4)
         hold(second, 3)
         assert eventually(lambda: first.ended + second.ended == 3)
-        assert any(each.was_told(b"limit of 4 open calls") for each in (first, second))
+        assert any(each.has_received(b"limit of 4 open calls") for each in (first, second))
         # Another one, by its address.
         assert is_answered(small)
     assert all_are_free()
@@ -145,7 +152,7 @@ def test_health_has_places_for_each_host(small: str) -> None:
 
 
 class Call:
-    """Context of a call that never ends."""
+    """Context of a call, which ends with its test."""
 
     def __init__(self, host: str) -> None:
         self._host = host
@@ -156,12 +163,9 @@ class Call:
     def auth_context(self) -> dict[str, object]:
         return {}
 
-    def add_done_callback(self, callback: object) -> None:
-        """Do nothing."""
-
 
 @pytest.mark.parametrize("limits", [CallLimits(9, 1), CallLimits(1, 9)], ids=["of the caller", "of the server"])
-def test_refused_calls_explain_the_bytes_of_their_connection_and_health_checks_do_not(limits: CallLimits) -> None:
+async def test_refused_calls_explain_the_bytes_of_their_connection_and_health_checks_do_not(limits: CallLimits) -> None:
     arrivals = Arrivals()
     calls = OpenCalls(limits, health=limits, arrivals=arrivals)
     handler: Any = grpc.unary_unary_rpc_method_handler(lambda request, context: None)
@@ -175,7 +179,7 @@ def test_refused_calls_explain_the_bytes_of_their_connection_and_health_checks_d
     assert arrivals.take() == CallsSince(ended={peer: 3}, open={peer: 2})
 
 
-def test_nobody_from_elsewhere_takes_the_places_of_this_machines_health_checks() -> None:
+async def test_nobody_from_elsewhere_takes_the_places_of_this_machines_health_checks() -> None:
     calls = OpenCalls(CallLimits(1, 1), health=CallLimits(3, 1))
     layered = calls.wrap(grpc.unary_unary_rpc_method_handler(lambda request, context: None), HEALTH)
     # One machine with many addresses of its network, then others.
@@ -222,7 +226,7 @@ def test_an_answer_that_nobody_reads_keeps_its_place(small: str) -> None:
         for number in range(5):
             deaf.call(2 * number + 1, GET_VERSION)
             deaf.message(2 * number + 1, b"")
-        assert eventually(lambda: deaf.was_told(b"limit of 4 open calls"))
+        assert eventually(lambda: deaf.has_received(b"limit of 4 open calls"))
 
 
 def test_a_token_says_how_many(tmp_path: Path) -> None:
@@ -247,3 +251,20 @@ def test_a_token_says_how_many(tmp_path: Path) -> None:
             assert eventually(lambda: stranger.ended == 1)
             assert "limit of 4 open calls" in refusal(address, metadata=usual)[1]
             assert is_answered(address, metadata=few)
+
+
+async def test_a_call_leaves_nothing_to_the_garbage_collector() -> None:
+    layers = Layers(CallInterceptor(Metrics("1")), OpenCalls(CallLimits(9, 9)), RequestTimeouts(PATIENCE_S))
+    async with small_server(interceptors=[layers], unary=answer) as (channel, _):
+        await call(channel)
+        gc.collect()
+        gc.set_debug(gc.DEBUG_SAVEALL)
+        try:
+            for _ in range(10):
+                await call(channel)
+            gc.collect()
+            left = Counter(type(item).__name__ for item in gc.garbage)
+        finally:
+            gc.set_debug(0)
+            gc.garbage.clear()
+    assert not {"RPCState", "_ServicerContext"} & left.keys(), left

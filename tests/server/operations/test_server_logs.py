@@ -72,7 +72,8 @@ def test_half_a_character_can_be_logged() -> None:
     for form in LogFormat:
         with logged(LogLevel.INFO, form) as log:
             structlog.get_logger().info("ours", value="\ud800")
-            # To ours alone: pytest keeps what is logged, and cannot send half a character from one process to another.
+            # The record goes to our handlers alone: pytest keeps what is logged, and cannot send half a character from
+            # one process to another.
             record = logging.LogRecord("others", logging.WARNING, __file__, 1, "\udfff", None, None)
             for handler in logging.getLogger().handlers:
                 if isinstance(handler.formatter, structlog.stdlib.ProcessorFormatter):

@@ -6,10 +6,24 @@ from pathlib import Path
 from prometheus_client.parser import text_string_to_metric_families
 
 from robosc_server.operations.metrics import Metrics
-from robosc_server.operations.settings import Settings, default_text, description_of, flag_of, variable_of
-from robosc_server.operations.settings_reference import settings_table
+from robosc_server.operations.settings import Settings, default_text, description_of, flag_of, group_of, variable_of
 
 PAGE = (Path(__file__).parents[3] / "docs" / "server.md").read_text("utf-8")
+
+
+def settings_table() -> str:
+    """Return the settings for the manual: a table in Markdown for each group."""
+    parts = []
+    for group in dict.fromkeys(map(group_of, Settings.model_fields)):
+        rows = ["| flag | file | environment | what it is | default |", "|---|---|---|---|---|"]
+        for name in Settings.model_fields:
+            if group_of(name) == group:
+                cells = (f"`{flag_of(name)}`", f"`{name}`", f"`{variable_of(name)}`", description_of(name))
+                rows.append(
+                    f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} | {default_text(name)} |"
+                )
+        parts.append(f"### {group[0].upper()}{group[1:]}\n\n" + "\n".join(rows) + "\n")
+    return "\n".join(parts)
 
 
 def test_every_setting_stands_in_the_manual_as_it_is_defined() -> None:

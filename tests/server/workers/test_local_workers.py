@@ -119,7 +119,7 @@ class TestDeaths:
     def test_a_process_that_dies_ends_its_task_alone(
         self, running: Running, monkeypatch: pytest.MonkeyPatch, text: str, message: str
     ) -> None:
-        # Whatever else this machine has no memory for.
+        # The machine may lack memory for something else.
         for name in ("oom_kills", "_kills_before"):
             monkeypatch.setattr(f"robosc_server.workers.process.{name}", lambda: 0)
         other, pid = running.begun("stop\necho unharmed")

@@ -95,7 +95,7 @@ print(before, huge_bytes(), joined, memory[:] == bytes(range(256)) * 2**15)
 needs_kernel = pytest.mark.skipif(kernel_module() is None, reason="there is no compiled kernel")
 
 
-def told(program: str) -> str:
+def output_of(program: str) -> str:
     environment = {**os.environ, "PYTHONPATH": os.pathsep.join(path for path in sys.path if path)}
     return subprocess.run(
         [sys.executable, "-c", program], env=environment, check=True, capture_output=True, text=True
@@ -104,14 +104,14 @@ def told(program: str) -> str:
 
 @needs_kernel
 def test_a_fork_that_reads_objects_copies_few_pages() -> None:
-    found = json.loads(told(COUNTED))
+    found = json.loads(output_of(COUNTED))
     assert found["kept"] > 20_000 * 7
     assert found["after"] * 4 < found["before"], found
 
 
 @needs_kernel
 def test_kept_objects_change_as_before() -> None:
-    assert told(CHANGED) == "as before\n"
+    assert output_of(CHANGED) == "as before\n"
 
 
 def test_without_the_kernel_nothing_is_kept() -> None:
@@ -120,14 +120,14 @@ def test_without_the_kernel_nothing_is_kept() -> None:
         "from robosc_server.workers import shared_memory\n"
         "print(shared_memory.keep_objects())"
     )
-    assert told(program) == "0\n"
+    assert output_of(program) == "0\n"
 
 
 def test_private_memory_is_of_huge_pages() -> None:
     choices = Path("/sys/kernel/mm/transparent_hugepage/enabled")
     if tuple(map(int, os.uname().release.split(".")[:2])) < (6, 1) or not choices.exists():
         pytest.skip("this kernel makes no huge pages when asked to")
-    before, after, joined, *is_same = told(JOINED).split()
+    before, after, joined, *is_same = output_of(JOINED).split()
     if "[never]" in choices.read_text() and joined == "0":
         pytest.skip("this machine makes no huge pages")
     assert int(joined) >= 3 * HUGE_PAGE_BYTES

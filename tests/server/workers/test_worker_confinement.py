@@ -1,4 +1,4 @@
-"""A worker in the hands of a hostile program: what it tries is refused by the kernel, and harms nobody."""
+"""A worker in the hands of a hostile program: what it tries is refused by the kernel, and does no harm."""
 
 import json
 import os
@@ -269,7 +269,7 @@ class TestTheServerItself:
             "import ctypes, os, sys\n"
             "from robosc_server.workers.kernel import SET_DUMPABLE, keep_memory_private, prctl\n"
             "os.getuid() or os.setuid(65534)\n"
-            "prctl(SET_DUMPABLE, 1)\n"  # As of a program that was started by this user.
+            "prctl(SET_DUMPABLE, 1)\n"  # A program of this user can be dumped.
             "def looked(pid):\n"
             "    answers, answering = os.pipe()\n"
             "    if os.fork() == 0:\n"

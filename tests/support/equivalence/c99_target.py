@@ -300,7 +300,7 @@ class C99Layer(C99Target):
         name, caller = self._communications[numbers[0]], {"caller": numbers[1]}
         match kind:
             case "answer" | "feedback":
-                return [("told" if kind == "feedback" else kind, name, {**caller, **self._data(numbers[2])})]
+                return [(kind, name, {**caller, **self._data(numbers[2])})]
             case "end":
                 return [("ended", name, {**caller, "how": _ENDS[numbers[2]], **self._data(numbers[3])})]
         return [(kind.replace("_", " "), name, caller)]

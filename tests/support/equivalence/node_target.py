@@ -14,6 +14,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, Protocol
 
+from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import CommunicationKind, Deployment, Interface, Model
 from support.equivalence.observation import FULL, Entry, Issued, Observation, Sight, entry
 from support.equivalence.portable import flat
@@ -149,6 +150,22 @@ class NodeTarget:
                 resend = None
         return self._taken()
 
+    @property
+    def issued(self) -> tuple[Issued, ...]:
+        """Requests that came and that no observation has yet."""
+        return tuple(self._issued)
+
+    def next_entries(self, count: int) -> list[Entry]:
+        """Wait until the log has so many entries more, and return all that it has more."""
+        began = time.monotonic()
+        self._look()
+        while len(self._log) < count:
+            assert time.monotonic() < began + LIMIT_S, f"waited {LIMIT_S} s in vain for {count} entries: {self._log}"
+            self._surroundings.spin()
+            self._look()
+        found, self._log = self._log, []
+        return found
+
     def _look(self) -> None:
         self._issued += self._surroundings.take_issued()
         for path in self._folder.glob("*.jsonl"):
@@ -174,7 +191,7 @@ class NodeTarget:
             self._surroundings.close()
         stop = next((number for number, item in enumerate(self._log) if item["kind"] == "stop"), len(self._log))
         self._log = self._log[:stop]
-        # What brings the robot to rest: all-default messages, and cancels; a layer takes leave of its callers.
+        # Messages that bring the robot to rest: all-default messages, and cancels; a layer takes leave of its callers.
         leave = [item for item in self._issued if item[0] in ("answer", "ended")]
         self._issued = [item for item in self._issued if item not in leave and (item[2] or item[0] in ("call", "goal"))]
         return self._taken()
@@ -183,10 +200,8 @@ class NodeTarget:
 def node_parameters(scenario: Scenario, folder: Path, deployment: Deployment) -> dict[str, Any]:
     """The settings as the node's parameters."""
     settings = scenario.all_settings()
-    is_layer = deployment is Deployment.LAYER
-    decisions = {"policy": settings.policy, "every": settings.every}
     return {
-        **({"command_timeout": settings.command_timeout_s} if is_layer else decisions),
+        **deciding(settings, deployment),
         "period": settings.period_s,
         "service_timeout": settings.service_timeout_s,
         "on_unknown": settings.on_unknown,
@@ -194,6 +209,13 @@ def node_parameters(scenario: Scenario, folder: Path, deployment: Deployment) ->
         "log_folder": str(folder),
         "server_wait": LIMIT_S,
     }
+
+
+def deciding(settings: Settings, deployment: Deployment) -> dict[str, Any]:
+    """The parameters about decisions; without a policy, the node has its own."""
+    if deployment is Deployment.LAYER:
+        return {"command_timeout": settings.command_timeout_s}
+    return {"every": settings.every, **({} if settings.policy is None else {"policy": settings.policy})}
 
 
 def given(interface: Interface, message: Any) -> dict[str, Any]:

@@ -26,7 +26,7 @@ def flat(data: Any, path: str = "") -> dict[str, Any]:
     if data is None:
         return {}
     if isinstance(data, float) and math.isnan(data):
-        return {path: "NaN"}  # Which equals itself.
+        return {path: "NaN"}  # The text equals itself.
     return {path: data if isinstance(data, str) else float(data)}
 
 
@@ -138,7 +138,7 @@ class World:
         self._note("reject", communication, caller=goal_id)
 
     def pass_feedback(self, communication: str, goal_id: Any, data: Any) -> None:
-        self._note("told", communication, data, caller=goal_id)
+        self._note("feedback", communication, data, caller=goal_id)
 
     def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any) -> None:
         self._note("ended", communication, data, caller=goal_id, how=outcome)

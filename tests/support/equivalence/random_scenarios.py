@@ -82,7 +82,7 @@ class Dice:
         """Draw a value that may come as something of all these types."""
         dice = self._dice
         sources = [self._source(type_) for type_ in types]
-        # In C, a number that is missing is NaN.
+        # A missing number is NaN in C.
         if self._is_hostile and not isinstance(sources[0], DoubleType) and dice.random() < 0.05:
             return None
         match sources[0]:
@@ -125,7 +125,7 @@ def random_settings(supervisor: Supervisor, dice: Random) -> dict[str, Any]:
     """Settings under which targets must agree: all but the policy `random`, which C draws from another generator."""
     model = supervisor.model
     requests = [item.name for item in model.communications if item.kind is not CommunicationKind.OUTGOING_MESSAGE]
-    # In source order: C takes no order of them.
+    # Source order: C takes no order of them.
     sent = [item for item in model.communications if item.kind is CommunicationKind.INCOMING_MESSAGE]
     topics = list(dict.fromkeys(item.identifier for item in sent))
     policy = dice.choice(("fair", "fair", "priority"))
@@ -212,8 +212,8 @@ def _replies(model: Model, target: PythonTarget, dice: Random, drawn: Dice, outc
     return found
 
 
-def node_settings(model: Model, policy: str = "fair") -> dict[str, Any]:
-    """Settings under which a node decides whenever something comes, and never else."""
+def node_settings(model: Model, policy: str | None = "fair") -> dict[str, Any]:
+    """Settings under which a node decides whenever something comes, and never else; None: under its own policy."""
     sensors = {item.identifier for item in model.communications if item.max_age is not None}
     return {
         "every": "event",
@@ -278,7 +278,20 @@ def ticking_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario
 
 
 LAYER_KINDS = frozenset(
-    {"publish", "call", "goal", "cancel", "pass", "blocked", "answer", "no answer", "accept", "reject", "told", "ended"}
+    {
+        "publish",
+        "call",
+        "goal",
+        "cancel",
+        "pass",
+        "blocked",
+        "answer",
+        "no answer",
+        "accept",
+        "reject",
+        "feedback",
+        "ended",
+    }
 )
 """Kinds of requests and reports of a layer, all of which a random run should show."""
 

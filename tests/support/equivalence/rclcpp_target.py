@@ -116,7 +116,8 @@ class StandInSurroundings:
         assert kind in _KINDS, line
         if kind == "publish":
             topic = self._topics.get(name)
-            return (kind, name, given(topic.interface, yaml.safe_load(text))) if topic else None
+            # A message without a field is printed as nothing.
+            return (kind, name, given(topic.interface, yaml.safe_load(text) or {})) if topic else None
         return kind, self._servers[name].name, set_parts(yaml.safe_load(text)) if text else {}
 
     def settle(self) -> None:

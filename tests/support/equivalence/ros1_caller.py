@@ -93,7 +93,7 @@ class Ros1Caller:
         for goal, (name, number) in self._goals.items():
             for heard in self._new(goal, peer.sent[goal]):
                 for kind, data in _contents(heard):
-                    parts = dict.fromkeys([""], *data.values()) if kind == "told" and name in self._basic else data
+                    parts = dict.fromkeys([""], *data.values()) if kind == "feedback" and name in self._basic else data
                     found.append((kind, name, {"caller": number, **parts}))
         return found
 
@@ -106,7 +106,7 @@ class Ros1Caller:
 def _contents(heard: dict[str, Any]) -> list[tuple[str, dict[str, Any]]]:
     """Express what a client of an action hears in the words of the suite."""
     if "feedback" in heard:
-        return [("told", set_parts(heard["feedback"]))]
+        return [("feedback", set_parts(heard["feedback"]))]
     if heard["state"] == _ACTIVE:
         return [("accept", {})]
     if heard["state"] != _DONE:

@@ -54,9 +54,9 @@ class Ros1Surroundings:
         self._servers: dict[str, str] = {}
         self._is_layer = supervisor.deployment is Deployment.LAYER
         self._caller: Ros1Caller | None = None
-        # How much of what the peer was sent is taken, by kind and name.
+        # Number of messages at the peer that were taken, by kind and name.
         self._taken: dict[tuple[str, str], int] = {}
-        # How many goals have ended, by the name of the action on ROS.
+        # Number of goals that have ended, by the name of the action on ROS.
         self._ended: Counter[str] = Counter()
 
     def start(self, scenario: Scenario, folder: Path) -> None:
@@ -89,7 +89,7 @@ class Ros1Surroundings:
                 self._peer.serve(name, type_name)
             else:
                 type_name = type_name.removesuffix("Action")
-                # What a layer hears of the end of a cancelled goal is a step of its own.
+                # The end of a cancelled goal is a step of its own for a layer.
                 self._peer.act(name, type_name, ends_on_cancel=not self._is_layer)
             types[item.name] = type_name
         if self._is_layer:
@@ -113,15 +113,15 @@ class Ros1Surroundings:
         )
 
     def _connections(self) -> set[str]:
-        """The topics on which the node has somebody to send to, as it says itself."""
-        # Of each: number, the other end, direction, transport, topic.
+        """The topics on which the node has a subscriber, as it reports itself."""
+        # Fields of each: number, the other end, direction, transport, topic.
         return {item[4] for item in _answer(self._ask_node("getBusInfo")) if item[2] == "o"}
 
     def _has_heard_ends(self) -> bool:
         """Return True if the node has received the results of all goals that have ended, as it reports itself."""
         found = self._ask_node("getBusStats")
-        # What it sent and what it received; roscpp says so without a code and words. Of each topic its connections,
-        # and of each of these: number, bytes, messages, what was dropped.
+        # Statistics of sent and received messages; roscpp gives them without a code and words. Each topic has its
+        # connections, and each of these: number, bytes, messages, dropped messages.
         received = (found if isinstance(found[0], list) else _answer(found))[1]
         heard = {topic: sum(connection[2] for connection in connections) for topic, connections in received}
         return all(heard.get(f"{name}/result", 0) >= count for name, count in self._ended.items())
@@ -151,7 +151,7 @@ class Ros1Surroundings:
                 how = {"cancelled": "canceled"}.get(action.how, action.how)
                 self._peer.do("end", name=name, how=how, message=_fields(action.data))
             case "accept" | "end":
-                # What the peer does by itself, as soon as the goal or its cancel comes.
+                # The peer does this by itself, as soon as the goal or its cancel comes.
                 pass
             case _:
                 raise ValueError(action.do)

@@ -105,7 +105,7 @@ class Ros2Caller:
 
     def _send(self, name: str, number: int, data: Any) -> None:
         def on_feedback(message: Any) -> None:
-            self._report("told", name, number, self._given(message.feedback))
+            self._report("feedback", name, number, self._given(message.feedback))
 
         def ended(done: Any) -> None:
             found = done.result()

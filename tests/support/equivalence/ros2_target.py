@@ -16,7 +16,7 @@ from robosc.supervisor import Supervisor
 from robosc.targets import generate, write_files
 from robosc.targets.ros.runtime.messages import basic_field, load_message, load_server, message_name
 from robosc.targets.ros.topics import servers, topics
-from support.equivalence.node_target import LIMIT_S, NodeTarget
+from support.equivalence.node_target import LIMIT_S, NodeTarget, deciding
 from support.equivalence.observation import Issued, Sight
 from support.equivalence.portable import flat
 from support.equivalence.ros2_caller import Ros2Caller
@@ -69,7 +69,9 @@ class Ros2Surroundings:
         self._peer.node.create_subscription(String, "/state", self._note_tick, _DEPTH)
         reports = self._peer.receive(DiagnosticArray, "/diagnostics")
         parameters = folder.parent / "parameters.yaml"
-        parameters.write_text(json.dumps({"/**": {"ros__parameters": _parameters(scenario, folder, self._is_layer)}}))
+        parameters.write_text(
+            json.dumps({"/**": {"ros__parameters": _parameters(scenario, folder, self._supervisor.deployment)}})
+        )
         command = [*self._words, "-m", f"{package}.node", "--ros-args", "--params-file", str(parameters)]
         self._node = self._stack.enter_context(
             RosProcess(command, variables, self._folder / "run", [self._folder / "package"], program=self._program)
@@ -100,7 +102,7 @@ class Ros2Surroundings:
             type_ = load_server(_ServerType(is_action, str(info.package), str(info.interface)))  # type: ignore[arg-type]
             self._seen[item.name] = 0
             if is_action:
-                # What a layer hears of the end of a cancelled goal is a step of its own.
+                # The end of a cancelled goal is a step of its own for a layer.
                 self._actions[item.name] = HeldAction(host, type_, item.identifier, ends_on_cancel=not self._is_layer)
             else:
                 self._services[item.name] = HeldService(host, type_, item.identifier)
@@ -148,7 +150,7 @@ class Ros2Surroundings:
             case "feedback":
                 self._actions[name].feedback(**_fields(self._actions[name].action_class.Feedback, action.data))
             case "end" if action.how == "cancelled" and not self._is_layer:
-                # As soon as the cancel comes, the server ends the goal.
+                # The server ends the goal as soon as the cancel comes.
                 server = self._actions[name]
                 self._peer.spin_until(server.is_last_over, LIMIT_S, "the cancelled goal's end", self._node)
             case "end":
@@ -209,12 +211,11 @@ class _ServerType:
         self.is_action, self.package, self.type_name = is_action, package, type_
 
 
-def _parameters(scenario: Scenario, folder: Path, is_layer: bool) -> dict[str, Any]:
+def _parameters(scenario: Scenario, folder: Path, deployment: Deployment) -> dict[str, Any]:
     """The settings as the node's parameters."""
     settings = scenario.all_settings()
-    decisions = {"policy": settings.policy, "every": settings.every}
     found: dict[str, Any] = {
-        **({"command_timeout": settings.command_timeout_s} if is_layer else decisions),
+        **deciding(settings, deployment),
         "period": settings.period_s,
         "service_timeout": settings.service_timeout_s,
         "on_unknown": settings.on_unknown,
@@ -224,7 +225,7 @@ def _parameters(scenario: Scenario, folder: Path, is_layer: bool) -> dict[str, A
     }
     if settings.max_age_s:
         found["max_age"] = [f"{topic}={age}" for topic, age in settings.max_age_s.items()]
-    if settings.priority and not is_layer:
+    if settings.priority and deployment is Deployment.CONTROLLER:
         found["priority"] = list(settings.priority)
     if settings.release_identifiers is not None:
         found["release_identifiers"] = list(settings.release_identifiers) or [""]

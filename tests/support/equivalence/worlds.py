@@ -42,7 +42,7 @@ def _velocity(issued: Sequence[Issued], before: tuple[float, float]) -> tuple[fl
 
 
 def _line_follower() -> Run:
-    """Follows a line that lies askew; loses it; somebody stands in the way, then presses the button."""
+    """Follows a line that lies askew; loses it; a person stands in the way, then presses the button."""
     offset, heading, velocity = 0.5, 0.0, (0.0, 0.0)
     issued = yield []
     for step in range(60):
@@ -165,7 +165,7 @@ def _point(x: float, y: float, z: float = 1.0) -> dict[str, float]:
 
 
 def _object_finder() -> Run:
-    """Turns until it sees the object, goes there past somebody, reports it at the second try."""
+    """Turns until it sees the object, goes there past a person, reports it at the second try."""
     angle, way, velocity = -3.0, 0.0, (0.0, 0.0)
     calls = 0
     issued = yield []
@@ -222,7 +222,7 @@ def _ball_pusher() -> Run:
 
 
 def _person_follower() -> Run:
-    """A person walks off, waits, comes close, goes round a corner; somebody crosses; the button is pressed twice."""
+    """A person walks off, waits, comes close, goes round a corner; another crosses; the button is pressed twice."""
     away, velocity = 1.0, (0.0, 0.0)
     issued = yield []
     for step in range(70):

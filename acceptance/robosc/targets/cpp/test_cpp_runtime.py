@@ -128,7 +128,7 @@ def test_texts_are_written_as_python_writes_them(program: Path) -> None:
     texts += ["".join(chr(dice.randrange(*dice.choice(ranges))) for _ in range(dice.randrange(9))) for _ in range(1000)]
     lines = [f"text {len(raw):x} {raw.hex(' ')}" for raw in (text.encode() for text in texts)]
     assert [json.loads(answer) for answer in answers(program, lines)] == texts
-    # What is no UTF-8 becomes valid JSON all the same.
+    # Bytes that are no UTF-8 become valid JSON all the same.
     broken = [dice.randbytes(dice.randrange(1, 9)) for _ in range(1000)]
     for raw, answer in zip(broken, answers(program, [f"text {len(r):x} {r.hex(' ')}" for r in broken]), strict=True):
         assert json.loads(answer).replace("�", "") == raw.decode("utf-8", "ignore").replace("�", "")

@@ -141,7 +141,7 @@ SERVERS = [f"server {name} 1" for name in ("/power", "/wind", "/count", "/arm/re
 def test_what_comes_before_the_start_is_held_and_goals_are_cancelled_at_the_end(
     courier: Supervisor, courier_node: Path, tmp_path: Path
 ) -> None:
-    # Nobody is there to be asked while the orders come; of each topic as many are held as its depth.
+    # The server is not there while the orders come; each topic holds as many as its depth.
     early = ["message /order/count", "message /allowed 0", *["message /allowed 1"] * 10]
     late = ["wait goal /count", "accept /count", "wait publish /cmd_vel", END]
     end = ["wait cancel /count", "refuse /count 0", "result /count 5"]
@@ -343,7 +343,7 @@ def test_others_manage_the_node(courier_node: Path, tmp_path: Path) -> None:
     doings = [(word, name) for word, name, _ in found]
     assert doings.index(("state", "activate")) < doings.index(("call", "/power"))
     assert drives(found)[-1] is False
-    # The wheels stop before the goal is cancelled, and both before the answer to whoever manages the node.
+    # The wheels stop before the goal is cancelled, and both before the answer to the node's manager.
     place = doings.index(("state", "deactivate"))
     assert doings[place - 2 : place] == [("publish", "/cmd_vel"), ("cancel", "/count")]
     # Each configuration begins a log.

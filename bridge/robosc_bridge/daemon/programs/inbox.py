@@ -81,7 +81,7 @@ class ProgramInbox:
         self._wake = wake
         self._look = look
         self._lock = threading.Lock()
-        # In the order in which they are asked next.
+        # Programs stand in the order of their next turns.
         self._waiting: dict[Program, _Waiting] = {}
 
     def put(self, item: FromProgram) -> None:

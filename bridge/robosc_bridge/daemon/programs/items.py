@@ -314,7 +314,7 @@ class Clients:
             return
         try:
             program.send(item)
-        except Exception:  # What a program's side does wrong must not stop the robot's loop.
+        except Exception:  # Faults of a program's side must not stop the robot's loop.
             _log.exception("an item could not be sent to %s", program.name)
 
     def send_all(self, item: ToProgram) -> None:

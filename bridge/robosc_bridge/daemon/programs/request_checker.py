@@ -85,7 +85,7 @@ class RequestChecker:
                 meant = self.messages.get(identifier)
                 if meant is None:
                     raise InvalidRequestError(f"the model has no message to the robot on '{identifier:.255}'")
-                # Which of them it is, the layer finds out: it must fit any.
+                # The layer finds the message that is meant, so the data must fit each of them.
                 for message in meant:
                     self._require_fit(message, data)
                 for message in meant:

@@ -94,7 +94,7 @@ class Requesters:
         self._goals.clear()
 
     def detach(self, program: Program, layer: Layer | None) -> None:
-        """End what a program that is gone has asked for, without an answer to it."""
+        """End the calls and goals of a program that is gone, without an answer to it."""
         if layer is not None:
             self._end(program, layer, _GONE)
         self._calls = {item: name for item, name in self._calls.items() if item[0] is not program}
@@ -126,7 +126,7 @@ class Requesters:
             if now_s >= sender.heard_s + self._timeout_s:
                 layer.on_silent(identifier)
 
-    # What programs ask for.
+    # Requests of programs.
 
     def take(self, item: ProgramRequest, layer: Layer | None) -> None:
         """Pass a program's request to the layer, or refuse it."""

@@ -238,7 +238,7 @@ class RobotAdapter:
             self._rotations.poll()
 
     def report_rotation(self, executor: Supervised) -> None:
-        """Send the feedback of the rotation under way, if an action asked for it."""
+        """Send the feedback of the rotation under way, if an action requested it."""
         self._rotations.report(executor)
 
     def _saw_buttons(self, buttons: Mapping[str, bool], executor: Supervised) -> None:

@@ -72,7 +72,7 @@ class MotionTarget:
     def refresh(self, now_s: float) -> None:
         """Repeat the wanted motion to the safety layer, in each cycle of the loop."""
         if self._rotate.is_rotating:
-            # For its time limit only: without a new heading nobody knows how far it is.
+            # For its time limit only: the remaining angle is unknown without a new heading.
             self._rotate.update(None, now_s)
             if not self._rotate.is_rotating:
                 self._wish = STANDSTILL

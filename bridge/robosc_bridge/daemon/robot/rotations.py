@@ -63,11 +63,11 @@ class Rotations:
 
     @property
     def asked_by(self) -> str | None:
-        """Name of the communication that asked for the rotation under way; None: there is none."""
+        """Name of the communication that requested the rotation under way; None: there is none."""
         return None if self._rotation is None else self._rotation.asked.name
 
     def forget(self) -> None:
-        """Forget the rotation under way, for a new run: its end is not reported to the run that asked for it."""
+        """Forget the rotation under way, for a new run: its end is not reported to the run that requested it."""
         self._rotation = None
 
     def begin(self, asked: Communication, channel: RotateChannel, number: int | None, message: Any) -> None:
@@ -87,13 +87,13 @@ class Rotations:
         self._motion.rotate(math.radians(angle) if channel.unit == "degrees" else angle, self._clock())
 
     def end(self, reason: str, *, is_own: bool = False) -> None:
-        """End the rotation under way as failed; `is_own`: because the model asked for another motion."""
+        """End the rotation under way as failed; `is_own`: because the model requested another motion."""
         if self._rotation is not None:
             self._motion.stop(self._clock(), reason)
             self.poll(is_own=is_own)
 
     def cancel(self, communication: str, number: int) -> None:
-        """End a rotation that an action asked for."""
+        """End a rotation that an action requested."""
         rotation = self._rotation
         if rotation is not None and rotation.number == number and rotation.asked.name == communication:
             self._rotation = None
@@ -101,7 +101,7 @@ class Rotations:
             self._owe(lambda executor: executor.on_goal_ended(number, "cancelled"))
 
     def poll(self, *, is_own: bool = False) -> None:
-        """Check whether a rotation has ended; if so, its end is reported later to whoever asked for it."""
+        """Check whether a rotation has ended; if so, its end is reported later to its requester."""
         rotation = self._rotation
         if rotation is not None and self._motion.is_rotating and self._clock() >= rotation.end_s:
             self._motion.stop(self._clock(), "the rotation takes longer than a call may")
@@ -122,7 +122,7 @@ class Rotations:
             self._owe(lambda executor: executor.on_call_failed(number, reason))
 
     def _report_end(self, reason: str, *, has_arrived: bool, is_own: bool) -> None:
-        """A rotation that a message asked for has ended."""
+        """A rotation that a message requested has ended."""
         outcomes = ("done", "any") if has_arrived else ("failed", "any")
         listening = [name for name, channel in self._listeners.of(RotatedChannel) if channel.outcome in outcomes]
         for identifier in listening:
@@ -131,7 +131,7 @@ class Rotations:
             self._on_failed(reason)
 
     def report(self, executor: Supervised) -> None:
-        """Send the feedback of the rotation under way, if an action asked for it."""
+        """Send the feedback of the rotation under way, if an action requested it."""
         rotation = self._rotation
         if rotation is not None and rotation.number is not None and rotation.asked.kind is CommunicationKind.ACTION:
             left = self._motion.remaining_rad * (1.0 if rotation.channel.direction == "left" else -1.0)

@@ -68,7 +68,7 @@ class CameraWorker:
             self._camera.open()
         except BridgeError as error:
             return self._failed(str(error))
-        except Exception as error:  # Without a camera there is no line, which is reported to the model.
+        except Exception as error:  # A failed camera is reported to the model as a lost line.
             _log.exception("the camera's driver failed")
             return self._failed(f"the driver failed: {type(error).__name__}: {error}")
         self._is_open = True
@@ -103,7 +103,7 @@ class CameraWorker:
 
     def _failed(self, problem: str) -> float:
         if self._is_seeing:
-            # What was seen last is over: the model must not go by it until the time limit.
+            # The last sighting is over: the model must not go by it until the time limit.
             self._report(Sighting(self._clock(), LOST.correction_rad_s))
         self._is_open = self._is_seeing = False
         is_first = self._backoff.is_fresh

@@ -209,7 +209,7 @@ class DriveWorker:
             return self._clock()
         except BridgeError as error:
             return self._failed(str(error))
-        except Exception as error:  # Whatever breaks, the wheels stop: closing does that.
+        except Exception as error:  # Closing stops the wheels after any failure.
             _log.exception("the drive base's driver failed")
             return self._failed(f"the driver failed: {type(error).__name__}: {error}")
         return self._due_s
@@ -244,7 +244,7 @@ class DriveWorker:
         reading = self._base.exchange(command.velocity)
         self._timing.exchanged(began_s)
         if not self._has_torque:
-            # With torque off no velocity is written.
+            # No velocity is written while torque is off.
             self._scan_s = None
         elif self._attentive is None:
             self.written()
@@ -329,7 +329,7 @@ class DriveWorker:
         if self._attentive is not None:
             try:
                 self._attentive.wake()
-            except Exception:  # Who wants to hurry it must not end by it: it may be the loop.
+            except Exception:  # The caller, perhaps the loop, must not end by it.
                 _log.exception("the drive base's driver failed when it was woken")
 
     def close(self) -> None:
@@ -391,7 +391,7 @@ class ScannerWorker:
                 self._restarts = 0
         except BridgeError as error:
             return self._failed(str(error))
-        except Exception as error:  # Without a scanner, the safety layer stops the wheels.
+        except Exception as error:  # The safety layer stops the wheels without a scanner.
             _log.exception("the range scanner's driver failed")
             return self._failed(f"the driver failed: {type(error).__name__}: {error}")
         return now_s

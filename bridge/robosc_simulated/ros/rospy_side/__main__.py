@@ -17,7 +17,7 @@ from .frames import Decoder, Frame, FrameError, encode
 
 CHUNK = 65536
 EXIT_MISSING, EXIT_FAULT = 3, 1
-# What waits for a subscriber that does not take it.
+# Limit of messages for a subscriber that does not take them.
 _QUEUE = 10
 
 

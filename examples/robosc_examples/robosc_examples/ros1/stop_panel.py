@@ -37,7 +37,7 @@ class StopPanel(Node):
             self.exit_status = EXIT_OK
             return
         *lines, self._unread = (self._unread + data).split(b"\n")
-        # What never ends is no line.
+        # A text without an end is no line.
         self._unread = self._unread[-CHUNK:]
         for line in lines:
             self._press(line.decode(errors="replace").strip().lower())
@@ -48,7 +48,7 @@ class StopPanel(Node):
         elif name in self._sent_to:
             self._sent_to[name].publish(Empty())
         elif name:
-            # When in doubt, stop: somebody in a hurry misses the key.
+            # The panel stops when in doubt: people in a hurry miss the key.
             self.stop()
             rospy.logwarn(f"stop: {name!r:.40} is none of stop, resume, quit")
 

@@ -24,7 +24,7 @@ from robosc.targets.code.expressions import (
     operation,
 )
 
-# Whatever is no atom stands in parentheses; only conditions that guard an access are joined without.
+# Operands stand in parentheses unless they are atoms; only conditions that guard an access are joined without.
 _OTHER, _GUARD, ATOM = range(3)
 
 
@@ -134,7 +134,7 @@ def _tested(code: Code) -> tuple[Code, str, bool] | None:
 def _is_decided(operator: str, operands: tuple[Code, ...]) -> bool:
     """Return True if tests joined by an operator say nothing, as compilers warn: never all true, or always one."""
     tests = [test for test in map(_tested, operands) if test is not None]
-    # Of a conjunction at most one equality of a place can be true, of a disjunction at most one inequality false.
+    # Equalities of a place exclude each other in a conjunction, and so do inequalities in a disjunction.
     pairs = {(subject, constant) for subject, constant, is_equal in tests if is_equal is (operator == "and")}
     others = {(subject, constant) for subject, constant, is_equal in tests if is_equal is not (operator == "and")}
     return len({subject for subject, _ in pairs}) < len(pairs) or bool(pairs & others)

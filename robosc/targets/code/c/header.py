@@ -58,7 +58,7 @@ def _words(package: str, name: str, is_layer: bool, has_strategy: bool) -> tuple
 
 
 def decided(text: str, is_layer: bool, has_strategy: bool) -> str:
-    """The lines of a runtime file for a supervisor: what `#if` asks of it is decided here, not by a compiler."""
+    """The lines of a runtime file for a supervisor: the conditions of its `#if` are decided here, not by a compiler."""
     conditions = {
         "#if ROBOT_IS_LAYER": is_layer,
         "#if !ROBOT_IS_LAYER": not is_layer,

@@ -7,7 +7,7 @@ from robosc.targets.code.naming import Namer, snake_case
 _MAXIMUM = 120
 _MAXIMUM_PREFIX = 60
 
-# What C99, C11, C23 and C++ keep for themselves, and macros of common headers that look like ordinary names.
+# Words that C99, C11, C23 and C++ keep for themselves, and macros of common headers that look like ordinary names.
 _TAKEN = frozenset(
     """
     alignas alignof and and_eq asm auto bitand bitor bool break case catch char char16_t char32_t char8_t class compl

@@ -209,7 +209,7 @@ def _switch(head_: str, parameters: str, subject: str, cases: Iterable[tuple[obj
 
 
 def _dispatchers(unit: Unit) -> list[list[str]]:
-    """Return the functions through which the engine asks the model."""
+    """Return the functions by which the engine calls the model."""
     layout = unit.layout
     function, events = layout.function, layout.events
     state, event, data = "const state_t *s", f"{layout.prefix}_event_t event", f"{layout.prefix}_request_t *data"

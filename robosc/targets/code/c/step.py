@@ -86,7 +86,7 @@ class Stepper(StepWriter):
 
     def _parameter(self, path: Path) -> str:
         """The parameter of the step function that takes the value of a path."""
-        assert self.data is not None  # noqa: S101  # There are paths only where data comes.
+        assert self.data is not None  # noqa: S101  # Paths exist only where data comes.
         # The declared code of the reader has the same bounds: it is made of the same path.
         code = Reader(self.unit, self.data, "NULL").read(path)
         code = self._received[path] = code.held_in(self._namer.name("_".join(["value", *map(str, path)])))

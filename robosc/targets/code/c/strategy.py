@@ -20,7 +20,7 @@ def forgotten(unit: Unit) -> list[Statement]:
 
 
 def strategy_functions(unit: Unit, conditions: CConditions, strategy: Strategy) -> list[list[str]]:
-    """Return the functions through which the engine asks the strategy.
+    """Return the functions by which the engine calls the strategy.
 
     Args:
         unit: The file.

@@ -13,7 +13,7 @@ _MAXIMUM_NESTING = 200
 def safe(text: str) -> str:
     """A text for a comment: printable ASCII that neither ends the comment nor is a trigraph or a spliced line."""
     shown = printable(text).replace("*/", "* /").replace("/*", "/ *")
-    # Of three question marks in a row the first time leaves two.
+    # The first pass leaves two of three question marks in a row.
     while "??" in shown:
         shown = shown.replace("??", "? ?")
     return f"{shown} " if shown.endswith("\\") else shown

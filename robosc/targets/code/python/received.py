@@ -44,7 +44,7 @@ def received_unknown(type_: Type, path: Path) -> Unknown:
         case DoubleType() | IntegerType():
             return Unknown.NAN
         case EnumType() if not any(isinstance(step, int) for step in path):
-            return Unknown.NEVER  # Whatever came, the rules make a value of it; an element may be absent.
+            return Unknown.NEVER  # The rules make a value of any data; an element may be absent.
         case _:
             return Unknown.VALUE
 

@@ -85,7 +85,7 @@ def receive_method(writer: Writer, identifier: str, batch: tuple[str, ...]) -> l
 
 def _event_type(writer: Writer, event: str) -> Type:
     type_ = writer.layout.executable.events[event].received
-    assert type_ is not None  # noqa: S101  # There are paths only where data comes.
+    assert type_ is not None  # noqa: S101  # Paths exist only where data comes.
     return type_
 
 

@@ -187,7 +187,7 @@ public:
             }
             return;
         }
-        /* What was heard of calls and goals came earlier. */
+        /* News of calls and goals came earlier. */
         advance();
         take_in(take);
         report_reasons();
@@ -717,7 +717,7 @@ private:
 
     static void on_log(void* context, robot_log_t kind, int what)
     {
-        /* Whatever happens here, it must not pass through C. */
+        /* Exceptions must not pass through C. */
         try {
             self(context).log(kind, what);
         } catch (const std::exception&) {

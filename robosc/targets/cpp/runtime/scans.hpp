@@ -40,7 +40,7 @@ Scan resampled(const Scan& given)
     for (std::size_t bin = 0; bin < BINS; bin++) {
         scan.ranges[bin] = smallest[bin] == NONE ? std::numeric_limits<float>::quiet_NaN() : smallest[bin];
     }
-    /* What belonged to single beams means nothing any more. */
+    /* The values of single beams mean nothing any more. */
     scan.intensities.clear();
     scan.time_increment = 0.0F;
     scan.angle_min = 0.0F;

@@ -26,7 +26,7 @@ std::string value_text(T value)
     }
 }
 
-/* Something with a value, as the model writes it. */
+/* A name and its value, as the model writes them. */
 struct NamedValue {
     std::string name;
     std::string value;

@@ -46,7 +46,7 @@ private:
     std::vector<std::unique_ptr<std::max_align_t[]>> blocks_;
 };
 
-/* In C++, ROS 1 stores a bool in a byte. */
+/* ROS 1 stores a bool in a byte in C++. */
 template <class T>
 inline constexpr bool is_boolean = std::is_same<T, bool>::value || std::is_same<T, std::uint8_t>::value;
 

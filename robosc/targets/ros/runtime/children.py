@@ -52,7 +52,7 @@ def run_both(
     layer = controller = None
     status = 0
     try:
-        # What is run is what the user wrote on the command line.
+        # The user wrote this command.
         layer = subprocess.Popen(  # noqa: S603
             layer_command, env=environment, preexec_fn=end_with_parent
         )

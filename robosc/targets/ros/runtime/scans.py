@@ -74,7 +74,7 @@ class Resampler:
         scan.ranges = self.ranges(
             scan.angle_min, scan.angle_increment, scan.ranges, scan.range_min, scan.range_max
         )
-        # What belonged to single beams means nothing any more.
+        # The values of single beams mean nothing any more.
         scan.intensities = array('f')
         scan.time_increment = 0.0
         scan.angle_min = 0.0

@@ -175,7 +175,7 @@ class ActionGoals:
         self._end(goal_id, 'lost')
 
     def _look_for_server(self) -> None:
-        """Cancel lost goals as soon as their server is seen: nobody else would ever stop them."""
+        """Cancel lost goals as soon as their server is seen: they would run on."""
         is_there = self.is_ready()
         for abandoned in list(self._abandoned.values()):
             if not is_there:
@@ -184,7 +184,7 @@ class ActionGoals:
                 abandoned.is_asked = True
                 abandoned.handle.cancel()
 
-    # What actionlib says, in the threads of rospy.
+    # Callbacks of actionlib, in the threads of rospy.
 
     def _transition(self, goal_id: int) -> Callable[[Any], None]:
         def on_transition(handle: Any) -> None:

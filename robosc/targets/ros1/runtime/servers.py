@@ -58,7 +58,7 @@ class CalledService:
         self._handled = 0
         self._is_closed = False
 
-    # In the threads of rospy.
+    # Methods for the threads of rospy.
 
     @contextmanager
     def handling(self) -> Iterator[None]:
@@ -84,7 +84,7 @@ class CalledService:
         call.is_answered.wait()
         return call.response
 
-    # In the executor's thread.
+    # Methods for the executor's thread.
 
     def answer(self, number: int, response: Any) -> None:
         """Answer a call."""
@@ -98,12 +98,12 @@ class CalledService:
         self.answer(number, self._make_default())
 
     def close(self) -> None:
-        """Answer every new call with the default response from now on, and notify nobody."""
+        """Answer every new call with the default response from now on, without a notice."""
         with self._lock:
             self._is_closed = True
 
     def take_leave(self) -> None:
-        """Answer every call that waits with the default response: nobody else would."""
+        """Answer every call that waits with the default response."""
         for number in list(self._waiting):
             self.answer_default(number)
 
@@ -145,8 +145,8 @@ class ServedAction:
         self._count = 0
         self._is_closed = False
 
-    # In the threads of rospy, while actionlib holds the lock of its server: the executor's thread
-    # may wait for that.
+    # Callbacks in the threads of rospy, while actionlib holds the lock of its server: the
+    # executor's thread may wait for that.
 
     def goal_came(self, handle: Any) -> None:
         """Take in a goal, with its handle as of actionlib's `ServerGoalHandle`."""
@@ -160,7 +160,7 @@ class ServedAction:
         """Take in that a caller wants to cancel a goal."""
         self._put(lambda: self._cancel(handle))
 
-    # In the executor's thread.
+    # Methods for the executor's thread.
 
     def _judge(self, handle: Any) -> None:
         self._count += 1
@@ -198,12 +198,12 @@ class ServedAction:
         self._try_to('end', lambda: end(result))
 
     def close(self) -> None:
-        """From now on reject every new goal, and notify nobody."""
+        """From now on reject every new goal, without a notice."""
         with self._lock:
             self._is_closed = True
 
     def take_leave(self) -> None:
-        """Abort every goal: nobody else would end it."""
+        """Abort every goal, for its caller waits."""
         for number in list(self._goals):
             self.end(number, 'aborted', None)
 

@@ -62,7 +62,8 @@ inline std::pair<ros::NodeHandle, std::string> place(const std::shared_ptr<Share
 /* The calls of one service that wait. Of calls that never end, only so many are kept. */
 class Pending {
 public:
-    /* There is a call more, for which the oldest may be given up; false if too many threads have not ended. */
+    /* Add a call, for which the oldest may be given up; false if too many threads have not ended.
+       */
     bool begin(std::uint32_t id)
     {
         ros::ServiceServerLinkPtr oldest;

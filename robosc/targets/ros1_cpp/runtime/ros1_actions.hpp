@@ -90,7 +90,7 @@ public:
                 refuse(id);
             }
         }
-        /* Nobody else would ever stop a lost goal that runs on. */
+        /* A lost goal that runs on would never be stopped otherwise. */
         if (!abandoned_.empty() && is_ready()) {
             cancel_abandoned();
         }

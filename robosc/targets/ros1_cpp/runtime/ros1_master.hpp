@@ -78,7 +78,8 @@ private:
         }
         XmlRpc::XmlRpcDispatch dispatch;
         dispatch.addSource(&client, XmlRpc::XmlRpcDispatch::WritableEvent | XmlRpc::XmlRpcDispatch::Exception);
-        /* Whatever its header says, in seconds; it returns as soon as the client is done. */
+        /* The argument is in seconds, whatever its header says; it returns as soon as the client
+           is done. */
         dispatch.work(std::chrono::duration<double>(MASTER_PERIOD).count());
         dispatch.removeSource(&client);
         XmlRpc::XmlRpcValue answer;

@@ -212,7 +212,7 @@ class ActionGoals:
         self._end(goal_id, 'lost')
 
     def _look_for_server(self) -> None:
-        """Cancel lost goals as soon as their server is seen: nobody else would ever stop them."""
+        """Cancel lost goals as soon as their server is seen: they would run on."""
         is_there = self.is_ready()
         for goal_id, abandoned in list(self._abandoned.items()):
             if not is_there:
@@ -227,8 +227,8 @@ class ActionGoals:
         future.add_done_callback(lambda done: self._abandoned_answered(goal_id, done))
 
     def _abandoned_answered(self, goal_id: int, future: Any) -> None:
-        # Whatever the server says, it has heard; a client's failure is tried again when the server
-        # is seen anew.
+        # The server has heard it, whatever it says; a client's failure is tried again when the
+        # server is seen anew.
         if future.exception() is None:
             self._abandoned.pop(goal_id, None)
 
@@ -256,7 +256,7 @@ class ActionGoals:
                 self._end(goal_id, 'rejected')
             return
         if goal is None:
-            # Its server counted as lost: nobody would ever stop this one.
+            # Its server counted as lost: this goal would run on.
             self._abandoned[goal_id] = AbandonedGoal(handle)
             self._cancel_abandoned(goal_id)
             return

@@ -95,7 +95,7 @@ class CalledService:
         self.answer(number, self._make_default())
 
     def take_leave(self) -> None:
-        """Answer every call with the default response: nobody else would."""
+        """Answer every call with the default response, for its caller waits."""
         for number in list(self._calls):
             self.answer_default(number)
 
@@ -161,7 +161,7 @@ class ServedAction:
         """
         self._server = server
 
-    # What the server asks.
+    # Callbacks of the server.
 
     def decide(self, message: Any) -> bool:
         """Take in a goal; return True if it is accepted."""
@@ -252,7 +252,7 @@ class ServedAction:
         return self._make_default() if result is None else result
 
     def take_leave(self) -> None:
-        """Abort every goal: nobody else would end it."""
+        """Abort every goal, for its caller waits."""
         for number in list(self._goals):
             self.end(number, 'aborted', None)
 

@@ -149,7 +149,7 @@ public:
         } else if (presence_.is_lost(is_ready(), now)) {
             for (const auto& [id, call] : std::exchange(calls_, {})) {
                 client_->remove_pending_request(call.number);
-                /* What is over by then, the engine has counted as failed. */
+                /* The engine has counted calls that are over by then as failed. */
                 if (now < call.deadline_us) {
                     fail(id);
                 }

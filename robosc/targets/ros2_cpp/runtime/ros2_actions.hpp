@@ -154,7 +154,7 @@ private:
     {
         Abandoned& goal = abandoned_[id];
         goal.is_asked = true;
-        /* Whatever the server says, it has heard. */
+        /* The server has heard it, whatever it says. */
         ask(Handle(goal.handle), [this, id](const auto&) { abandoned_.erase(id); });
     }
 

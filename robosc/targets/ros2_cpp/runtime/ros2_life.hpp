@@ -76,7 +76,8 @@ public:
         done.get();
     }
 
-    /* In the thread: handle all that is there by then, waiting at most so many microseconds for the first of it. */
+    /* Handle all that has come, waiting at most so many microseconds for the first of it; runs in
+       the thread. */
     void spin(std::uint64_t wait_us)
     {
         executor_.spin_once(std::chrono::microseconds(wait_us));
@@ -127,7 +128,7 @@ private:
             host->controller().run_due();
         } catch (const std::exception& failure) {
             host->controller().stop(failure.what(), true);
-            /* Whatever it was will not be better at once. */
+            /* The failure will not be over at once. */
             std::this_thread::sleep_for(std::chrono::microseconds(WATCH_US));
         }
         has_fault = host->controller().fault() != nullptr;

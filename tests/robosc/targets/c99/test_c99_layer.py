@@ -169,7 +169,7 @@ def test_random_supervisors_behave_as_the_reference(tmp_path: Path) -> None:
 
 @needs_gcc
 def test_random_robots_behave_as_the_reference(tmp_path: Path) -> None:
-    """Robots in which silent steps are many and may not end; their messages are told apart by conditions."""
+    """Robots in which silent steps are many and may not end; their messages are distinguished by conditions."""
     seen: Counter[str] = Counter()
     for seed in range(8):
         supervisor = random_layer(Random(seed))

@@ -48,7 +48,7 @@ def test_examples(name: str, deployment: Deployment) -> None:
     supervisor = example_supervisor(name, deployment)
     states = int(supervisor.certificate.states)
     assert assert_same_problem(supervisor, reachable=states + 1) > 1
-    # Everything that is reachable under the supervisor, and not one state more.
+    # Exactly the states that are reachable under the supervisor.
     assert assert_same_control(supervisor, reachable=10 * states) >= states
 
 
@@ -59,7 +59,7 @@ GOLDEN = Path(__file__).parents[2] / "supervisor" / "golden"
     ("name", "test"),
     [
         ("capacity", "component_Bolts.v_n + component_Nuts.v_m <= 19"),
-        # What is -2 in the model is 0 in the file.
+        # The file has 0 for -2 of the model.
         ("follower", "component_First.v_at >= component_Second.v_at"),
         ("house", "component_Cat.v_room != component_Mouse.v_room"),
     ],

@@ -49,7 +49,7 @@ def test_a_package_is_complete_and_the_same_each_time(target: str, name: str) ->
     assert package in files["CMakeLists.txt"]
     needed = {item.text for item in root.findall("depend")}
     assert ({"roscpp"} if target == "ros1-cpp" else {"rclcpp"}) | {"diagnostic_msgs", "std_msgs"} <= needed
-    # Whatever is included is a package that is asked for, a file that is there, or of the system.
+    # Included files are of a package that is asked for, of the package itself, or of the system.
     client = {"ros", "boost", "xmlrpcpp"} if target == "ros1-cpp" else set()
     for path, text in files.items():
         if path.endswith((".cpp", ".hpp", ".c", ".h")):

@@ -385,7 +385,7 @@ public:
 
 }  // namespace node_interfaces
 
-// What nodes of every kind have; the text is the same for rclcpp::Node and rclcpp_lifecycle::LifecycleNode there.
+// Members of nodes of every kind; the text is the same for rclcpp::Node and rclcpp_lifecycle::LifecycleNode there.
 class StandInNode {
 public:
     using OnSetParametersCallbackHandle = node_interfaces::OnSetParametersCallbackHandle;

@@ -289,7 +289,8 @@ void robot_default_settings(robot_settings_t *settings);
    callback that the model needs is missing; it must not be used then. */
 bool robot_init(robot_t *r, const robot_settings_t *settings, const robot_callbacks_t *callbacks);
 
-/* In all that follows `now_us` is the time since some moment, in microseconds; it never goes back. */
+/* The argument `now_us` of all functions below is the time since some moment, in microseconds; it
+   never goes back. */
 
 /* Begin; what comes earlier is ignored. Does nothing the second time. */
 void robot_start(robot_t *r, uint64_t now_us);

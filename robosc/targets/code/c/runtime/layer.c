@@ -5,7 +5,7 @@ static void hold_back(robot_t *r, const char *identifier, int why)
 {
     note(r, ROBOT_LOG_BLOCKED, why);
     require(r, r->callbacks.blocked(r->callbacks.context, identifier, (robot_refusal_t)why));
-    /* What let nothing through because it failed stops the robot now that the caller knows. */
+    /* A request that was refused because of a fault stops the robot now that the caller knows. */
     guard(r, why != (int)ROBOT_REFUSAL_FAULT);
     finish(r);
 }
@@ -32,7 +32,8 @@ static int take_request(robot_t *r, int request)
     if (!take(r, REQUESTS[request].event) || !settle(r, request, &has_changed)) {
         return (int)ROBOT_REFUSAL_FAULT;
     }
-    /* What goes out now may wait for time to pass: looked up as soon as the clock is read again. */
+    /* The outgoing request may set a new deadline: looked up as soon as the clock is read again.
+       */
     r->deadline_us = r->now_us;
     return LET_THROUGH;
 }
@@ -196,7 +197,7 @@ static void cancel_for_caller(robot_t *r, uint64_t now_us, int action, uint32_t 
         goal->is_running = false;
         happened(r, ACTIONS[action].cancel, take_event(&r->state, ACTIONS[action].cancel));
         is_well = end_batch(r);
-        /* Whatever went wrong, the cancel is forwarded. */
+        /* The cancel is forwarded, whatever went wrong. */
         is_well = request_cancel(r, action) && is_well;
         guard(r, is_well);
     }

@@ -89,7 +89,7 @@ static bool expire(robot_t *r)
         is_expired[action] = goal->is_open && goal->is_running && r->now_us >= goal->deadline_us;
     }
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        /* What another one's end led to may have cancelled it. */
+        /* The end of another goal may have led to a cancellation of this one. */
         if (is_expired[action] && r->goals[action].is_running) {
             r->goals[action].is_running = false;
             happened(r, ACTIONS[action].error, take_event(&r->state, ACTIONS[action].error));
@@ -140,7 +140,8 @@ static bool check_time(robot_t *r)
 #endif
     r->deadline_us = next_deadline(r);
 #if ROBOT_IS_LAYER
-    /* What is over ends for the caller before anything that comes at the same moment. */
+    /* Calls and goals that are over end for the caller before all that comes at the same moment.
+       */
     finish(r);
 #endif
     return true;

@@ -91,7 +91,7 @@ def number_at(array: Any, index: int) -> Any:
     """
     try:
         value = array[index] if index < len(array) else None
-    except Exception:  # As above.
+    except Exception:  # Arrays of a message class may raise any error, as above.
         return NAN
     return value if type(value) is float else number(value)
 

@@ -1,0 +1,48 @@
+"""A model that is played against the surroundings, in a real browser: whatever one does, the goal is not reached."""
+
+from pathlib import Path
+
+from playwright.sync_api import Browser, expect
+
+from support.browser import visit
+from support.view_servers import view_process
+
+GATE = """robot Gate {
+    component Door {
+        incoming message open with identifier: "/open", type: none
+        outgoing message opened with identifier: "/opened", type: none
+        outgoing message stuck with identifier: "/stuck", type: none
+        behaviour {
+            initial marked state closed { on request to open goto opening }
+            state opening { on response from opened goto ajar on response from stuck goto closed }
+            marked state ajar { }
+        }
+    }
+    assume Door.opening leads to Door.ajar or Door.closed
+    goal once Door.ajar
+}
+"""
+
+
+def test_the_surroundings_play_against_a_person(browser: Browser, tmp_path: Path) -> None:
+    file = tmp_path / "gate.rscd"
+    file.write_text(GATE, encoding="utf-8")
+    with view_process("--counter-strategy", file) as (_, url), visit(browser, url) as seen:
+        page = seen.page
+        expect(page.locator("#play-denied")).to_contain_text("The surroundings deny goal 1, whatever you do.")
+        expect(page.locator("#play-goals li")).to_have_text(["goal once Door.ajar: not yet"])
+        for hidden in ("#play-world", "#play-finding", "#play-test", "#play-link"):
+            expect(page.locator(hidden)).to_be_hidden()
+        outcome = page.locator("#play-report")
+        for _ in range(3):
+            page.locator('form[data-event="open.request"] button').click()
+            expect(outcome).to_contain_text("open.request: Door = opening")
+            page.locator("#play-wait").click()
+            expect(outcome).to_contain_text("you wait")
+            page.locator("#play-wait").click()
+            expect(page.locator('[data-component="Door"] .card-state')).to_have_text("closed")
+        expect(page.locator("#play-goals li")).to_have_text(["goal once Door.ajar: not yet"])
+        expect(page.locator("#play-denied")).to_contain_text("assumption 1 came true")
+        page.locator("#play-undo").click()
+        expect(outcome).to_have_text("taken back: open.request")
+        seen.picture("denied")

@@ -26,6 +26,7 @@ from robosc_examples.persons import Person
 from robosc_experiments.maze import CHANNELS, MODEL
 from robosc_experiments.serial import Setting, configuration
 from robosc_simulated import Obstacle, Scene, load_scene, maze_scene, room
+from support.models import EXAMPLES
 from support.scenario_runs import Companion, ScenarioRun, maze_run, scenario_run
 
 DAYS = [("ideal", 0), ("typical", 1), ("bad-day", 2), ("bad-day", 3)]
@@ -51,14 +52,9 @@ channels: {/calibrate: {channel: grpc}, /person/distance: {channel: grpc}, /navi
 FACTOR = 4.0
 """Speed of the world of a courier, whose rounds are long, as a multiple of the bridge's clock."""
 
-HOUSE = """remote: {grpc_address: "127.0.0.1:0"}
-skills: {rotate: {speed_rad_s: 0.6}}
-channels: {/odom: {channel: odometry}, /cmd_vel: {channel: drive}, /battery_state: {channel: battery},
-  /rotate_left: {channel: rotate, direction: left}, /rotate_right: {channel: rotate, direction: right},
-  /rotate_done: {channel: rotated}, /order: {channel: grpc}, /door/open: {channel: grpc}, /door/close: {channel: grpc},
-  /door/opened: {channel: grpc}, /tray/unlock: {channel: grpc}, /tray/lock: {channel: grpc},
-  /tray/closed: {channel: grpc}}
-"""
+_PAGE = (EXAMPLES / "courier" / "README.md").read_text(encoding="utf-8")
+HOUSE = _PAGE.partition("```yaml\n")[2].partition("```")[0].replace(":50061", ":0")
+"""Remote endpoint and channels of the courier, as its page shows them."""
 
 
 def hall(person_x_m: float, width_m: float) -> Scene:

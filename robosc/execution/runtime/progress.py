@@ -11,7 +11,7 @@ of the executor's clock.
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Set, Tuple
+from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Set, Tuple
 
 from robosc.execution.runtime.protocol import Aim, Description, StrategicSystem
 from robosc.execution.runtime.recorder import Recorder
@@ -203,12 +203,38 @@ def _size(mission: _Mission) -> int:
     return sum(tour.visits for tour in mission.tours)
 
 
+def _tour_made(tour: _Tour, first: int, made: int) -> Iterator[int]:
+    """Yield the aims of visits of a tour that were made; fewer than none: it went round."""
+    for visit in range(first, first + (made + tour.visits if made < 0 else made)):
+        yield tour.first + visit % tour.visits
+
+
 def _place(tour: _Tour, seen: Tuple[bool, ...]) -> Optional[int]:
     """Return the number of the visit that a tour is at, from 0 on; None: it is at none."""
     for visit in range(tour.visits):
         if seen[tour.here + visit]:
             return visit
     return None
+
+
+MAXIMUM_CHANGES = 1000
+"""Number of changes that are remembered at once, so that they need not be found again."""
+
+
+class _Change(NamedTuple):
+    """
+    Change of what is seen from one stable state to the next.
+
+    :ivar unmet: Numbers of the aims and assumptions that are not met from now on.
+    :ivar reached: Numbers of those that are met from now on, then of the visits that are made.
+    :ivar is_owed: True if an assumption is not met from now on.
+    :ivar following: Known changes of what is seen after this one, by what they lead to.
+    """
+
+    unmet: Tuple[int, ...]
+    reached: Tuple[int, ...]
+    is_owed: bool
+    following: Dict[Tuple[bool, ...], _Change]
 
 
 class ProgressAccount:
@@ -228,14 +254,17 @@ class ProgressAccount:
 
     __slots__ = (
         '_approached',
+        '_changes',
         '_chosen',
         '_count',
         '_counts',
-        '_is_reported',
         '_items',
+        '_known',
+        '_known_count',
         '_missions',
         '_numbers',
         '_recorder',
+        '_reported',
         '_requests',
         '_since_s',
         '_system',
@@ -267,6 +296,9 @@ class ProgressAccount:
         self._numbers = range(len(self._items))
         self._missions = _missions(description)
         self._visits = range(self._count - sum(map(_size, self._missions)), self._count)
+        # Known changes, by what was seen before them.
+        self._known: Dict[Tuple[bool, ...], Dict[Tuple[bool, ...], _Change]] = {}
+        self._known_count = 0
         self.is_followed = False
         self.wake: Callable[[float], None] = lambda due_s: None
         self.restart()
@@ -277,7 +309,8 @@ class ProgressAccount:
         self.seen: Tuple[bool, ...] = ()
         self._counts = [0] * number
         self._since_s = [0.0] * number
-        self._is_reported = [False] * number
+        self._reported: Set[int] = set()
+        self._changes = self._known.setdefault((), {})
         self._approached: Optional[int] = None
         self._chosen: Optional[int] = None
         self.due_s = math.inf
@@ -285,24 +318,25 @@ class ProgressAccount:
     def change(self, seen: Tuple[bool, ...]) -> None:
         """Take in a stable state in which something else than `seen` is seen."""
         # This is written out for speed: the cycle time of the controller.
-        before, self.seen = self.seen, seen
-        now_s = self._recorder.began_s
-        for number in self._numbers:
-            is_met = seen[number]
-            if before and is_met is before[number]:
-                continue
-            if not is_met:
-                self._since_s[number] = now_s
-                if number >= self._count and now_s + self._timeout_s < self.due_s:
-                    # One that was to be reported earlier may be met by now: that costs a look.
-                    self.due_s = now_s + self._timeout_s
-                    self.wake(self.due_s)
-            elif before and number not in self._visits:
-                self._counts[number] += 1
-                if self._recorder.is_active or self._is_reported[number]:
-                    self._report_met(number)
-        if self._missions and before:
-            self._make_visits(before)
+        change = self._changes.get(seen)
+        if change is None:
+            change = self._learn(seen)
+        unmet, reached, is_owed, self._changes = change
+        self.seen = seen
+        if unmet:
+            now_s, since_s = self._recorder.began_s, self._since_s
+            for number in unmet:
+                since_s[number] = now_s
+            if is_owed and now_s + self._timeout_s < self.due_s:
+                # One that was to be reported earlier may be met by now: that costs a look.
+                self.due_s = now_s + self._timeout_s
+                self.wake(self.due_s)
+        if reached:
+            counts = self._counts
+            for number in reached:
+                counts[number] += 1
+            if self._reported or self._recorder.is_active:
+                self._report(reached)
 
     def decide(self) -> Optional[int]:
         """Return the number of the request that the strategy chooses in this stable state."""
@@ -320,10 +354,10 @@ class ProgressAccount:
         """Report each assumption that is owed for too long by now, once."""
         for number in self._owed():
             # The sum is the deadline: their difference may be rounded to less.
-            if now_s >= self._since_s[number] + self._timeout_s and not self._is_reported[number]:
-                self._is_reported[number] = True
+            if now_s >= self._since_s[number] + self._timeout_s and number not in self._reported:
+                self._reported.add(number)
                 self._recorder.owed(self._items[number], now_s - self._since_s[number])
-        waiting = [self._since_s[it] for it in self._owed() if not self._is_reported[it]]
+        waiting = [self._since_s[it] for it in self._owed() if it not in self._reported]
         self.due_s = min(waiting, default=math.inf) + self._timeout_s
 
     def at(self, now_s: float) -> Progress:
@@ -335,7 +369,7 @@ class ProgressAccount:
             aims=tuple(standings[: self._count]),
             assumptions=tuple(standings[self._count :]),
             overdue=tuple(
-                self._items[number].name for number in self._owed() if self._is_reported[number]
+                self._items[number].name for number in self._owed() if number in self._reported
             ),
             is_followed=self.is_followed,
             approached=None if approached in (None, NO_AIM) else self._items[approached].name,
@@ -374,9 +408,27 @@ class ProgressAccount:
                 made.update(range(tour.first, tour.first + number))
         return made
 
-    def _make_visits(self, before: Tuple[bool, ...]) -> None:
-        """Count the visits that are made between the stable state before and this one."""
-        seen = self.seen
+    def _learn(self, seen: Tuple[bool, ...]) -> _Change:
+        """Find out what changes between the last stable state and this one."""
+        if self._known_count >= MAXIMUM_CHANGES:
+            self._known.clear()
+            self._changes = self._known.setdefault(self.seen, {})
+            self._known_count = 0
+        before = self.seen
+        changed = [it for it in self._numbers if not before or seen[it] is not before[it]]
+        unmet = tuple(number for number in changed if not seen[number])
+        reached: List[int] = []
+        if before:
+            reached += [it for it in changed if seen[it] and it not in self._visits]
+            reached += self._visits_made(before, seen)
+        is_owed = any(number >= self._count for number in unmet)
+        change = _Change(unmet, tuple(reached), is_owed, self._known.setdefault(seen, {}))
+        self._changes[seen] = change
+        self._known_count += 1
+        return change
+
+    def _visits_made(self, before: Tuple[bool, ...], seen: Tuple[bool, ...]) -> Iterator[int]:
+        """Yield the numbers of the visits that are made between two stable states."""
         for mission in self._missions:
             own = mission.tours[0]
             place = _place(own, seen)
@@ -385,32 +437,24 @@ class ProgressAccount:
                 continue
             # All visits were made at once where every one was true already.
             if not before[mission.round]:
-                was = _place(own, before) or 0
-                is_round = seen[mission.round]
-                self._make(own, was, own.visits if is_round else (place - was) % own.visits)
+                was, is_round = _place(own, before) or 0, seen[mission.round]
+                yield from _tour_made(own, was, own.visits if is_round else place - was)
             for tour in mission.tours[1:]:
                 begun, now = _place(tour, before), _place(tour, seen)
                 if begun is None and now is None:
                     continue
                 first = begun or 0
                 # A detour that is before where it was has ended, and has begun again.
-                made = tour.visits - first if now is None else (now - first) % tour.visits
-                self._make(tour, first, made)
+                yield from _tour_made(tour, first, (tour.visits if now is None else now) - first)
 
-    def _make(self, tour: _Tour, first: int, made: int) -> None:
-        for visit in range(first, first + made):
-            number = tour.first + visit % tour.visits
-            self._counts[number] += 1
-            if self._recorder.is_active:
+    def _report(self, reached: Tuple[int, ...]) -> None:
+        for number in reached:
+            if number < self._count:
                 self._recorder.reached(self._items[number], self._counts[number])
-
-    def _report_met(self, number: int) -> None:
-        if number < self._count:
-            self._recorder.reached(self._items[number], self._counts[number])
-        elif self._is_reported[number]:
-            self._is_reported[number] = False
-            owed_s = self._recorder.began_s - self._since_s[number]
-            self._recorder.met(self._items[number], owed_s)
+            elif number in self._reported:
+                self._reported.remove(number)
+                owed_s = self._recorder.began_s - self._since_s[number]
+                self._recorder.met(self._items[number], owed_s)
 
     def _owed(self) -> List[int]:
         """Return the numbers of the assumptions that are owed."""

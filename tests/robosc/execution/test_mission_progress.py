@@ -3,6 +3,7 @@
 import json
 from collections import Counter
 from typing import Any
+from unittest.mock import patch
 
 import pytest
 from hypothesis import given, settings
@@ -77,8 +78,17 @@ class Touring:
 @given(
     st.lists(missions, min_size=2, max_size=2, unique_by=lambda mission: mission.name),
     st.lists(states, min_size=1, max_size=12),
+    st.sampled_from((2, 1000)),
 )
-def test_visits_are_made_as_the_interpreter_accounts_for_them(given_missions: list[Mission], run: list[Any]) -> None:
+def test_visits_are_made_as_the_interpreter_accounts_for_them(
+    given_missions: list[Mission], run: list[Any], remembered: int
+) -> None:
+    """However many changes are remembered, each state comes again, so that most of them are known then."""
+    with patch("robosc.execution.runtime.progress.MAXIMUM_CHANGES", remembered):
+        _check_visits(given_missions, [*run, *run])
+
+
+def _check_visits(given_missions: list[Mission], run: list[Any]) -> None:
     system, clock, log = Touring(given_missions), ManualClock(), MemoryLog()
     recorder = Recorder(system, clock, log)  # type: ignore[arg-type]  # its state is not needed
     account = ProgressAccount(system, recorder, (), 0.0)  # type: ignore[arg-type]

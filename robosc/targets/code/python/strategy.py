@@ -42,10 +42,12 @@ def strategy_methods(writer: Writer, strategy: Strategy) -> list[list[str]]:
         f'''\
 def choose(self):
     """Return the number of the request that the strategy chooses, None to wait."""
+    seen = self._seen
     for _ in range({count}):
-        if not self._seen[self.mode]:
-            return self._approach[self.mode]()
-        self.mode = (self.mode + 1) % {count}
+        mode = self.mode
+        if not seen[mode]:
+            return self._approach[mode]()
+        self.mode = (mode + 1) % {count}
     return None'''.splitlines(),
     ]
     for number, aim in enumerate(executable.obligations.aims):

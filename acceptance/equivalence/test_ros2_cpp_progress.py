@@ -8,6 +8,8 @@ from typing import Any
 import pytest
 
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.runtime.progress import mission_texts
+from robosc.supervisor import Supervisor
 from robosc_view.ros2_topic import StateReader
 from support.equivalence.node_target import LIMIT_S
 from support.equivalence.python_targets import observe
@@ -17,6 +19,7 @@ from support.equivalence.targets import compare
 from support.execution import Bench
 from support.goal_porter import porter_supervisor
 from support.rclcpp_nodes import compiled_once, missing
+from support.rounds import rounds_supervisor
 
 yaml: Any = pytest.importorskip("yaml", reason="PyYAML, which reads what the stand-in prints, is not installed")
 pytestmark = pytest.mark.skipif(missing() is not None, reason=str(missing()))
@@ -38,9 +41,9 @@ def test_its_event_log_tells_of_goals(tmp_path: Path, tmp_path_factory: pytest.T
 class Stepped(StandInSurroundings):
     """A node on simulated time that publishes its state as JSON, and its health."""
 
-    def __init__(self, program: Path, folder: Path) -> None:
+    def __init__(self, program: Path, folder: Path, supervisor: Supervisor) -> None:
         parameters = {"use_sim_time": "true", "publish_state": "true", "assumption_timeout": "0.5"}
-        super().__init__(porter_supervisor(), program, folder, parameters)
+        super().__init__(supervisor, program, folder, parameters)
         self._periods = 0
         self.health: list[dict[str, Any]] = []
 
@@ -67,7 +70,7 @@ class Stepped(StandInSurroundings):
 def test_its_state_and_its_diagnostics_have_the_progress(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    node = Stepped(compiled_once(porter_supervisor(), tmp_path_factory), tmp_path)
+    node = Stepped(compiled_once(porter_supervisor(), tmp_path_factory), tmp_path, porter_supervisor())
     node.start(Scenario((), {"period_s": PERIOD_S, "policy": "strategy"}), tmp_path / "events")
     twin = Bench(InterpretedSystem(porter_supervisor()), assumption_timeout_s=0.5, period_s=PERIOD_S)
     reader = StateReader(porter_supervisor())
@@ -95,6 +98,41 @@ def test_its_state_and_its_diagnostics_have_the_progress(
         values = {item["key"]: item["value"] for item in health["values"]}
         assert values["approached"] == "goal 1"
         assert values["assumption 2"] == "true, reached 0 times: Door.closing leads to Door.shut"
+        node.stop()
+    finally:
+        node.close()
+
+
+def test_its_state_and_its_diagnostics_have_the_missions(
+    tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
+) -> None:
+    supervisor = rounds_supervisor()
+    node = Stepped(compiled_once(supervisor, tmp_path_factory), tmp_path, supervisor)
+    node.start(Scenario((), {"period_s": PERIOD_S, "policy": "strategy"}), tmp_path / "events")
+    twin = Bench(InterpretedSystem(supervisor), period_s=PERIOD_S)
+    reader = StateReader(supervisor)
+    try:
+        node._order("clock", "1.0")
+        for _ in range(3):
+            node.next_state()
+        seen = set[str]()
+        for identifier in ("/begin", "/call", "/end"):
+            node.send(identifier, {})
+            twin.receive(identifier)
+            for _ in range(3):
+                _, status, _ = reader.read(node.next_state(), 1.0)
+                twin.tick()
+                assert status.progress is not None and twin.executor.progress is not None
+                expected = twin.executor.progress
+                assert status.progress.missions == expected.missions
+                assert [(*item[:4], item.mission) for item in status.progress.aims] == [
+                    (*item[:4], item.mission) for item in expected.aims
+                ]
+                seen.add(mission_texts(expected)["mission rounds"])
+        assert len(seen) > 4
+        values = {item["key"]: item["value"] for item in node.next_health()["values"]}
+        assert values["mission rounds"] == "not asked for; rounds made: 2"
+        assert values["visit 1 of mission rounds"] == "not wanted now, reached 3 times: Base.kitchen"
         node.stop()
     finally:
         node.close()

@@ -68,9 +68,12 @@ class LoggedProgress:
         place = bisect_right(self._counts, count) - 1
         told = _Told() if place < 0 else self._told[place]
         return Progress(
-            aims=tuple(Standing(*item, False, told.times.get(item.name, 0), None) for item in self._aims),
+            aims=tuple(
+                Standing(item.name, item.words, False, told.times.get(item.name, 0), None, item.mission)
+                for item in self._aims
+            ),
             assumptions=tuple(
-                Standing(*item, False, 0, max(time_s - told.owed[item.name], 0.0) if item.name in told.owed else None)
+                Standing(item.name, item.words, False, 0, self._owed_s(told, item.name, time_s))
                 for item in self._assumptions
             ),
             overdue=tuple(item.name for item in self._assumptions if item.name in told.owed),
@@ -78,6 +81,10 @@ class LoggedProgress:
             approached=told.approached,
             chosen=None,
         )
+
+    @staticmethod
+    def _owed_s(told: _Told, name: str, time_s: float) -> float | None:
+        return max(time_s - told.owed[name], 0.0) if name in told.owed else None
 
 
 def _after(told: _Told, document: Mapping[str, Any], time_s: float, known: set[str]) -> _Told:

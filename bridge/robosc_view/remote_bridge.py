@@ -11,7 +11,7 @@ from typing import Any
 from google.protobuf.json_format import MessageToDict
 
 from robosc.errors import RoboscError
-from robosc.execution.runtime.progress import Progress, Standing
+from robosc.execution.runtime.progress import MissionStanding, Progress, Standing
 from robosc.supervisor import Supervisor, decode
 from robosc_api.security import Credentials
 from robosc_bridge.daemon.states import OperatorCommand
@@ -318,12 +318,16 @@ def _progress(progress: StrategyProgress) -> Progress:
         is_followed=progress.is_followed,
         approached=progress.approached or None,
         chosen=progress.chosen or None,
+        missions=tuple(
+            MissionStanding(item.name, item.visit, item.is_round, item.rounds, tuple(item.detours))
+            for item in progress.missions
+        ),
     )
 
 
 def _standing(item: Any) -> Standing:
     unmet_s = item.unmet_s if item.HasField("unmet_s") else None
-    return Standing(item.name, item.words, item.is_met, item.times, unmet_s)
+    return Standing(item.name, item.words, item.is_met, item.times, unmet_s, item.mission or None)
 
 
 def _drive(drive: DriveState) -> Drive:

@@ -20,7 +20,7 @@ from typing import Annotated, Any
 import msgspec
 
 from robosc.automata.plants import PLANT_LOCATIONS
-from robosc.execution.runtime.progress import Progress, Standing
+from robosc.execution.runtime.progress import MissionStanding, Progress, Standing
 from robosc.supervisor import Supervisor
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.definition import (
@@ -238,6 +238,7 @@ def _communications(locations: object, robot: Robot) -> Mapping[str, str]:
 
 
 _Text = Annotated[str, msgspec.Meta(max_length=100_000)]
+_Number = Annotated[int, msgspec.Meta(ge=0)]
 _MANY = msgspec.Meta(max_length=10_000)
 
 
@@ -247,8 +248,19 @@ class _Standing(msgspec.Struct, frozen=True):
     name: _Text
     words: _Text
     is_met: bool
-    times: Annotated[int, msgspec.Meta(ge=0)]
+    times: _Number
     unmet_s: Annotated[float, msgspec.Meta(ge=0)] | None
+    mission: _Text | None = None
+
+
+class _Mission(msgspec.Struct, frozen=True):
+    """State of a mission, as a node writes it."""
+
+    name: _Text
+    visit: _Number
+    is_round: bool
+    rounds: _Number
+    detours: Annotated[tuple[_Number, ...], _MANY]
 
 
 class _Progress(msgspec.Struct, frozen=True):
@@ -260,6 +272,7 @@ class _Progress(msgspec.Struct, frozen=True):
     is_followed: bool
     approached: _Text | None
     chosen: _Text | None
+    missions: Annotated[tuple[_Mission, ...], _MANY] = ()
 
 
 def _progress(found: object) -> Progress | None:
@@ -277,6 +290,7 @@ def _progress(found: object) -> Progress | None:
         is_followed=told.is_followed,
         approached=told.approached,
         chosen=told.chosen,
+        missions=tuple(MissionStanding(*msgspec.structs.astuple(item)) for item in told.missions),
     )
 
 

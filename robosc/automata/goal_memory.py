@@ -158,6 +158,7 @@ class Aim:
         number: Number of the goal from 0; of a visit in its mission, where those of detours follow its own.
         mission: Number of the mission from 0; None for a goal.
         visit: Condition that the visit is about, as it is written; None for a goal.
+        here: Condition over the state and the memory that the mission or detour is at the visit; None for a goal.
     """
 
     name: str
@@ -166,6 +167,7 @@ class Aim:
     number: int
     mission: int | None = None
     visit: Expression | None = None
+    here: Expression | None = None
 
 
 def counted(aims: Collection[Aim]) -> str:
@@ -183,10 +185,12 @@ class Journey:
         aims: Its visits, then those of each detour.
         exclusive: Places of the memory in groups; in each group at most one is true at a time: of the mission, where it
             is at its first visit if none is true, then of each detour, which is idle if none is true.
+        is_round: Condition over the state that the mission is asked for and every visit of its own is true.
     """
 
     aims: tuple[Aim, ...]
     exclusive: tuple[tuple[Place, ...], ...]
+    is_round: Expression
 
 
 @dataclass(frozen=True, slots=True)
@@ -235,7 +239,8 @@ def journey(mission: Mission, number: int) -> Journey:
         for visit, (condition, place_) in enumerate(zip(detour.visits, group, strict=True), start=1):
             target = _negated(place_.read)
             place_number = len(mission.visits) + len(aims)
-            aims.append(Aim(f"visit {visit} of {title}", AimKind.DETOUR_VISIT, target, place_number, number, condition))
+            words = f"visit {visit} of {title}"
+            aims.append(Aim(words, AimKind.DETOUR_VISIT, target, place_number, number, condition, place_.read))
     own = [
         Aim(
             f"visit {visit + 1} of {name}",
@@ -244,10 +249,11 @@ def journey(mission: Mission, number: int) -> Journey:
             visit,
             number,
             condition,
+            conjunction(*asked, at[visit]),
         )
         for visit, condition in enumerate(mission.visits)
     ]
-    return Journey((*own, *aims), tuple(groups))
+    return Journey((*own, *aims), tuple(groups), conjunction(*asked, *visits))
 
 
 def _detour_places(detour: Detour, title: str, asked: Sequence[Expression]) -> tuple[Place, ...]:
@@ -308,6 +314,7 @@ class Obligations:
         cancels: Own cancels of the executor, in its order.
         places: Places of the memory: of the cancels, of the assumptions, of the goals, of the missions.
         exclusive: Groups of places, in each of which at most one is true at a time.
+        rounds: For each mission, the condition that it is asked for and every visit of its own is true.
     """
 
     aims: tuple[Aim, ...]
@@ -315,6 +322,7 @@ class Obligations:
     cancels: tuple[Cancel, ...]
     places: tuple[Place, ...]
     exclusive: tuple[tuple[Place, ...], ...]
+    rounds: tuple[Expression, ...]
 
 
 def obligations(executable: "ExecutableSystem") -> Obligations:
@@ -341,4 +349,5 @@ def obligations(executable: "ExecutableSystem") -> Obligations:
             *(place for group in exclusive for place in group),
         ),
         exclusive,
+        tuple(item.is_round for item in journeys),
     )

@@ -241,6 +241,13 @@ _PRINT_PROGRESS = """\
         const @p@_standing_t found = @p@_standing(&r, number, now_us);
         printf(" %d %d %d %" PRIu32 " %" PRIu64, found.is_met, found.is_unmet, found.is_overdue, found.count,
                found.unmet_us);
+    }
+    for (int number = 0; number < @P@_MISSION_COUNT; number++) {
+        const @p@_mission_t found = @p@_mission(&r, number);
+        printf(" %d %d %" PRIu32, found.visit, found.is_round, found.rounds);
+        for (int detour = 0; detour < found.detours; detour++) {
+            printf(" %d", @p@_detour(&r, number, detour));
+        }
     }"""
 
 

@@ -136,8 +136,16 @@ def progress(**changes: Any) -> Message:
                 "is_met": False,
                 "times": 1,
                 "unmet_s": 5.2,
+                "mission": None,
             },
-            {"name": "goal 2", "words": "always eventually Base.outside", "is_met": True, "times": 3, "unmet_s": None},
+            {
+                "name": "goal 2",
+                "words": "always eventually Base.outside",
+                "is_met": True,
+                "times": 3,
+                "unmet_s": None,
+                "mission": None,
+            },
         ],
         "assumptions": [
             {
@@ -146,12 +154,14 @@ def progress(**changes: Any) -> Message:
                 "is_met": False,
                 "times": 0,
                 "unmet_s": 4,
+                "mission": None,
             },
         ],
         "overdue": [],
         "is_followed": True,
         "approached": "goal 1",
         "chosen": "open",
+        "missions": [],
     }
     return {**message, **changes}
 

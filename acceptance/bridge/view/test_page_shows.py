@@ -6,8 +6,11 @@ from typing import Any
 import pytest
 from playwright.sync_api import Browser
 
+from robosc.execution.interpreter import InterpretedSystem
 from support.browser import Visit, visit
+from support.execution import Bench
 from support.live_view import StandIn
+from support.rounds import rounds_supervisor
 from support.view_messages import component, definition, entry, events, graph, progress, taken, update
 
 
@@ -255,3 +258,49 @@ def test_goals_are_shown_with_the_one_that_is_approached(server: StandIn, seen: 
 
     server.send(update())
     seen.wait("() => document.querySelector('#goals').hidden")
+
+
+def test_missions_are_shown_with_the_detour_that_is_under_way(server: StandIn, seen: Visit) -> None:
+    """The messages are those of an executor."""
+    robot = Bench(InterpretedSystem(rounds_supervisor()))
+
+    def shown(condition: str) -> tuple[str, dict[str, list[str]]]:
+        """Send the progress of the robot; return where its mission is, and its visits, once a condition is true."""
+        assert robot.executor.progress is not None
+        server.send(update(progress=robot.executor.progress.plain()))
+        seen.wait(f"() => document.querySelector('.mission p')?.innerText.includes('{condition}')")
+        return seen.page.locator(".mission p").inner_text(), seen.page.evaluate(GOALS)
+
+    robot.tick()
+    where, visits = shown("not asked for")
+    assert where == "not asked for 0 rounds made"
+    assert [state for state, _ in visits.values()] == ["unmet"] * 3
+    assert seen.page.locator("#goals-count").inner_text() == ""
+    assert seen.page.locator("#goals-choice").inner_text() == "No goal or visit is left: nothing is requested."
+
+    robot.receive("/begin")
+    robot.tick()
+    robot.receive("/call")
+    where, visits = shown("detour 1 under way")
+    assert where == "at visit 2, Base.office; detour 1 under way, at visit 1, Base.hall 0 rounds made"
+    # No tick stands at the visit that waits for the detour.
+    assert visits == {
+        "visit 1 of mission rounds": ["met", "visit 1 of mission rounds made in this round reached once Base.kitchen"],
+        "visit 2 of mission rounds": [
+            "unmet",
+            "visit 2 of mission rounds after the detour reached 0 times Base.office",
+        ],
+        "visit 1 of detour 1 of mission rounds": [
+            "unmet",
+            "visit 1 of detour 1 of mission rounds wanted, for 0 s reached 0 times Base.hall",
+        ],
+    }
+    robot.clock.advance(5.0)
+    robot.tick(2)
+    where, visits = shown("at visit 1, Base.kitchen")
+    assert where == "at visit 1, Base.kitchen 1 round made"
+    assert [state for state, _ in visits.values()] == ["unmet", "unmet", "unmet"]
+    assert visits["visit 2 of mission rounds"][1] == "visit 2 of mission rounds reached once Base.office"
+    robot.tick()
+    where, visits = shown("at visit 2, Base.office")
+    assert visits["visit 1 of mission rounds"][0] == "met"

@@ -156,11 +156,27 @@ def _metrics(snapshot: Snapshot) -> Iterator[Metric]:
 
 def _progress(progress: Progress) -> Iterator[Metric]:
     reached = CounterMetricFamily(
-        "robosc_bridge_goal_reached", "Times that a goal has become true since the run began.", labels=["goal"]
+        "robosc_bridge_goal_reached",
+        "Times that a goal has become true, or a visit was made, since the run began.",
+        labels=["goal"],
     )
     for aim in progress.aims:
         reached.add_metric([aim.name], aim.times)
     yield reached
+    if progress.missions:
+        visit = GaugeMetricFamily(
+            "robosc_bridge_mission_visit",
+            "Number of the visit that a mission is at, from 1 on; 0 if it is not asked for.",
+            labels=["mission"],
+        )
+        rounds = CounterMetricFamily(
+            "robosc_bridge_mission_rounds", "Rounds that a mission has made since the run began.", labels=["mission"]
+        )
+        for mission in progress.missions:
+            visit.add_metric([mission.name], float(mission.visit))
+            rounds.add_metric([mission.name], mission.rounds)
+        yield visit
+        yield rounds
     owed = GaugeMetricFamily(
         "robosc_bridge_assumption_owed_seconds",
         "Time since when an assumption is owed; 0 if it is met.",

@@ -13,7 +13,7 @@ from google.protobuf.struct_pb2 import Struct
 from robosc._version import __version__
 from robosc.errors import UnsupportedModelError
 from robosc.execution.runtime.event_log import Entry, plain
-from robosc.execution.runtime.progress import Progress, Standing
+from robosc.execution.runtime.progress import MissionStanding, Progress, Standing
 from robosc.expressions import ObjectType
 from robosc.model.structure import Communication, CommunicationKind, Model
 from robosc.supervisor import Supervisor, encode
@@ -212,12 +212,19 @@ def _progress(progress: Progress) -> pb.StrategyProgress:
         is_followed=progress.is_followed,
         approached=progress.approached or "",
         chosen=progress.chosen or "",
+        missions=map(_mission, progress.missions),
     )
 
 
 def _standing(item: Standing) -> pb.Standing:
-    name, words, is_met, times, unmet_s = item
-    return pb.Standing(name=name, words=text_of(words), is_met=is_met, times=times, unmet_s=unmet_s)
+    name, words, is_met, times, unmet_s, mission = item
+    return pb.Standing(
+        name=name, words=text_of(words), is_met=is_met, times=times, unmet_s=unmet_s, mission=mission or ""
+    )
+
+
+def _mission(item: MissionStanding) -> pb.MissionStanding:
+    return pb.MissionStanding(**item._asdict())
 
 
 def _notice(item: Reason | Caution) -> pb.Notice:

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 from enum import IntEnum
 
 from robosc_bridge.terminal.client import DriveState, Snapshot, is_fault, state_name
-from robosc_bridge.terminal.formatting import STALE_S, owed_text
+from robosc_bridge.terminal.formatting import STALE_S, mission_text, owed_text, standing_text
 
 _STANDBY = "STANDBY"
 
@@ -128,10 +128,8 @@ def _goals(snapshot: Snapshot) -> Iterator[Entry]:
     progress = snapshot.progress
     values = {}
     for item in (*progress.aims, *progress.assumptions):
-        standing = (
-            "true" if item.is_met else f"not for {item.unmet_s:.0f} s" if item.HasField("unmet_s") else "not known"
-        )
-        values[item.name] = f"{standing}, reached {item.times} times: {item.words}"
+        values[item.name] = f"{standing_text(item)}, reached {item.times} times: {item.words}"
+    values |= {f"mission {item.name}": mission_text(item, progress) for item in progress.missions}
     values |= {"approached": progress.approached, "chosen": progress.chosen}
     owed = [owed_text(item) for item in progress.assumptions if item.name in progress.overdue]
     if owed:

@@ -44,6 +44,7 @@ Snapshot = pb.Snapshot
 DriveState = pb.DriveState
 StrategyProgress = pb.StrategyProgress
 Standing = pb.Standing
+MissionStanding = pb.MissionStanding
 Scan = pb.Scan
 Definition = pb.GetDefinitionResponse
 WatchResponse = pb.WatchResponse

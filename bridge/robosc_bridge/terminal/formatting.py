@@ -7,6 +7,7 @@ from typing import Any
 
 from robosc_bridge.terminal.client import (
     DriveState,
+    MissionStanding,
     Snapshot,
     Standing,
     StrategyProgress,
@@ -73,18 +74,44 @@ def _drive_lines(drive: DriveState) -> Iterator[str]:
 
 
 def _progress_lines(progress: StrategyProgress) -> Iterator[str]:
+    for mission in progress.missions:
+        yield f"  mission {mission.name}: {mission_text(mission, progress)}"
     for aim in progress.aims:
         turn = ", approached now" if aim.name == progress.approached else ""
-        since = (
-            "true" if aim.is_met else f"not yet, for {aim.unmet_s:.0f} s" if aim.HasField("unmet_s") else "not known"
-        )
-        yield f"  {aim.name}: {since}{turn}, reached {aim.times} times: {aim.words}"
+        yield f"  {aim.name}: {standing_text(aim)}{turn}, reached {aim.times} times: {aim.words}"
     if progress.is_followed:
         yield f"  the strategy {f'requests {progress.chosen}' if progress.chosen else 'waits'}"
     for item in progress.assumptions:
         if item.HasField("unmet_s"):
             mark = "warning: " if item.name in progress.overdue else ""
             yield f"  {mark}{owed_text(item)}"
+
+
+def standing_text(item: Standing) -> str:
+    """Return the state of a goal, a visit or an assumption, in words."""
+    if item.HasField("unmet_s"):
+        return f"{'wanted' if item.mission else 'not yet,'} for {item.unmet_s:.0f} s"
+    if item.mission:
+        return "made in this round" if item.is_met else "not wanted now"
+    return "true" if item.is_met else "not known"
+
+
+def mission_text(mission: MissionStanding, progress: StrategyProgress) -> str:
+    """Return where a mission is, and how many rounds were made, in words."""
+    words = {aim.name: aim.words for aim in progress.aims}
+
+    def at(visit: int, title: str) -> str:
+        return f"at visit {visit}, {words.get(f'visit {visit} of {title}', '')}"
+
+    title = f"mission {mission.name}"
+    parts = ["every visit is true" if mission.is_round else at(mission.visit, title)]
+    parts += [
+        f"detour {number} under way, {at(visit, f'detour {number} of {title}')}"
+        for number, visit in enumerate(mission.detours, start=1)
+        if visit
+    ]
+    where = "; ".join(parts) if mission.visit else "not asked for"
+    return f"{where}; rounds made: {mission.rounds}"
 
 
 def owed_text(item: Standing) -> str:

@@ -174,34 +174,52 @@ class Snapshot(_message.Message):
     def __init__(self, number: _Optional[int] = ..., time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., age_s: _Optional[float] = ..., state: _Optional[_Union[BridgeState, str]] = ..., problem: _Optional[str] = ..., reasons: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., warnings: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., stops: _Optional[_Iterable[str]] = ..., devices: _Optional[_Iterable[_Union[DeviceState, _Mapping]]] = ..., components: _Optional[_Iterable[_Union[ComponentState, _Mapping]]] = ..., enabled: _Optional[_Iterable[str]] = ..., drive: _Optional[_Union[DriveState, _Mapping]] = ..., has_scan: _Optional[bool] = ..., overruns: _Optional[int] = ..., communications: _Optional[_Iterable[_Union[CommunicationState, _Mapping]]] = ..., latencies: _Optional[_Iterable[_Union[Latency, _Mapping]]] = ..., lines: _Optional[_Iterable[_Union[LineCounts, _Mapping]]] = ..., progress: _Optional[_Union[StrategyProgress, _Mapping]] = ...) -> None: ...
 
 class StrategyProgress(_message.Message):
-    __slots__ = ("aims", "assumptions", "overdue", "is_followed", "approached", "chosen")
+    __slots__ = ("aims", "assumptions", "overdue", "is_followed", "approached", "chosen", "missions")
     AIMS_FIELD_NUMBER: _ClassVar[int]
     ASSUMPTIONS_FIELD_NUMBER: _ClassVar[int]
     OVERDUE_FIELD_NUMBER: _ClassVar[int]
     IS_FOLLOWED_FIELD_NUMBER: _ClassVar[int]
     APPROACHED_FIELD_NUMBER: _ClassVar[int]
     CHOSEN_FIELD_NUMBER: _ClassVar[int]
+    MISSIONS_FIELD_NUMBER: _ClassVar[int]
     aims: _containers.RepeatedCompositeFieldContainer[Standing]
     assumptions: _containers.RepeatedCompositeFieldContainer[Standing]
     overdue: _containers.RepeatedScalarFieldContainer[str]
     is_followed: bool
     approached: str
     chosen: str
-    def __init__(self, aims: _Optional[_Iterable[_Union[Standing, _Mapping]]] = ..., assumptions: _Optional[_Iterable[_Union[Standing, _Mapping]]] = ..., overdue: _Optional[_Iterable[str]] = ..., is_followed: _Optional[bool] = ..., approached: _Optional[str] = ..., chosen: _Optional[str] = ...) -> None: ...
+    missions: _containers.RepeatedCompositeFieldContainer[MissionStanding]
+    def __init__(self, aims: _Optional[_Iterable[_Union[Standing, _Mapping]]] = ..., assumptions: _Optional[_Iterable[_Union[Standing, _Mapping]]] = ..., overdue: _Optional[_Iterable[str]] = ..., is_followed: _Optional[bool] = ..., approached: _Optional[str] = ..., chosen: _Optional[str] = ..., missions: _Optional[_Iterable[_Union[MissionStanding, _Mapping]]] = ...) -> None: ...
 
 class Standing(_message.Message):
-    __slots__ = ("name", "words", "is_met", "times", "unmet_s")
+    __slots__ = ("name", "words", "is_met", "times", "unmet_s", "mission")
     NAME_FIELD_NUMBER: _ClassVar[int]
     WORDS_FIELD_NUMBER: _ClassVar[int]
     IS_MET_FIELD_NUMBER: _ClassVar[int]
     TIMES_FIELD_NUMBER: _ClassVar[int]
     UNMET_S_FIELD_NUMBER: _ClassVar[int]
+    MISSION_FIELD_NUMBER: _ClassVar[int]
     name: str
     words: str
     is_met: bool
     times: int
     unmet_s: float
-    def __init__(self, name: _Optional[str] = ..., words: _Optional[str] = ..., is_met: _Optional[bool] = ..., times: _Optional[int] = ..., unmet_s: _Optional[float] = ...) -> None: ...
+    mission: str
+    def __init__(self, name: _Optional[str] = ..., words: _Optional[str] = ..., is_met: _Optional[bool] = ..., times: _Optional[int] = ..., unmet_s: _Optional[float] = ..., mission: _Optional[str] = ...) -> None: ...
+
+class MissionStanding(_message.Message):
+    __slots__ = ("name", "visit", "is_round", "rounds", "detours")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    VISIT_FIELD_NUMBER: _ClassVar[int]
+    IS_ROUND_FIELD_NUMBER: _ClassVar[int]
+    ROUNDS_FIELD_NUMBER: _ClassVar[int]
+    DETOURS_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    visit: int
+    is_round: bool
+    rounds: int
+    detours: _containers.RepeatedScalarFieldContainer[int]
+    def __init__(self, name: _Optional[str] = ..., visit: _Optional[int] = ..., is_round: _Optional[bool] = ..., rounds: _Optional[int] = ..., detours: _Optional[_Iterable[int]] = ...) -> None: ...
 
 class Latency(_message.Message):
     __slots__ = ("name", "count", "p50_s", "p99_s", "max_s", "sum_s")

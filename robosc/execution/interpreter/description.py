@@ -1,10 +1,10 @@
 """The static part of a controlled system, for the interpreter and for generated code alike."""
 
-from collections.abc import Iterable
+from collections.abc import Iterator
 from math import prod
 
 from robosc.conditions.goals import aims_in_words, assumptions_in_words
-from robosc.execution.runtime.protocol import Aim, CommunicationInfo, Description
+from robosc.execution.runtime.protocol import Aim, CommunicationInfo, Description, MissionInfo
 from robosc.expressions import conjuncts
 from robosc.model.structure import Communication, CommunicationKind, EventKind, Model, Transition, is_tau
 from robosc.supervisor import Supervisor
@@ -27,13 +27,24 @@ def describe(supervisor: Supervisor) -> Description:
         taus=tuple(transition.event for transition in _taus(model)),
         silent_bound=silent_bound(model),
         has_strategy=supervisor.strategy is not None,
-        aims=() if supervisor.strategy is None else _aims(aims_in_words(supervisor)),
-        assumptions=() if supervisor.strategy is None else _aims(assumptions_in_words(model)),
+        aims=() if supervisor.strategy is None else tuple(_aims(supervisor)),
+        assumptions=() if supervisor.strategy is None else tuple(Aim(*item) for item in assumptions_in_words(model)),
+        missions=() if supervisor.strategy is None else tuple(_missions(model)),
     )
 
 
-def _aims(found: Iterable[tuple[str, str]]) -> tuple[Aim, ...]:
-    return tuple(Aim(name, words) for name, words in found)
+def _aims(supervisor: Supervisor) -> Iterator[Aim]:
+    aims, missions = supervisor.executable.obligations.aims, supervisor.model.missions
+    for aim, (name, words) in zip(aims, aims_in_words(supervisor), strict=True):
+        yield Aim(name, words, None if aim.mission is None else missions[aim.mission].name)
+
+
+def _missions(model: Model) -> Iterator[MissionInfo]:
+    first = len(model.goals)
+    for mission in model.missions:
+        detours = tuple(len(detour.visits) for detour in mission.detours)
+        yield MissionInfo(mission.name, first, len(mission.visits), detours)
+        first += len(mission.visits) + sum(detours)
 
 
 def silent_bound(model: Model) -> int:

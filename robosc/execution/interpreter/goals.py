@@ -147,6 +147,13 @@ class GoalsOfSystem:
         owed = (item.is_true(self._account.kept[item.name], state) for item in self._assumptions)
         return (*self._is_nothing_wanted(state), *owed)
 
+    def where_missions_are(self) -> tuple[bool, ...]:
+        """Return for each visit if its mission or detour is at it, then for each mission if every visit is true."""
+        places = self._account.missions
+        pairs = zip(self._missions, places, strict=True)
+        visits = (is_here for mission, place in pairs for is_here in mission.here(place))
+        return (*visits, *(place.is_round for place in places))
+
     @property
     def mode(self) -> int:
         """Number of the goal or visit whose turn it is."""

@@ -79,9 +79,13 @@ class MissionOfSystem:
 
     def wanted(self, place: MissionPlace, state: State) -> list[bool]:
         """Return for each visit, those of detours last, True if it is to be reached in a state that was taken in."""
-        is_own = place.is_asked and all(current is None for current in place.detours)
-        own = [
-            is_own and number == place.visit and not holds(visit, state) for number, visit in enumerate(self._visits)
-        ]
+        here = self.here(place)
+        is_own = all(current is None for current in place.detours)
+        own = [is_own and is_at and not holds(visit, state) for is_at, visit in zip(here, self._visits, strict=False)]
+        return [*own, *here[len(own) :]]
+
+    def here(self, place: MissionPlace) -> list[bool]:
+        """Return for each visit, those of detours last, True if the mission or the detour is at it."""
+        own = [place.is_asked and number == place.visit for number in range(len(self._visits))]
         detours = zip(self._detours, place.detours, strict=True)
         return [*own, *(number == current for (_, visits), current in detours for number in range(len(visits)))]

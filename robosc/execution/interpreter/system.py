@@ -203,11 +203,11 @@ class InterpretedSystem:
         return str(self._state[communication_plant_name(self._model.communication(communication)), None])
 
     def observe(self) -> tuple[bool, ...]:
-        """Take in a stable state, for what the strategy remembers; for each aim and assumption, whether it is met."""
+        """Take in a stable state, for what the strategy remembers; return what is met, and where missions are."""
         if self._goals is None:
             return ()
         self._goals.observe(self._state)
-        return self._goals.are_met(self._state)
+        return (*self._goals.are_met(self._state), *self._goals.where_missions_are())
 
     @property
     def mode(self) -> int:

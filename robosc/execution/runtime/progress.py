@@ -1,17 +1,19 @@
 """
 Progress of a strategy: which aims and assumptions are met, since when not, and what is approached.
 
-An aim is a condition that a strategy makes true again and again, such as a goal of the model. An
-assumption that is not met is owed by the surroundings of the robot. Both are looked at in stable
-states, and all times are those of the executor's clock.
+An aim is a goal of the model, or a visit of a mission or of one of its detours. A visit is made
+when the mission or the detour moves on past it because it is true: where several are true in one
+stable state, all of them are made, a whole round at most. An assumption that is not met is owed by
+the surroundings of the robot. All of this is looked at in stable states, and all times are those
+of the executor's clock.
 """
 
 from __future__ import annotations
 
 import math
-from typing import Any, Callable, Dict, List, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Dict, Iterator, List, NamedTuple, Optional, Set, Tuple
 
-from robosc.execution.runtime.protocol import Aim, StrategicSystem
+from robosc.execution.runtime.protocol import Aim, Description, StrategicSystem
 from robosc.execution.runtime.recorder import Recorder
 
 NO_AIM = -1
@@ -23,11 +25,14 @@ class Standing(NamedTuple):
     State of an aim or an assumption.
 
     :ivar name: Its name, such as `goal 1`.
-    :ivar words: The aim or assumption as a user writes it.
-    :ivar is_met: True if it is met in the last stable state.
+    :ivar words: The aim or assumption as a user writes it; of a visit its condition.
+    :ivar is_met: True if it is met in the last stable state; of a visit: if it was made in this
+        round.
     :ivar times: Number of times that it has become met since the start; what is met at the start
-        counts only when it is met again.
-    :ivar unmet_s: Seconds since when it is not met; None: it is met.
+        counts only when it is met again. Of a visit: number of times that it was made.
+    :ivar unmet_s: Seconds since when it is not met; None: it is met. Of a visit: seconds since
+        when it is to be made; None: nothing is to be done for it now.
+    :ivar mission: Name of the mission that it is a visit of; None: it is none.
     """
 
     name: str
@@ -35,6 +40,25 @@ class Standing(NamedTuple):
     is_met: bool
     times: int
     unmet_s: Optional[float]
+    mission: Optional[str] = None
+
+
+class MissionStanding(NamedTuple):
+    """
+    State of a mission.
+
+    :ivar name: Its name.
+    :ivar visit: Number of the visit that it is at, from 1 on; 0: it is not asked for.
+    :ivar is_round: True if every visit is true, so that none is left to be made.
+    :ivar rounds: Number of times that its last visit was made.
+    :ivar detours: For each detour the number of the visit that it is at, from 1 on; 0: it is idle.
+    """
+
+    name: str
+    visit: int
+    is_round: bool
+    rounds: int
+    detours: Tuple[int, ...]
 
 
 class Progress(NamedTuple):
@@ -49,6 +73,7 @@ class Progress(NamedTuple):
         another policy decides, or nothing was decided yet.
     :ivar chosen: Name of the communication that the strategy chose at the last decision; None: it
         waits, or likewise.
+    :ivar missions: Every mission, in source order; empty as long as nothing is known of them.
     """
 
     aims: Tuple[Standing, ...]
@@ -57,10 +82,14 @@ class Progress(NamedTuple):
     is_followed: bool
     approached: Optional[str]
     chosen: Optional[str]
+    missions: Tuple[MissionStanding, ...] = ()
 
     def plain(self) -> Dict[str, Any]:
         """Return it as values that JSON knows, by name."""
         found: Dict[str, Any] = {**self._asdict(), 'overdue': list(self.overdue)}
+        found['missions'] = [
+            {**item._asdict(), 'detours': list(item.detours)} for item in self.missions
+        ]
         for kind in ('aims', 'assumptions'):
             found[kind] = [
                 {**item._asdict(), 'unmet_s': item.unmet_s and round(item.unmet_s, 3)}
@@ -71,11 +100,52 @@ class Progress(NamedTuple):
 
 def standing_text(item: Standing) -> str:
     """Return the state of an aim or assumption, in words."""
-    if item.unmet_s is None:
+    if item.unmet_s is not None:
+        state = ('not for {:.0f} s' if item.mission is None else 'wanted for {:.0f} s').format(
+            item.unmet_s
+        )
+    elif item.mission is None:
         state = 'true' if item.is_met else 'not known'
     else:
-        state = 'not for {:.0f} s'.format(item.unmet_s)
+        state = 'made in this round' if item.is_met else 'not wanted now'
     return '{}, reached {} times: {}'.format(state, item.times, item.words)
+
+
+def mission_text(mission: MissionStanding, words: Dict[str, str]) -> str:
+    """
+    Return where a mission is, in words.
+
+    :param mission: The mission.
+    :param words: Conditions of visits, by their names.
+    """
+    title = 'mission {}'.format(mission.name)
+    if mission.visit == 0:
+        return 'not asked for'
+    if mission.is_round:
+        parts = ['every visit is true']
+    else:
+        parts = [_at_visit(mission.visit, title, words)]
+    for number, visit in enumerate(mission.detours, start=1):
+        if visit > 0:
+            where = _at_visit(visit, 'detour {} of {}'.format(number, title), words)
+            parts.append('detour {} under way, {}'.format(number, where))
+    return '; '.join(parts)
+
+
+def _at_visit(visit: int, title: str, words: Dict[str, str]) -> str:
+    condition = words.get('visit {} of {}'.format(visit, title), '')
+    return 'at visit {}, {}'.format(visit, condition)
+
+
+def mission_texts(progress: Progress) -> Dict[str, str]:
+    """Return where each mission is, and how many rounds were made, in words by its title."""
+    words = {item.name: item.words for item in progress.aims}
+    return {
+        'mission {}'.format(item.name): '{}; rounds made: {}'.format(
+            mission_text(item, words), item.rounds
+        )
+        for item in progress.missions
+    }
 
 
 def owed_texts(progress: Progress) -> List[str]:
@@ -87,6 +157,86 @@ def owed_texts(progress: Progress) -> List[str]:
     ]
 
 
+class _Tour(NamedTuple):
+    """
+    The visits of a mission, or of one of its detours.
+
+    :ivar first: Number of the aim that is its first visit.
+    :ivar visits: Number of its visits.
+    :ivar here: Place in what is seen of whether it is at its first visit; the others follow.
+    """
+
+    first: int
+    visits: int
+    here: int
+
+
+class _Mission(NamedTuple):
+    """
+    A mission.
+
+    :ivar name: Its name.
+    :ivar tours: Its own tour, then those of its detours.
+    :ivar round: Place in what is seen of whether every visit of its own is true.
+    """
+
+    name: str
+    tours: Tuple[_Tour, ...]
+    round: int
+
+
+def _missions(description: Description) -> Tuple[_Mission, ...]:
+    found: List[_Mission] = []
+    here = len(description.aims) + len(description.assumptions)
+    visits = sum(aim.mission is not None for aim in description.aims)
+    for number, info in enumerate(description.missions):
+        tours: List[_Tour] = []
+        first = info.first
+        for count in (info.visits, *info.detours):
+            tours.append(_Tour(first, count, here + first - (len(description.aims) - visits)))
+            first += count
+        found.append(_Mission(info.name, tuple(tours), here + visits + number))
+    return tuple(found)
+
+
+def _size(mission: _Mission) -> int:
+    return sum(tour.visits for tour in mission.tours)
+
+
+def _tour_made(tour: _Tour, first: int, made: int) -> Iterator[int]:
+    """Yield the aims of visits of a tour that were made; fewer than none: it went round."""
+    for visit in range(first, first + (made + tour.visits if made < 0 else made)):
+        yield tour.first + visit % tour.visits
+
+
+def _place(tour: _Tour, seen: Tuple[bool, ...]) -> Optional[int]:
+    """Return the number of the visit that a tour is at, from 0 on; None: it is at none."""
+    for visit in range(tour.visits):
+        if seen[tour.here + visit]:
+            return visit
+    return None
+
+
+MAXIMUM_CHANGES = 1000
+"""Number of changes that are remembered at once, so that they need not be found again."""
+
+
+class _Change(NamedTuple):
+    """
+    Change of what is seen from one stable state to the next.
+
+    :ivar unmet: Numbers of the aims and assumptions that are not met from now on.
+    :ivar reached: Numbers of those that are met from now on, then of the visits that are made.
+    :ivar is_owed: True if an assumption is not met from now on.
+    :ivar following: Known changes of what is seen after this one, by what they lead to.
+    """
+
+    unmet: Tuple[int, ...]
+    reached: Tuple[int, ...]
+    is_owed: bool
+    following: Dict[Tuple[bool, ...], _Change]
+
+
 class ProgressAccount:
     """
     Account of a strategy's progress, which costs time only when something changes.
@@ -96,8 +246,7 @@ class ProgressAccount:
     :param requests: Names of all requests' communications, by number.
     :param timeout_s: Seconds after which an assumption that is owed is reported; 0: never.
     :ivar observe: Take in a stable state, and return what is met in it.
-    :ivar met: For each aim and assumption, whether it was met in the last stable state; empty
-        before the first.
+    :ivar seen: Result of `observe` in the last stable state; empty before the first.
     :ivar is_followed: True if the strategy chooses the requests.
     :ivar due_s: Time at which the next assumption is to be reported.
     :ivar wake: Called with that time when it has come nearer.
@@ -105,20 +254,26 @@ class ProgressAccount:
 
     __slots__ = (
         '_approached',
+        '_changes',
         '_chosen',
         '_count',
         '_counts',
-        '_is_reported',
         '_items',
+        '_known',
+        '_known_count',
+        '_missions',
+        '_numbers',
         '_recorder',
+        '_reported',
         '_requests',
         '_since_s',
         '_system',
         '_timeout_s',
+        '_visits',
         'due_s',
         'is_followed',
-        'met',
         'observe',
+        'seen',
         'wake',
     )
 
@@ -138,6 +293,12 @@ class ProgressAccount:
         self._count = len(description.aims)
         # The aims, then the assumptions.
         self._items: Tuple[Aim, ...] = description.aims + description.assumptions
+        self._numbers = range(len(self._items))
+        self._missions = _missions(description)
+        self._visits = range(self._count - sum(map(_size, self._missions)), self._count)
+        # Known changes, by what was seen before them.
+        self._known: Dict[Tuple[bool, ...], Dict[Tuple[bool, ...], _Change]] = {}
+        self._known_count = 0
         self.is_followed = False
         self.wake: Callable[[float], None] = lambda due_s: None
         self.restart()
@@ -145,40 +306,43 @@ class ProgressAccount:
     def restart(self) -> None:
         """Forget everything: the system is in its initial state again."""
         number = len(self._items)
-        self.met: Tuple[bool, ...] = ()
+        self.seen: Tuple[bool, ...] = ()
         self._counts = [0] * number
         self._since_s = [0.0] * number
-        self._is_reported = [False] * number
+        self._reported: Set[int] = set()
+        self._changes = self._known.setdefault((), {})
         self._approached: Optional[int] = None
         self._chosen: Optional[int] = None
         self.due_s = math.inf
 
-    def change(self, met: Tuple[bool, ...]) -> None:
-        """Take in what is met in this stable state, if that is something else than `met`."""
+    def change(self, seen: Tuple[bool, ...]) -> None:
+        """Take in a stable state in which something else than `seen` is seen."""
         # This is written out for speed: the cycle time of the controller.
-        before, self.met = self.met, met
-        now_s = self._recorder.began_s
-        number = -1
-        for is_met in met:
-            number += 1
-            if before and is_met is before[number]:
-                continue
-            if not is_met:
-                self._since_s[number] = now_s
-                if number >= self._count and now_s + self._timeout_s < self.due_s:
-                    # One that was to be reported earlier may be met by now: that costs a look.
-                    self.due_s = now_s + self._timeout_s
-                    self.wake(self.due_s)
-            elif before:
-                self._counts[number] += 1
-                if self._recorder.is_active or self._is_reported[number]:
-                    self._report_met(number)
+        change = self._changes.get(seen)
+        if change is None:
+            change = self._learn(seen)
+        unmet, reached, is_owed, self._changes = change
+        self.seen = seen
+        if unmet:
+            now_s, since_s = self._recorder.began_s, self._since_s
+            for number in unmet:
+                since_s[number] = now_s
+            if is_owed and now_s + self._timeout_s < self.due_s:
+                # One that was to be reported earlier may be met by now: that costs a look.
+                self.due_s = now_s + self._timeout_s
+                self.wake(self.due_s)
+        if reached:
+            counts = self._counts
+            for number in reached:
+                counts[number] += 1
+            if self._reported or self._recorder.is_active:
+                self._report(reached)
 
     def decide(self) -> Optional[int]:
         """Return the number of the request that the strategy chooses in this stable state."""
         chosen = self._chosen = self._system.choose()
         approached = self._system.mode
-        if chosen is None and False not in self.met[: self._count]:
+        if chosen is None and False not in self.seen[: self._count]:
             approached = NO_AIM
         if approached != self._approached:
             self._approached = approached
@@ -190,44 +354,109 @@ class ProgressAccount:
         """Report each assumption that is owed for too long by now, once."""
         for number in self._owed():
             # The sum is the deadline: their difference may be rounded to less.
-            if now_s >= self._since_s[number] + self._timeout_s and not self._is_reported[number]:
-                self._is_reported[number] = True
+            if now_s >= self._since_s[number] + self._timeout_s and number not in self._reported:
+                self._reported.add(number)
                 self._recorder.owed(self._items[number], now_s - self._since_s[number])
-        waiting = [self._since_s[it] for it in self._owed() if not self._is_reported[it]]
+        waiting = [self._since_s[it] for it in self._owed() if it not in self._reported]
         self.due_s = min(waiting, default=math.inf) + self._timeout_s
 
     def at(self, now_s: float) -> Progress:
         """Return the progress at a time."""
-        standings = [self._standing(number, now_s) for number in range(len(self._items))]
+        made = self._made()
+        standings = [self._standing(number, now_s, made) for number in self._numbers]
         approached, chosen = self._approached, self._chosen
         return Progress(
             aims=tuple(standings[: self._count]),
             assumptions=tuple(standings[self._count :]),
             overdue=tuple(
-                self._items[number].name for number in self._owed() if self._is_reported[number]
+                self._items[number].name for number in self._owed() if number in self._reported
             ),
             is_followed=self.is_followed,
             approached=None if approached in (None, NO_AIM) else self._items[approached].name,
             chosen=None if chosen is None else self._requests[chosen],
+            missions=tuple(map(self._mission_standing, self._missions)) if self.seen else (),
         )
 
-    def _standing(self, number: int, now_s: float) -> Standing:
-        name, words = self._items[number]
-        is_met = bool(self.met) and self.met[number]
+    def _standing(self, number: int, now_s: float, made: Set[int]) -> Standing:
+        name, words, mission = self._items[number]
+        is_met = bool(self.seen) and self.seen[number]
         # Before the first stable state, nothing is known.
-        is_unmet = bool(self.met) and not is_met
+        is_unmet = bool(self.seen) and not is_met
         unmet_s = max(now_s - self._since_s[number], 0.0) if is_unmet else None
-        return Standing(name, words, is_met, self._counts[number], unmet_s)
+        if mission is not None:
+            is_met = number in made
+        return Standing(name, words, is_met, self._counts[number], unmet_s, mission)
 
-    def _report_met(self, number: int) -> None:
-        if number < self._count:
-            self._recorder.reached(self._items[number], self._counts[number])
-        elif self._is_reported[number]:
-            self._is_reported[number] = False
-            owed_s = self._recorder.began_s - self._since_s[number]
-            self._recorder.met(self._items[number], owed_s)
+    def _mission_standing(self, mission: _Mission) -> MissionStanding:
+        visit, *detours = (_place(tour, self.seen) for tour in mission.tours)
+        own = mission.tours[0]
+        return MissionStanding(
+            mission.name,
+            0 if visit is None else visit + 1,
+            self.seen[mission.round],
+            self._counts[own.first + own.visits - 1],
+            tuple(0 if place is None else place + 1 for place in detours),
+        )
+
+    def _made(self) -> Set[int]:
+        """Return the numbers of the visits that were made in this round."""
+        made: Set[int] = set()
+        for mission in self._missions if self.seen else ():
+            for tour in mission.tours:
+                is_round = tour is mission.tours[0] and self.seen[mission.round]
+                number = tour.visits if is_round else _place(tour, self.seen) or 0
+                made.update(range(tour.first, tour.first + number))
+        return made
+
+    def _learn(self, seen: Tuple[bool, ...]) -> _Change:
+        """Find out what changes between the last stable state and this one."""
+        if self._known_count >= MAXIMUM_CHANGES:
+            self._known.clear()
+            self._changes = self._known.setdefault(self.seen, {})
+            self._known_count = 0
+        before = self.seen
+        changed = [it for it in self._numbers if not before or seen[it] is not before[it]]
+        unmet = tuple(number for number in changed if not seen[number])
+        reached: List[int] = []
+        if before:
+            reached += [it for it in changed if seen[it] and it not in self._visits]
+            reached += self._visits_made(before, seen)
+        is_owed = any(number >= self._count for number in unmet)
+        change = _Change(unmet, tuple(reached), is_owed, self._known.setdefault(seen, {}))
+        self._changes[seen] = change
+        self._known_count += 1
+        return change
+
+    def _visits_made(self, before: Tuple[bool, ...], seen: Tuple[bool, ...]) -> Iterator[int]:
+        """Yield the numbers of the visits that are made between two stable states."""
+        for mission in self._missions:
+            own = mission.tours[0]
+            place = _place(own, seen)
+            if place is None:
+                # Not asked for: its detours have been given up, too.
+                continue
+            # All visits were made at once where every one was true already.
+            if not before[mission.round]:
+                was, is_round = _place(own, before) or 0, seen[mission.round]
+                yield from _tour_made(own, was, own.visits if is_round else place - was)
+            for tour in mission.tours[1:]:
+                begun, now = _place(tour, before), _place(tour, seen)
+                if begun is None and now is None:
+                    continue
+                first = begun or 0
+                # A detour that is before where it was has ended, and has begun again.
+                yield from _tour_made(tour, first, (tour.visits if now is None else now) - first)
+
+    def _report(self, reached: Tuple[int, ...]) -> None:
+        for number in reached:
+            if number < self._count:
+                self._recorder.reached(self._items[number], self._counts[number])
+            elif number in self._reported:
+                self._reported.remove(number)
+                owed_s = self._recorder.began_s - self._since_s[number]
+                self._recorder.met(self._items[number], owed_s)
 
     def _owed(self) -> List[int]:
         """Return the numbers of the assumptions that are owed."""
-        met = self.met
-        return [number for number in range(self._count, len(met)) if not met[number]]
+        seen = self.seen
+        return [number for number in self._numbers[self._count :] if seen and not seen[number]]

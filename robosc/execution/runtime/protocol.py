@@ -54,11 +54,29 @@ class Aim(NamedTuple):
     Condition that a strategy makes true again and again, or that it assumes to be made true.
 
     :ivar name: Its name, such as `goal 1` or `assumption 2`.
-    :ivar words: The goal or assumption as a user writes it.
+    :ivar words: The goal or assumption as a user writes it; of a visit its condition.
+    :ivar mission: Name of the mission that it is a visit of; None: it is none.
     """
 
     name: str
     words: str
+    mission: Optional[str] = None
+
+
+class MissionInfo(NamedTuple):
+    """
+    A mission as aims, which follow each other: its own visits, then those of each detour.
+
+    :ivar name: Its name.
+    :ivar first: Number of the aim that is its first visit.
+    :ivar visits: Number of its own visits.
+    :ivar detours: Number of visits of each detour.
+    """
+
+    name: str
+    first: int
+    visits: int
+    detours: Tuple[int, ...]
 
 
 class Description(NamedTuple):
@@ -73,8 +91,9 @@ class Description(NamedTuple):
     :ivar taus: Tau events that can change something.
     :ivar silent_bound: Maximum number of silent steps in a row of a run that ends.
     :ivar has_strategy: True if the supervisor has a strategy that reaches the goals of the model.
-    :ivar aims: Aims of the strategy, in its order.
+    :ivar aims: Aims of the strategy, in its order: the goals, then the visits of each mission.
     :ivar assumptions: Its assumptions about the surroundings, in source order.
+    :ivar missions: Its missions, in source order.
     """
 
     name: str
@@ -87,6 +106,7 @@ class Description(NamedTuple):
     has_strategy: bool = False
     aims: Tuple[Aim, ...] = ()
     assumptions: Tuple[Aim, ...] = ()
+    missions: Tuple[MissionInfo, ...] = ()
 
 
 def requesting(infos: Sequence[CommunicationInfo]) -> Tuple[CommunicationInfo, ...]:
@@ -254,7 +274,10 @@ class StrategicSystem(ControlledSystem, Protocol):
 
         To observe a state again changes nothing.
 
-        :returns: For each aim, then for each assumption, whether it is met in this state.
+        :returns: For each aim, then for each assumption, whether it is met in this state; a visit
+            is where nothing is to be done for it. Then for each visit, in the order of the aims,
+            whether its mission or detour is at it now; then for each mission, whether every visit
+            of its own is true.
         """
 
     def choose(self) -> Optional[int]:

@@ -127,9 +127,9 @@ class Recorder:
         self._write_assumption('met', assumption, owed_s)
 
     def _write_assumption(self, kind: str, assumption: Aim, owed_s: float) -> None:
-        name, words = assumption
-        entry = {'assumption': name, 'owed_s': round(owed_s, 3), 'what': words}
-        self._write({'kind': kind, **entry})
+        owed = round(owed_s, 3)
+        what = assumption.words
+        self._write({'kind': kind, 'assumption': assumption.name, 'owed_s': owed, 'what': what})
 
     def note(self, kind: str, what: str) -> None:
         """Note a stop, its end, or a restart."""

@@ -178,9 +178,9 @@ class Steps:
             self._stable = self._system.changes
             progress = self._progress
             if progress is not None:
-                met = progress.observe()
-                if met != progress.met:
-                    progress.change(met)
+                seen = progress.observe()
+                if seen != progress.seen:
+                    progress.change(seen)
             if self._goals:
                 self._goals.observe_stable_state()
             for identifier in self._releases.due(issuing):

@@ -19,11 +19,16 @@ def observing(executable: ExecutableSystem, scope: ExpressionWriter, namer: Name
     return [*found, *(Assign(scope.variable_place(MEMORY, place.name), local) for place, local in kept)]
 
 
-def met(executable: ExecutableSystem, scope: ExpressionWriter) -> list[Code]:
-    """Return for each aim, then each assumption, the condition that it is met in a stable state that was taken in."""
+def seen(executable: ExecutableSystem, scope: ExpressionWriter) -> list[Code]:
+    """Return the conditions on a stable state that was taken in that executors keep account of.
+
+    For each aim, then each assumption, that it is met; for each visit that its mission or detour is at it; for each
+    mission that every visit of its own is true.
+    """
     obligations = executable.obligations
-    conditions = (*(aim.condition for aim in obligations.aims), *obligations.assumptions)
-    return [scope.truth(condition) for condition in conditions]
+    here = (aim.here for aim in obligations.aims if aim.here is not None)
+    aims = (aim.condition for aim in obligations.aims)
+    return [scope.truth(item) for item in (*aims, *obligations.assumptions, *here, *obligations.rounds)]
 
 
 def choosing(executable: ExecutableSystem, strategy: Strategy, number: int, diagrams: Diagrams, nothing: Code) -> Block:

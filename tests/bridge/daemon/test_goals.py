@@ -20,6 +20,7 @@ from robosc_view.reports import SourceKind
 from robosc_view.running import status_of
 from support.daemons import Connected, Scene
 from support.goal_porter import PORTER, porter_supervisor
+from support.rounds import ROUNDS
 
 CONFIGURATION = """
 robot: burger
@@ -36,11 +37,25 @@ channels:
 """
 
 
-class Called(Scene):
-    """A bridge of the porter, whose door obeys the test."""
+ROUNDS_CONFIGURATION = """
+robot: burger
+drive: {driver: opencr, port: /dev/base}
+execution: {period_s: 0.02}
+channels:
+  /to_kitchen: {channel: grpc}
+  /to_office: {channel: grpc}
+  /to_hall: {channel: grpc}
+  /call: {channel: grpc}
+  /begin: {channel: grpc}
+  /end: {channel: grpc}
+"""
 
-    def __init__(self) -> None:
-        super().__init__(text=CONFIGURATION, model=PORTER, needs_scanner=False)
+
+class Called(Scene):
+    """A bridge of a robot, the porter or another one, whose surroundings obey the test."""
+
+    def __init__(self, text: str = CONFIGURATION, model: str = PORTER) -> None:
+        super().__init__(text=text, model=model, needs_scanner=False)
         self.up()
         self.caller = Connected(self, "caller")
 
@@ -150,3 +165,46 @@ def test_a_robot_without_goals_and_one_that_rests_tell_nothing() -> None:
     SnapshotEncoder().put(made, snapshot)
     assert not made.HasField("progress")
     assert "robosc_bridge_goal_reached" not in {family.name for family in _metrics(snapshot)}
+
+
+def test_missions_are_told_by_each_way() -> None:
+    scene = Called(ROUNDS_CONFIGURATION, ROUNDS)
+    words = {line.split(":", 1)[0].strip(): line for line in status_lines(scene.sent)}
+    assert words["mission rounds"] == "  mission rounds: not asked for; rounds made: 0"
+    assert (
+        words["visit 1 of mission rounds"]
+        == "  visit 1 of mission rounds: not wanted now, reached 0 times: Base.kitchen"
+    )
+    scene.give("/begin")
+    scene.give("/call")
+    scene.live(0.5)
+    found = scene.progress
+    assert found == status_of(scene.snapshot).progress == status_of_remote(scene.sent).progress
+    (mission,) = found.missions
+    assert mission.rounds > 3 and mission.visit in (1, 2) and mission.detours == (0,)
+    assert [item.mission for item in found.aims] == ["rounds"] * 3
+    assert [item.times for item in found.aims][1:] == [mission.rounds, 1]
+    where = f"at visit {mission.visit}, {found.aims[mission.visit - 1].words}; rounds made: {mission.rounds}"
+    assert f"  mission rounds: {where}" in list(status_lines(scene.sent))
+    assert goals_entry(scene.sent).values["mission rounds"] == where
+    samples = {
+        (sample.name, *sample.labels.values()): sample.value
+        for family in _metrics(scene.snapshot)
+        for sample in family.samples
+    }
+    assert samples["robosc_bridge_mission_visit", "rounds"] == mission.visit
+    assert samples["robosc_bridge_mission_rounds_total", "rounds"] == mission.rounds
+    assert samples["robosc_bridge_goal_reached_total", "visit 1 of detour 1 of mission rounds"] == 1
+
+
+def test_a_detour_that_is_under_way_is_told() -> None:
+    made = pb.Snapshot()
+    made.progress.aims.add(name="visit 2 of mission m", words="Base.office", mission="m")
+    made.progress.aims.add(name="visit 1 of detour 2 of mission m", words="Base.hall", mission="m", unmet_s=3.0)
+    made.progress.missions.add(name="m", visit=2, rounds=1, detours=[0, 1])
+    lines = list(status_lines(made))
+    where = "at visit 2, Base.office; detour 2 under way, at visit 1, Base.hall; rounds made: 1"
+    assert f"  mission m: {where}" in lines
+    assert "  visit 1 of detour 2 of mission m: wanted for 3 s, reached 0 times: Base.hall" in lines
+    made.progress.missions[0].is_round = True
+    assert "  mission m: every visit is true; detour 2 under way" in "\n".join(status_lines(made))

@@ -25,6 +25,7 @@ from support.execution import Bench
 from support.goal_porter import porter_supervisor
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
 from support.pages_open import opened
+from support.rounds import rounds_supervisor
 from support.view_servers import served
 
 BEGIN_S, STEP_S = 1.7e9, 0.1
@@ -244,6 +245,22 @@ def test_goals_are_told_as_far_as_the_log_does(tmp_path: Path) -> None:
     last = told(len(recording.documents), recording.end_s)
     assert (last.approached, last.overdue) == (found.approached, ())
     assert [item.times for item in last.aims] == [item.times for item in found.aims]
+
+
+def test_visits_that_were_made_are_told_as_far_as_the_log_does(tmp_path: Path) -> None:
+    bench = Bench(InterpretedSystem(rounds_supervisor()))
+    for identifier in ("/begin", "/call", "/end"):
+        bench.receive(identifier)
+        bench.tick(3)
+    path = tmp_path / "log.jsonl"
+    path.write_text("".join(map(json_line, bench.log.entries)))
+    recording = Recording(read_log(path), rounds_supervisor())
+    found, told = bench.executor.progress, recording.progress(len(recording.documents), recording.end_s)
+    assert found is not None and told is not None
+    assert [(item.name, item.times, item.mission) for item in told.aims] == [
+        (item.name, item.times, item.mission) for item in found.aims
+    ]
+    assert found.missions[0].rounds == 2 and told.missions == ()
 
 
 def test_a_log_that_tells_nonsense_of_goals_is_shown_all_the_same(tmp_path: Path) -> None:

@@ -13,6 +13,7 @@ from robosc_view.ros2_topic import MAXIMUM_CHARACTERS, StateReader
 from support.execution import Bench
 from support.goal_porter import porter_supervisor
 from support.live import large_model, supervisor_without_synthesis
+from support.rounds import rounds_supervisor
 from support.view_nodes import Node
 
 
@@ -136,3 +137,23 @@ def test_the_progress_of_a_strategy_is_read_as_the_node_writes_it(tmp_path: Path
     for wrong in ([], *({**document["progress"], **change} for change in changes)):
         with pytest.raises(DefinitionError, match="the progress on /state makes no sense"):
             reader.read(json.dumps({**document, "progress": wrong}), 1.0)
+
+
+def test_the_progress_of_missions_is_read_as_the_node_writes_it(tmp_path: Path) -> None:
+    node, reader = Node(rounds_supervisor(), tmp_path), StateReader(rounds_supervisor())
+    bench = Bench(InterpretedSystem(rounds_supervisor()))
+    for identifier in ("/begin", "/call"):
+        bench.receive(identifier)
+    progress = bench.executor.progress
+    assert progress is not None and [item.detours for item in progress.missions] == [(1,)]
+    text = node.system.report(progress)
+    assert reader.read(text, 1.0)[1].progress == progress
+    document = json.loads(text)
+    # A node of an earlier version says nothing of missions.
+    aims = [{key: value for key, value in item.items() if key != "mission"} for item in document["progress"]["aims"]]
+    told = {key: value for key, value in document["progress"].items() if key != "missions"}
+    found = reader.read(json.dumps({**document, "progress": {**told, "aims": aims}}), 1.0)[1].progress
+    assert found is not None and found.missions == () and found.aims[0].mission is None
+    wrong = {**document["progress"], "missions": [{"name": "rounds", "visit": -1}]}
+    with pytest.raises(DefinitionError, match="the progress on /state makes no sense"):
+        reader.read(json.dumps({**document, "progress": wrong}), 1.0)

@@ -49,6 +49,8 @@ class Remembered:
         numbers = {subject: number for number, subject in enumerate(subjects)}
         self._updates = {place.name: compile_expression(place.update, numbers) for place in self.places}
         self._aims = {aim.name: compile_expression(aim.condition, numbers) for aim in self.aims}
+        self._here = [compile_expression(aim.here, numbers) for aim in self.aims if aim.here is not None]
+        self._round = compile_expression(found.is_round, numbers)
         self.memory = dict.fromkeys(self._updates, False)
 
     def observe(self, state: dict[str, int]) -> None:
@@ -56,6 +58,11 @@ class Remembered:
         after = {name: update(whole, NO_DATA) for name, update in self._updates.items()}
         assert set(after.values()) <= {True, False}
         self.memory = {name: value is True for name, value in after.items()}
+
+    def places_of(self, state: dict[str, int]) -> tuple[list[Any], Any]:
+        """Return for each visit whether the mission or detour is at it, and whether every visit of its own is true."""
+        whole = (*(state[name] for name in NAMES), *self.memory.values())
+        return [condition(whole, NO_DATA) for condition in self._here], self._round(whole, NO_DATA)
 
     def judged(self, state: dict[str, int]) -> dict[str, Any]:
         whole = (*(state[name] for name in NAMES), *self.memory.values())
@@ -84,6 +91,11 @@ def test_missions_are_where_the_twin_says(mission: Mission, run: list[dict[str, 
         assert found.memory == twin.memory(mark)
         assert found.judged(state) == {name: is_done(mark, state) for name, is_done in twin.aims()}
         assert all(sum(found.memory[place.name] for place in group) <= 1 for group in found.groups)
+        is_asked, own = twin.asked(state), len(mission.visits)
+        here = [is_asked and mark[0] == number for number in range(1, own + 1)]
+        for at, detour in zip(mark[1:], mission.detours, strict=True):
+            here += [at == number for number in range(1, len(detour.visits) + 1)]
+        assert found.places_of(state) == (here, is_asked and all(visit(state) for visit in twin.visits))
         # A state that is observed twice has the same effect as one that is observed once.
         once = found.memory
         found.observe(state)

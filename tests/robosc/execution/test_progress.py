@@ -82,12 +82,12 @@ def test_the_account_tells_what_happened(steps: list[Any]) -> None:
         recorder.began_s = float(now_s)
         system.met = met
         found_met = account.observe()
-        if found_met != account.met:
+        if found_met != account.seen:
             account.change(found_met)
         history.append((now_s, met))
         found = account.at(now_s)
         standings, _ = told(history, now_s)
-        assert [item[2:] for item in (*found.aims, *found.assumptions)] == standings
+        assert [item[2:5] for item in (*found.aims, *found.assumptions)] == standings
     counts = [count for _, count, _ in told(history, now_s)[0]]
     assert [sum(line.get("aim") == name for line in log.entries) for name in "ab"] == counts[:2]
     kinds = [line["kind"] for line in log.entries if "assumption" in line]
@@ -134,7 +134,7 @@ def test_a_door_that_does_not_open_is_reported_once_and_again_when_it_opens() ->
     robot.receive("/door/opened")
     robot.tick()
     assert progress(robot).overdue == ()
-    assert progress(robot).aims[0][2:] == (True, 1, None)
+    assert progress(robot).aims[0][2:5] == (True, 1, None)
     assert lines(robot) == [
         {"kind": "approach", "aim": None},
         {"kind": "approach", "aim": "goal 1"},

@@ -189,14 +189,21 @@ class C99Target:
     @property
     def _progress_length(self) -> int:
         description = self._layout.description
-        return 2 + 5 * (len(description.aims) + len(description.assumptions))
+        missions = sum(3 + len(mission.detours) for mission in description.missions)
+        return 2 + 5 * (len(description.aims) + len(description.assumptions)) + missions
 
     def _progress(self, numbers: list[int]) -> dict[str, Any]:
         """Return the progress of the strategy as the executor in Python tells it."""
         description = self._layout.description
         approached, chosen, *rest = numbers
+        end = 5 * (len(description.aims) + len(description.assumptions))
+        rest, left = rest[:end], iter(rest[end:])
+        missions = [
+            (mission.name, next(left), next(left) == 1, next(left), tuple(next(left) for _ in mission.detours))
+            for mission in description.missions
+        ]
         items = [
-            (item.name, item.words, is_met == 1, count, unmet_us / 1e6 if is_unmet else None)
+            (item.name, item.words, is_met == 1, count, unmet_us / 1e6 if is_unmet else None, item.mission)
             for item, is_met, is_unmet, _, count, unmet_us in zip(
                 (*description.aims, *description.assumptions), *(rest[place::5] for place in range(5)), strict=True
             )
@@ -207,6 +214,7 @@ class C99Target:
         return {
             "aims": items[: len(description.aims)],
             "assumptions": items[len(description.aims) :],
+            "missions": missions,
             "overdue": overdue,
             "approached": None if approached < 0 else description.aims[approached].name,
             "chosen": None if chosen < 0 else self._communications[chosen],

@@ -254,6 +254,7 @@ def progress_of(progress: Any) -> dict[str, Any] | None:
         return None
     return {
         "aims": [tuple(item) for item in progress.aims],
+        "missions": [tuple(item) for item in progress.missions],
         "assumptions": [tuple(item) for item in progress.assumptions],
         "overdue": list(progress.overdue),
         "approached": progress.approached,

@@ -190,7 +190,12 @@ def counts(layout: Layout) -> dict[str, int]:
         **(
             {}
             if layout.supervisor.strategy is None
-            else {"AIM": len(layout.description.aims), "ASSUMPTION": len(layout.description.assumptions)}
+            else {
+                "AIM": len(layout.description.aims),
+                "ASSUMPTION": len(layout.description.assumptions),
+                "VISIT": sum(aim.mission is not None for aim in layout.description.aims),
+                "MISSION": len(layout.description.missions),
+            }
         ),
         **({"WHEN": sum(item.when is not None for item in model.communications)} if layout.is_layer else {}),
     }

@@ -182,10 +182,23 @@ def _tables(layout: Layout, numbers: dict[str, int]) -> list[str]:
     lines += _table(event, "SILENT", silent if numbers["SILENT"] else [], "Resets, then taus, in source order.")
     lines += _table(communication, "SENSORS", [layout.communications[name] for name in sensors])
     items = [
-        [string_literal(text) for text in item] for item in (*layout.description.aims, *layout.description.assumptions)
+        ["NULL" if text is None else string_literal(text) for text in item]
+        for item in (*layout.description.aims, *layout.description.assumptions)
     ]
     words = "Aims of the strategy, then its assumptions."
-    return lines + _table(["const char *name", "const char *words"], "ITEMS", items, words)
+    lines += _table(["const char *name", "const char *words", "const char *mission"], "ITEMS", items, words)
+    missions: list[list[str]] = []
+    tours: list[list[str]] = []
+    for number, mission in enumerate(layout.description.missions):
+        missions.append([string_literal(mission.name), str(len(tours)), str(len(mission.detours))])
+        first = mission.first
+        for count in (mission.visits, *mission.detours):
+            tours.append([str(number), str(first), str(count)])
+            first += count
+    words = "Missions: their own tour, which those of detours follow."
+    lines += _table(["const char *name", "int tour", "int detours"], "MISSIONS", missions, words)
+    words = "Tours: the aims that are the visits of a mission, or of one of its detours."
+    return lines + _table(["int mission", "int first", "int visits"], "TOURS", tours, words)
 
 
 def _table(type_: str | list[str], name: str, rows: Sequence[str | list[str]], words: str = "") -> list[str]:

@@ -9,7 +9,7 @@ from robosc.targets.code.c.text import comment
 from robosc.targets.code.c.unit import Reading, Unit
 from robosc.targets.code.expressions import FALSE_CODE, integer, variable
 from robosc.targets.code.statements import Assign, Statement
-from robosc.targets.code.strategy import choosing, met, observing
+from robosc.targets.code.strategy import choosing, observing, seen
 
 
 def forgotten(unit: Unit) -> list[Statement]:
@@ -29,9 +29,9 @@ def strategy_functions(unit: Unit, conditions: CConditions, strategy: Strategy) 
     """
     executable, scope, mode = unit.layout.executable, Reading(unit), f"s->{unit.layout.mode}"
     count = len(strategy.modes)
-    taken = observing(executable, scope, CNamer(frozenset({"s", "met"})))
-    judged = (Assign(variable(f"met[{number}]"), code) for number, code in enumerate(met(executable, scope)))
-    head = "static void observe_for_strategy(state_t *s, bool *met)"
+    taken = observing(executable, scope, CNamer(frozenset({"s", "seen"})))
+    judged = (Assign(variable(f"seen[{number}]"), code) for number, code in enumerate(seen(executable, scope)))
+    head = "static void observe_for_strategy(state_t *s, bool *seen)"
     found = [unit.definition(head, [*unused("s"), *taken, *judged])]
     for number, aim in enumerate(executable.obligations.aims):
         body = [*unused("s"), *choosing(executable, strategy, number, conditions, integer(-1))]
@@ -40,16 +40,16 @@ def strategy_functions(unit: Unit, conditions: CConditions, strategy: Strategy) 
     following = f"{mode} + 1 < {count} ? {mode} + 1 : 0"
     lines = [
         "/* The request that the strategy chooses in a stable state, or -1 to wait; `approached`: the aim in turn. */",
-        "static int choose_by_strategy(state_t *s, const bool *met, int *approached)",
+        "static int choose_by_strategy(state_t *s, const bool *seen, int *approached)",
         "{",
         f"    for (int tried = 0; tried < {count}; tried++) {{",
         f"        *approached = (int){mode};",
-        f"        if (!met[{mode}]) {{",
+        f"        if (!seen[{mode}]) {{",
         "            break;",
         "        }",
         f"        {mode} = ({following});" if count > 1 else f"        {mode} = 0;",
         "    }",
-        "    if (met[*approached]) {",
+        "    if (seen[*approached]) {",
         "        return -1;",
         "    }",
         "    switch (*approached) {",

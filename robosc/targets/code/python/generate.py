@@ -180,9 +180,9 @@ def _class(writer: Writer) -> list[str]:
 def _description(description: Description) -> list[str]:
     lines = ["description = Description("]
     for field, content in description._asdict().items():
-        if field in ("has_strategy", "aims", "assumptions") and not content:
+        if field in ("has_strategy", "aims", "assumptions", "missions") and not content:
             continue
-        if field in ("communications", "aims", "assumptions"):
+        if field in ("communications", "aims", "assumptions", "missions"):
             lines += [f"    {field}=(", *(f"        {item!a}," for item in content), "    ),"]
         else:
             lines.append(f"    {field}={content!a},")

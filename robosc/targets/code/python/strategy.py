@@ -8,11 +8,11 @@ from robosc.targets.code.python.expressions import code_text
 from robosc.targets.code.python.naming import PythonNamer
 from robosc.targets.code.python.statements import method
 from robosc.targets.code.python.writer import Writer
-from robosc.targets.code.strategy import choosing, met, observing
+from robosc.targets.code.strategy import choosing, observing, seen
 from robosc.targets.text import indent
 
 _NOTHING = literal("None", Sort.INTEGER)
-_OBSERVE = "Take in a stable state; return for each aim and assumption whether it is met."
+_OBSERVE = "Take in a stable state; return what is met, and where missions are."
 
 
 def forgetting_lines(writer: Writer) -> list[str]:
@@ -20,8 +20,8 @@ def forgetting_lines(writer: Writer) -> list[str]:
     if writer.layout.supervisor.strategy is None:
         return []
     memory = (f"self.{attribute} = False" for attribute in writer.layout.memory.values())
-    nothing = _tuple([FALSE_CODE] * len(met(writer.layout.executable, writer.scope)))
-    return [*memory, "self.mode = 0", f"self._met = {nothing}"]
+    nothing = _tuple([FALSE_CODE] * len(seen(writer.layout.executable, writer.scope)))
+    return [*memory, "self.mode = 0", f"self._seen = {nothing}"]
 
 
 def mode_tables(strategy: Strategy) -> list[str]:
@@ -37,15 +37,17 @@ def strategy_methods(writer: Writer, strategy: Strategy) -> list[list[str]]:
     methods = [
         [
             *method("observe", _OBSERVE, observing(executable, scope, PythonNamer())),
-            *indent([f"met = self._met = {_tuple(met(executable, scope))}", "return met"]),
+            *indent([f"seen = self._seen = {_tuple(seen(executable, scope))}", "return seen"]),
         ],
         f'''\
 def choose(self):
     """Return the number of the request that the strategy chooses, None to wait."""
+    seen = self._seen
     for _ in range({count}):
-        if not self._met[self.mode]:
-            return self._approach[self.mode]()
-        self.mode = (self.mode + 1) % {count}
+        mode = self.mode
+        if not seen[mode]:
+            return self._approach[mode]()
+        self.mode = (mode + 1) % {count}
     return None'''.splitlines(),
     ]
     for number, aim in enumerate(executable.obligations.aims):

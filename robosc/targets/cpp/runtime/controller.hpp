@@ -603,9 +603,60 @@ private:
             put_json(text, found.is_met);
             text += ", \"times\": " + std::to_string(found.count) + ", \"unmet_s\": ";
             text += found.is_unmet ? number_text(static_cast<double>(found.unmet_us / 1000) / 1000.0) : "null";
-            text += "}";
+            text += ", \"mission\": " + or_null(found.mission) + "}";
         }
         return text + "]";
+    }
+
+    std::string missions_json() const
+    {
+        std::string text = "[";
+        /* Nothing is known before the first stable state. */
+        for (int number = 0; number < ROBOT_MISSION_COUNT && robot_.has_observed; number++) {
+            const robot_mission_t found = robot_mission(&robot_, number);
+            text += number > 0 ? ", {\"name\": " : "{\"name\": ";
+            put_json(text, found.name);
+            text += ", \"visit\": " + std::to_string(found.visit) + ", \"is_round\": ";
+            put_json(text, found.is_round);
+            text += ", \"rounds\": " + std::to_string(found.rounds) + ", \"detours\": [";
+            for (int detour = 0; detour < found.detours; detour++) {
+                text += (detour > 0 ? ", " : "") + std::to_string(robot_detour(&robot_, number, detour));
+            }
+            text += "]}";
+        }
+        return text + "]";
+    }
+
+    /* Where a mission is, in words. */
+    std::string mission_text(int number) const
+    {
+        const robot_mission_t found = robot_mission(&robot_, number);
+        std::string text = "not asked for";
+        if (found.visit > 0) {
+            const std::string title = std::string("mission ") + found.name;
+            text = found.is_round ? "every visit is true" : at_visit(found.visit, title);
+            for (int detour = 0; detour < found.detours; detour++) {
+                const int visit = robot_detour(&robot_, number, detour);
+                if (visit > 0) {
+                    const std::string name = "detour " + std::to_string(detour + 1);
+                    text += "; " + name + " under way, " + at_visit(visit, name + " of " + title);
+                }
+            }
+        }
+        return text + "; rounds made: " + std::to_string(found.rounds);
+    }
+
+    std::string at_visit(int visit, const std::string& title) const
+    {
+        const std::string name = "visit " + std::to_string(visit) + " of " + title;
+        std::string words;
+        for (int number = 0; number < ROBOT_AIM_COUNT; number++) {
+            const robot_standing_t found = robot_standing(&robot_, number, 0);
+            if (name == found.name) {
+                words = found.words;
+            }
+        }
+        return "at visit " + std::to_string(visit) + ", " + words;
     }
 
     std::string progress_json() const
@@ -628,6 +679,7 @@ private:
         put_json(text, robot_.settings.policy == ROBOT_POLICY_STRATEGY);
         text += ", \"approached\": " + or_null(approached_name());
         text += ", \"chosen\": " + or_null(chosen < 0 ? nullptr : robot_communication_name(chosen));
+        text += ", \"missions\": " + missions_json();
         return text + "}";
     }
 
@@ -639,14 +691,20 @@ private:
         for (int number = 0; number < ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT; number++) {
             const robot_standing_t found = robot_standing(&robot_, number, time_us);
             const std::string seconds = std::to_string((found.unmet_us + 500000) / 1000000) + " s";
-            const std::string state
-                = found.is_unmet ? "not for " + seconds : std::string(found.is_met ? "true" : "not known");
+            const bool is_visit = found.mission != nullptr;
+            const std::string state = found.is_unmet ? (is_visit ? "wanted for " : "not for ") + seconds
+                : is_visit                           ? std::string(found.is_met ? "made in this round" : "not wanted now")
+                                                     : std::string(found.is_met ? "true" : "not known");
             report.values.emplace_back(
                 found.name, state + ", reached " + std::to_string(found.count) + " times: " + found.words);
             if (found.is_overdue) {
                 owed += (owed.empty() ? "" : "; ") + std::string(found.name) + " has been owed for " + seconds + ": "
                     + found.words;
             }
+        }
+        for (int number = 0; number < ROBOT_MISSION_COUNT && robot_.has_observed; number++) {
+            report.values.emplace_back(
+                std::string("mission ") + robot_mission(&robot_, number).name, mission_text(number));
         }
         const char* const approached = approached_name();
         const int chosen = robot_chosen(&robot_);

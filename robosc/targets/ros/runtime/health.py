@@ -9,7 +9,7 @@ from __future__ import annotations
 from enum import IntEnum
 from typing import NamedTuple
 
-from robosc.execution.runtime.progress import owed_texts, Progress, standing_text
+from robosc.execution.runtime.progress import mission_texts, owed_texts, Progress, standing_text
 from robosc.execution.runtime.recorder import Counters
 from robosc.execution.runtime.runner import Runner, Status
 
@@ -71,6 +71,7 @@ class HealthMonitor:
         if progress is not None:
             for item in (*progress.aims, *progress.assumptions):
                 values[item.name] = standing_text(item)
+            values.update(mission_texts(progress))
             values.update(approached=progress.approached or '', chosen=progress.chosen or '')
         level, message = self._judge(status, counters, progress)
         return Health(level, message, values)

@@ -137,7 +137,7 @@ static uint64_t next_deadline(const robot_t *r);
 static int choose_strategically(robot_t *r)
 {
     int mode = 0;
-    const int chosen = choose_by_strategy(&r->state, r->met, &mode);
+    const int chosen = choose_by_strategy(&r->state, r->seen, &mode);
     const int approached = r->is_complete ? -1 : mode;
     r->chosen = chosen < 0 ? -1 : (int)REQUESTS[chosen].communication;
     if (!r->has_decided || approached != r->approached) {

@@ -166,12 +166,22 @@ typedef struct {
 typedef struct {
     const char *name;  /* such as "goal 1" */
     const char *words; /* as a user writes it */
-    bool is_met;
-    bool is_unmet;     /* not met; neither is true before the start */
+    const char *mission; /* name of the mission that it is a visit of, or NULL */
+    bool is_met;       /* a visit: it was made in this round */
+    bool is_unmet;     /* not met; a visit: it is to be made now; neither is true before the start */
     bool is_overdue;   /* an assumption that has been reported as owed for too long */
-    uint32_t count;    /* how often it has become met since the start */
+    uint32_t count;    /* how often it has become met since the start; a visit: was made */
     uint64_t unmet_us; /* since when it is not met */
 } robot_standing_t;
+
+/* State of a mission, as of the last stable state. */
+typedef struct {
+    const char *name;
+    int visit;       /* number of the visit that it is at, from 1 on; 0: it is not asked for */
+    bool is_round;   /* every visit is true, so that none is left to be made */
+    uint32_t rounds; /* how often its last visit was made since the start */
+    int detours;     /* number of detours that it has */
+} robot_mission_t;
 
 typedef struct {
     bool is_reported;
@@ -268,7 +278,7 @@ typedef struct {
 #endif
 #if ROBOT_HAS_STRATEGY
     robot_item_t items[ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT];
-    bool met[ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT];
+    bool seen[ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT + ROBOT_VISIT_COUNT + ROBOT_MISSION_COUNT];
     bool has_observed;
     bool is_complete;
     bool has_decided;
@@ -323,6 +333,12 @@ bool robot_enabled(const robot_t *r, robot_event_t event);
 #if ROBOT_HAS_STRATEGY
 /* State of an aim of the strategy, or of an assumption. `number`: the aims from 0 on, then the assumptions. */
 robot_standing_t robot_standing(const robot_t *r, int number, uint64_t now_us);
+
+/* State of a mission. */
+robot_mission_t robot_mission(const robot_t *r, int number);
+
+/* Number of the visit that a detour of a mission is at, from 1 on; 0: it is idle. `number`: from 0 on. */
+int robot_detour(const robot_t *r, int mission, int number);
 
 /* The aim that the last decision approached; -1: all were met, or another policy decides. */
 int robot_approached(const robot_t *r);

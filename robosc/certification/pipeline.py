@@ -18,7 +18,7 @@ from robosc.automata.goal_memory import counted
 from robosc.certification.certify import certify
 from robosc.certification.goals import GoalExplanation, goal_explanation
 from robosc.certification.progress import Progress
-from robosc.controller_properties import check_controller, check_strategy, controller_findings
+from robosc.controller_properties import Controller, check_controller, check_strategy, controller_findings
 from robosc.errors import Diagnostic, InternalError, NodeLimitError, sorted_diagnostics
 from robosc.model.check import check
 from robosc.model.layers import layer_findings, without_controller_findings
@@ -183,12 +183,13 @@ def make_supervisor(
         on_progress=lambda message: on_progress(Progress("verification", message)),
     )
     on_progress(Progress("controller", "finite response, confluence, nonblocking under control"))
+    controller = Controller(problem.system, result.added, semantics)
     properties = check_controller(
         problem.system,
         result.added,
         is_nonblocking=certificate.nonblocking == "passed",
         states=result.statistics.states,
-        semantics=semantics,
+        controller=controller,
         should_stop=should_stop,
     )
     diagnostics = sorted_diagnostics(
@@ -231,7 +232,7 @@ def make_supervisor(
             result.added,
             strategy,
             limit=Limits.of(verify_limit).positions,
-            semantics=semantics,
+            controller=controller,
             should_stop=should_stop,
         )
         if check.missed is not None:

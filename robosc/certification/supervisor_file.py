@@ -16,7 +16,7 @@ from robosc.automata.goal_memory import Aim, AimKind
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import subjects
 from robosc.certification.differences import model_differences
-from robosc.controller_properties import check_controller, check_strategy
+from robosc.controller_properties import Controller, check_controller, check_strategy
 from robosc.errors import Diagnostic, sorted_diagnostics
 from robosc.expressions import Value
 from robosc.expressions.text import automaton_text
@@ -194,6 +194,7 @@ def verify_supervisor_file(
         report = verified_with(0)
     found = report.verification
     faults += [Fault("certificate", text) for text in _false_claims(supervisor.certificate, found)]
+    controller = Controller(executable, supervisor.added, semantics)
     claimed = supervisor.certificate.controller
     if claimed is not None:
         properties = check_controller(
@@ -201,7 +202,7 @@ def verify_supervisor_file(
             supervisor.added,
             is_nonblocking=found.nonblocking is CheckOutcome.PASSED,
             states=found.states or stated,
-            semantics=semantics,
+            controller=controller,
             should_stop=should_stop,
         ).certified()
         faults += [Fault("certificate", text) for text in _false_properties(claimed, properties)]
@@ -211,7 +212,7 @@ def verify_supervisor_file(
             supervisor.added,
             supervisor.strategy,
             limit=limits.positions,
-            semantics=semantics,
+            controller=controller,
             should_stop=should_stop,
         )
         goals = CheckOutcome(under.result)

@@ -8,15 +8,20 @@ for VLSI Synthesis", Kluwer, 1984, ch. 4 (expand, irredundant, reduce); R. L. Ru
 "Multiple-valued minimization for PLA optimization", IEEE TCAD 6(5), 1987, pp. 727-750.
 """
 
-from robosc.conditions.literals import Indices, Membership, Size, Vocabulary, merged, operands, size
+from collections.abc import Iterable
+
+from robosc.conditions.literals import Indices, Size, Vocabulary, length, merged, size
 from robosc.conditions.multivalued import Cube, EffortExceededError, Node, Space
-from robosc.expressions import Expression, StateTest, VariableRead, leaves
+from robosc.expressions import Conditional, Expression, StateTest, VariableRead, children
 
 MAXIMUM_CUBES = 64
 """Products that a sum may have."""
 
 MAXIMUM_PARTS = 64
 """Values and ranges that the test of one place may name."""
+
+_Measure = tuple[int, int, int]
+"""Operands of a condition, and the least and the greatest rank of the places that it tests."""
 
 
 class Words:
@@ -30,26 +35,71 @@ class Words:
     def __init__(self, space: Space, vocabulary: Vocabulary) -> None:
         self._space = space
         self._vocabulary = vocabulary
-        self._tests: dict[tuple[int, int], tuple[Membership, Size]] = {}
+        self._tests: dict[tuple[int, int], tuple[Expression, Size]] = {}
+        self._measures: dict[int, tuple[Expression, _Measure]] = {}
         self._ranks = vocabulary.ranks
         self.ranks = [self._ranks[subject] for subject in space.subjects]
         """For each place where it stands in the model's text."""
 
-    def key(self, condition: Expression) -> tuple[int, int, Size]:
-        """Return a sort key of conditions: tests of one place first, by place in the model's text, then by length."""
-        tested = {
-            self._ranks[leaf.component, leaf.variable if isinstance(leaf, VariableRead) else None]
-            for leaf in leaves(condition)
-            if isinstance(leaf, StateTest | VariableRead)
-        }
-        return (0 if len(tested) == 1 else operands(condition)), min(tested), size(condition)
+    def ordered(self, conditions: Iterable[Expression]) -> list[Expression]:
+        """Return conditions in order: tests of one place first, by place in the model's text, then by length."""
+        keys = []
+        for condition in conditions:
+            count, first, last = self._measure(condition)
+            keys.append(((0 if first == last else count), first, condition))
+        if len({key[:2] for key in keys}) == len(keys):
+            keys.sort(key=lambda key: key[:2])
+        else:
+            # Texts take long to write: they are only where nothing else decides.
+            keys.sort(key=lambda key: (*key[:2], size(key[2])))
+        return [key[2] for key in keys]
+
+    def operands(self, condition: Expression) -> int:
+        """Return the number of operands of a condition; parts that were measured before are not looked at again."""
+        return self._measure(condition)[0]
+
+    def shortest(self, conditions: Iterable[Expression]) -> Expression | None:
+        """Return the shortest of some conditions, the first of several; None if there are none."""
+        found = list(conditions)
+        least = min(map(self.operands, found), default=0)
+        found = [item for item in found if self.operands(item) == least]
+        return min(found, key=length) if len(found) > 1 else next(iter(found), None)
+
+    def _measure(self, condition: Expression) -> "_Measure":
+        # An expression is kept with its measure: its number could otherwise become that of another one.
+        known = self._measures.get(id(condition))
+        if known is not None:
+            return known[1]
+        count, first, last = 0, len(self._ranks), -1
+        stack = [condition]
+        while stack:
+            part = stack.pop()
+            known = self._measures.get(id(part))
+            if known is not None:
+                more, lowest, highest = known[1]
+            elif isinstance(part, StateTest | VariableRead):
+                variable = part.variable if isinstance(part, VariableRead) else None
+                more, lowest = 1, self._ranks[part.component, variable]
+                highest = lowest
+            else:
+                stack += children(part)
+                count += isinstance(part, Conditional)
+                continue
+            count += more
+            first, last = min(first, lowest), max(last, highest)
+        measure = count, first, last
+        self._measures[id(condition)] = condition, measure
+        return measure
 
     def test(self, variable: int, mask: int) -> Expression:
         """The shortest test whether a place holds a value of some classes, not of all."""
-        return self._test(variable, mask)[0].expression
+        return self._test(variable, mask)[0]
 
     def size(self, variable: int, mask: int) -> Size:
         """Return the length of the test that `test` returns; zero for the test that is always true."""
+        found = self._tests.get((variable, mask))
+        if found is not None:
+            return found[1]
         return (0, 0) if mask == self._space.full[variable] else self._test(variable, mask)[1]
 
     def ranges(self, variable: int, mask: int) -> int:
@@ -60,7 +110,7 @@ class Words:
         classes = self._space.classes[variable]
         return merged(run for place, item in enumerate(classes) if mask >> place & 1 for run in item)
 
-    def _test(self, variable: int, mask: int) -> tuple[Membership, Size]:
+    def _test(self, variable: int, mask: int) -> tuple[Expression, Size]:
         found = self._tests.get((variable, mask))
         if found is None:
             runs = self._runs(variable, mask)
@@ -69,13 +119,18 @@ class Words:
             self._space.effort.spend(len(test.parts))
             if len(test.parts) > MAXIMUM_PARTS:
                 raise EffortExceededError
-            found = self._tests[variable, mask] = (test, test.size)
+            found = self._tests[variable, mask] = (test.expression, test.size)
         return found
 
     def cube_size(self, cube: Cube) -> Size:
         """Return the total length of the tests of a cube."""
-        sizes = [self.size(variable, mask) for variable, mask in enumerate(cube)]
-        return sum(item[0] for item in sizes), sum(item[1] for item in sizes)
+        count = characters = 0
+        for variable, (mask, full) in enumerate(zip(cube, self._space.full, strict=True)):
+            if mask != full:
+                size = self.size(variable, mask)
+                count += size[0]
+                characters += size[1]
+        return count, characters
 
 
 def cover(space: Space, words: Words, wanted: Node, forbidden: Node, *, most: int = MAXIMUM_CUBES) -> list[Cube]:

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import partial
 
 from robosc.conditions.cover import MAXIMUM_CUBES, Words, cover
-from robosc.conditions.literals import Vocabulary, has_relation, joined, operands, size, spine
+from robosc.conditions.literals import Vocabulary, joined, operands, spine
 from robosc.conditions.multivalued import Cube, Effort, EffortExceededError, Node, Space, space_of
 from robosc.conditions.relations import Description, Relations
 from robosc.expressions import FALSE, TRUE, BinaryOperator, Conditional, Expression, Unary
@@ -59,12 +59,6 @@ _Factors = frozenset[_Literal]
 def _most_cubes(limit: int) -> int:
     """Cubes that a sum of so many operands can have: most of them if it is a product of sums of three."""
     return min(MAXIMUM_CUBES, max(2, round(3 ** (min(limit, 12) / 3))))
-
-
-def length(expression: Expression) -> tuple[int, bool, int]:
-    """Return the length of a formula; of two with as many operands the one without relations reads better."""
-    count, characters = size(expression)
-    return count, has_relation(expression), characters
 
 
 def to_expression(
@@ -140,16 +134,15 @@ class _Formulas:
             found += self._of_sums(node, opposite, min(most, MAXIMUM_CUBES))
             if len(self._covers.get(node, ())) == 1 or len(self._covers.get(opposite, ())) == 1:
                 # One product is a sum of its literals the other way round: only relations are shorter.
-                return min(found, key=length, default=None)
+                return self._words.shortest(found)
             if not found or self._least(found) >= _LONG:
                 found += self._tried(partial(self._choice_at, node))
             if compared and (not found or self._least(found) > len(tested)):
                 found += self._tried(partial(self._divided, node, tested))
-        return min(found, key=length, default=None)
+        return self._words.shortest(found)
 
-    @staticmethod
-    def _least(found: list[Expression]) -> int:
-        return min(map(operands, found))
+    def _least(self, found: list[Expression]) -> int:
+        return min(map(self._words.operands, found))
 
     def _of_sums(self, node: Node, opposite: Node, most: int) -> list[Expression]:
         """The formulas of a sum of at most so many products, and of the negation of such a sum."""
@@ -201,7 +194,7 @@ class _Formulas:
             if parts is not None:
                 found = self._join("or" if is_negated else "and", parts)
                 yield found
-                if operands(found) <= least:
+                if self._words.operands(found) <= least:
                     return
 
     def _described(self, description: Description, is_negated: bool) -> list[Expression] | None:
@@ -365,4 +358,4 @@ class _Formulas:
 
     def _join(self, operator: BinaryOperator, parts: list[Expression]) -> Expression:
         """Short parts first, then in the order of the model's text."""
-        return joined(operator, sorted(parts, key=self._words.key))
+        return joined(operator, self._words.ordered(parts))

@@ -127,6 +127,12 @@ def _length(text: str) -> int:
     return len(text) + 3 * (text.count("!") - text.count("!="))
 
 
+def length(expression: Expression) -> tuple[int, bool, int]:
+    """Return the length of a formula; of two with as many operands the one without relations reads better."""
+    count, characters = size(expression)
+    return count, has_relation(expression), characters
+
+
 def operands(expression: Expression) -> int:
     """The tests in a condition: of a location, a boolean or an integer; each choice counts as one more.
 

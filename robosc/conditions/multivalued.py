@@ -57,16 +57,23 @@ class Effort:
         Raises:
             EffortExceededError: There are not so many left.
         """
-        self.left -= steps
-        if self._whole is not None:
-            self._whole.spend(steps)
-        if self.left < 0:
+        is_over = False
+        effort: Effort | None = self
+        while effort is not None:
+            effort.left -= steps
+            is_over = is_over or effort.left < 0
+            effort = effort._whole
+        if is_over:
             raise EffortExceededError
 
     @property
     def available(self) -> int:
         """Steps that can be taken before there are no more."""
-        return self.left if self._whole is None else min(self.left, self._whole.available)
+        least, effort = self.left, self._whole
+        while effort is not None:
+            least = min(least, effort.left)
+            effort = effort._whole
+        return least
 
     def part(self, steps: int) -> "Effort":
         """A part of it for work of its own."""

@@ -257,23 +257,25 @@ class Relations:
             if variable in signs:
                 gains[variable] = [high if signs[variable] > 0 else -low for low, high in self._values[variable]]
                 below[variable] += max(gains[variable])
+        # For each node the most that the places from its own on can give, less what they can give untested.
         known: dict[Node, int] = {1: 0}
 
         def greatest(item: Node) -> int:
-            """Return the most that the places from its own on can give."""
-            found = known.get(item)
-            if found is None:
-                variable, children = self._space.variable(item), self._space.children(item)
-                self._space.effort.spend()
-                gain = gains[variable] or [0] * len(children)
-                found = known[item] = max(
-                    gain[place] + below[variable + 1] - below[self._space.variable(child)] + greatest(child)
-                    for place, child in enumerate(children)
-                    if child
-                )
-            return found
+            variable, children = self._space.variable(item), self._space.children(item)
+            gain = gains[variable]
+            for child in children:
+                if child and child not in known:
+                    known[child] = greatest(child)
+            if gain:
+                most = max([gain[place] + known[child] for place, child in enumerate(children) if child])
+            else:
+                most = max([known[child] for child in children if child])
+            return most + below[variable + 1] - below[variable]
 
-        return below[0] - below[self._space.variable(node)] + greatest(node)
+        if node not in known:
+            known[node] = greatest(node)
+        self._space.effort.spend(len(known) - 1)
+        return below[0] + known[node]
 
     def _is_computable(self, form: Form) -> bool:
         """Return True if no number in any relation of a sum, nor in its opposite, can leave 32 bits."""

@@ -7,6 +7,7 @@ silent steps only pass through it, because the robot has then completed its task
 """
 
 from robosc.controller_properties.check import DEFAULT_LIMIT, check_controller
+from robosc.controller_properties.controller import Controller
 from robosc.controller_properties.findings import controller_findings
 from robosc.controller_properties.goals import MissedGoal, StrategyCheck, StrategyRun, check_strategy
 from robosc.controller_properties.outcome import Blocking, Conflict, Livelock, Order, Properties
@@ -15,6 +16,7 @@ __all__ = [
     "DEFAULT_LIMIT",
     "Blocking",
     "Conflict",
+    "Controller",
     "Livelock",
     "MissedGoal",
     "Order",

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Iterable
 
 from robosc.automata.executable import ExecutableSystem
-from robosc.automata.semantics import Semantics, TooManyChoicesError
+from robosc.automata.semantics import TooManyChoicesError
 from robosc.controller_properties.confluence import ConfluenceSearch
 from robosc.controller_properties.controller import Controller
 from robosc.controller_properties.outcome import Properties
@@ -25,7 +25,7 @@ def check_controller(
     is_nonblocking: bool,
     states: int = 0,
     limit: int = DEFAULT_LIMIT,
-    semantics: Semantics | None = None,
+    controller: Controller | None = None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Properties:
     """Check finite response, confluence and nonblocking under control of a supervisor; deterministic.
@@ -39,14 +39,14 @@ def check_controller(
         states: Number of states of the controlled system, if it is known. If it is `HOPELESS` times as large as
             `limit`, there is no search for nonblocking alone, because only a complete search decides it.
         limit: Maximum number of stable states that the search visits.
-        semantics: Semantics of its automata, if it was made already.
+        controller: The controller automaton, if it was made already.
         should_stop: Function called now and then; once it returns true, the work ends.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
     """
     conditions = tuple(added)
-    controller = Controller(system, conditions, semantics)
+    controller = controller or Controller(system, conditions)
     ends = always_end(controller.system, should_stop)
     is_confluent = ends and never_conflict(controller, conditions, should_stop)
     # Not without an end of silent steps: what comes after them would not.

@@ -36,6 +36,9 @@ Held = tuple[int, ...]
 Node = tuple[State, Held]
 """A state of the controller automaton."""
 
+Move = tuple[tuple[str, ...], bool, Node]
+"""Events, True if this can happen under every setting, and the state before any silent step."""
+
 
 @dataclass(frozen=True, slots=True)
 class Goal:
@@ -128,6 +131,7 @@ class Controller:
         self._choices = {batch: choices for batch, choices in together if choices is not None}
         self.requests = executable.requests
         self._runs: dict[Node, SilentRun] = {}
+        self._moves: dict[Node, tuple[Move, ...]] = {}
         # Only where it is not marked everywhere, as a message's plant is.
         self._marked = tuple(
             (places[Subject(item.name)], item.marked)
@@ -218,13 +222,17 @@ class Controller:
         )
         return state, looked
 
-    def moves(self, node: Node) -> Iterator[tuple[tuple[str, ...], bool, Node]]:
-        """Yield the moves that can change a stable state: first requests, then the environment's, in source order.
+    def moves(self, node: Node) -> tuple[Move, ...]:
+        """Return the moves that can change a stable state: first requests, then the environment's, in source order.
 
-        Returns:
-            Events, True if this can happen under every setting, and the state before any silent step. A state comes
-            once for each request and once for each batch, as a whole batch if possible.
+        A state comes once for each request and once for each batch, as a whole batch if possible.
         """
+        found = self._moves.get(node)
+        if found is None:
+            found = self._moves[node] = tuple(self._moves_from(node))
+        return found
+
+    def _moves_from(self, node: Node) -> Iterator[Move]:
         state, held = node
         for event in self.requests:
             target = self.after(state, event)

@@ -10,18 +10,19 @@ model checking: branching time logic strikes back", Science of Computer Programm
 It shares nothing with the synthesis of strategies but the automata and what is remembered of goals.
 """
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
 
-from robosc.automata.compile import NO_DATA, State, compile_expression
+from robosc.automata.compile import NO_DATA, State, compile_expression, subjects_read
 from robosc.automata.executable import ExecutableSystem
-from robosc.automata.semantics import Semantics, TooManyChoicesError
-from robosc.automata.state import subjects
+from robosc.automata.goal_memory import MEMORY
+from robosc.automata.semantics import TooManyChoicesError
+from robosc.automata.state import Subject, subjects
 from robosc.controller_properties.controller import Controller, Node
 from robosc.controller_properties.graphs import components
 from robosc.controller_properties.search import STOP_INTERVAL
 from robosc.errors import SynthesisCancelled
-from robosc.expressions import Expression
+from robosc.expressions import Expression, Value, leaves, simple_parts
 from robosc.supervisor import AddedCondition, PropertyResult, Strategy
 from robosc.supervisor.predicates import state_predicate
 
@@ -65,6 +66,34 @@ class StrategyCheck:
     missed: MissedGoal | None = None
 
 
+class _Judgements:
+    """Truth values of some conditions over a state and the memory, worked out once for all states that look alike.
+
+    Args:
+        conditions: The conditions.
+        places: Place of each subject in a state with its memory.
+    """
+
+    def __init__(self, conditions: Iterable[Expression], places: Mapping[Subject, int]) -> None:
+        self._functions = [compile_expression(item, places) for item in conditions]
+        self._known: dict[tuple[Value | None, ...], tuple[bool, ...]] = {}
+
+    def of(self, look: tuple[Value | None, ...], state: State, memory: Memory) -> tuple[bool, ...]:
+        """Return for each condition True if it is true.
+
+        Args:
+            look: All that conditions read of the state.
+            state: The state.
+            memory: The memory.
+        """
+        key = (*look, *memory)
+        found = self._known.get(key)
+        if found is None:
+            whole = _whole(state, memory)
+            found = self._known[key] = tuple(holds(whole, NO_DATA) is True for holds in self._functions)
+        return found
+
+
 class StrategyRun:
     """A strategy over explicit states: what it remembers, and what it chooses.
 
@@ -76,38 +105,39 @@ class StrategyRun:
     def __init__(self, executable: ExecutableSystem, strategy: Strategy) -> None:
         owed, system = executable.obligations, executable.remembering_automata
         places = {subject: place for place, subject in enumerate(subjects(system))}
-
-        def compiled(conditions: Iterable[Expression]) -> tuple[Callable[[State], bool], ...]:
-            functions = [compile_expression(item, places) for item in conditions]
-            return tuple(lambda state, holds=holds: holds(state, NO_DATA) is True for holds in functions)
-
-        self._updates = compiled(place.update for place in owed.places)
-        self._goals = compiled(item.condition for item in owed.aims)
-        self._assumptions = compiled(owed.assumptions)
+        conditions = (
+            tuple(place.update for place in owed.places),
+            tuple(item.condition for item in owed.aims),
+            owed.assumptions,
+        )
+        self._updates, self._goals, self._assumptions = [_Judgements(items, places) for items in conditions]
+        read = dict.fromkeys(part for items in conditions for item in items for part in _read_of_state(item))
+        self._read = tuple(compile_expression(part, places) for part in read)
+        self._looks: dict[State, tuple[Value | None, ...]] = {}
         self._modes = tuple(
             tuple((item.event, state_predicate(system, item.condition)) for item in mode) for mode in strategy.modes
         )
         self.memory: Memory = (False,) * len(owed.places)
         """Memory before the first stable state."""
 
-    @staticmethod
-    def _whole(state: State, memory: Memory) -> State:
-        return (*state, "only", *memory)
+    def look(self, state: State) -> tuple[Value | None, ...]:
+        """Return all that memory, goals and assumptions read of a state: where it is the same, so are they."""
+        found = self._looks.get(state)
+        if found is None:
+            found = self._looks[state] = tuple(part(state, NO_DATA) for part in self._read)
+        return found
 
     def observed(self, state: State, memory: Memory) -> Memory:
         """Return the memory after a stable state."""
-        whole = self._whole(state, memory)
-        return tuple(update(whole) for update in self._updates)
+        return self._updates.of(self.look(state), state, memory)
 
     def goals(self, state: State, memory: Memory) -> tuple[bool, ...]:
         """Return for each goal and visit True if it is true."""
-        whole = self._whole(state, memory)
-        return tuple(goal(whole) for goal in self._goals)
+        return self._goals.of(self.look(state), state, memory)
 
     def assumptions(self, state: State, memory: Memory) -> tuple[bool, ...]:
         """Return for each assumption True if it is true."""
-        whole = self._whole(state, memory)
-        return tuple(item(whole) for item in self._assumptions)
+        return self._assumptions.of(self.look(state), state, memory)
 
     def decided(self, state: State, memory: Memory, mode: int) -> tuple[str | None, int]:
         """Return the request that is chosen, None for none, and the mode after it."""
@@ -116,8 +146,23 @@ class StrategyRun:
         number = next((item for item in following if not goals[item]), None)
         if number is None:
             return None, mode
-        whole = self._whole(state, memory)
+        whole = _whole(state, memory)
         return next((event for event, condition in self._modes[number] if condition(whole)), None), number
+
+
+def _whole(state: State, memory: Memory) -> State:
+    """Return a state with its memory, as a state of the remembering automata."""
+    return (*state, "only", *memory)
+
+
+def _read_of_state(condition: Expression) -> Iterator[Expression]:
+    """Yield parts of a condition that read the state alone: with the memory they decide its value."""
+    for part in simple_parts(condition):
+        found = (part,) if all(subject.automaton != MEMORY for subject in subjects_read(part)) else leaves(part)
+        for item in found:
+            read = subjects_read(item)
+            if read and all(subject.automaton != MEMORY for subject in read):
+                yield item
 
 
 def check_strategy(
@@ -126,7 +171,7 @@ def check_strategy(
     strategy: Strategy,
     *,
     limit: int = DEFAULT_LIMIT,
-    semantics: Semantics | None = None,
+    controller: Controller | None = None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> StrategyCheck:
     """Check that a strategy reaches every goal of its model while the assumptions come true.
@@ -136,40 +181,45 @@ def check_strategy(
         added: The conditions that its supervisor adds.
         strategy: The strategy.
         limit: Positions beyond which the check is given up.
-        semantics: Semantics of its automata, if it was made already.
+        controller: The controller automaton, if it was made already.
         should_stop: Function called now and then; once it returns true, the work ends.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
     """
-    search = _Search(Controller(executable, added, semantics), StrategyRun(executable, strategy))
+    search = _Search(controller or Controller(executable, added), StrategyRun(executable, strategy))
     try:
         if not search.is_complete_within(limit, should_stop):
             result: PropertyResult = "not checked" if search.lost is None else "failed"
             return StrategyCheck(result, len(search.turns), search.lost)
     except TooManyChoicesError:
         return StrategyCheck("not checked", len(search.turns))
-    missed = search.missed(len(executable.obligations.aims))
+    missed = search.missed()
     return StrategyCheck("passed" if missed is None else "failed", len(search.turns), missed)
 
 
 class _Search:
-    """Positions under a strategy, with the moves between them.
+    """Positions under a strategy, with the moves between them; each position has a number.
 
     Attributes:
-        moves: Targets of the surroundings' moves from each position.
-        turns: Target of the controller's turn in each position.
+        positions: The positions by their numbers, in the order in which they were found.
+        moves: For each position that was visited the targets of the surroundings' moves.
+        turns: For each of them the target of the controller's turn, and True if the approached goal is not true yet.
         lost: A run that ends in silent steps without end or a request that is not enabled, or None.
     """
 
     def __init__(self, controller: Controller, run: StrategyRun) -> None:
         self._controller = controller
         self._run = run
-        self.moves: dict[Position, tuple[Position, ...]] = {}
-        self.turns: dict[Position, Position] = {}
+        self.positions: list[Position] = []
+        self.moves: list[list[int]] = []
+        self.turns: list[tuple[int, bool]] = []
         self.lost: MissedGoal | None = None
-        self._parents: dict[Position, tuple[Position | None, tuple[str, ...]]] = {}
-        self._queue: list[Position] = []
+        self._numbers: dict[tuple[int, Memory, int], int] = {}
+        self._parents: list[tuple[int | None, tuple[str, ...]]] = []
+        # Nodes are numbered, too: a state takes long to look up.
+        self._nodes: dict[Node, int] = {}
+        self._surroundings: dict[int, list[tuple[Node, int, tuple[str, ...]]]] = {}
 
     def is_complete_within(self, limit: int, should_stop: Callable[[], bool]) -> bool:
         """Visit the positions; return False if they are more than a limit, or one was found from which nothing goes on.
@@ -177,80 +227,114 @@ class _Search:
         Raises:
             SynthesisCancelled: `should_stop` became true.
         """
-        self._arrived(self._controller.start, self._run.memory, 0, None, ())
-        for place, position in enumerate(self._queue):
+        start = self._arrived(self._controller.start, self._run.memory, 0, None, ())
+        if start is None:
+            return False
+        for place, position in enumerate(self.positions):
             if place % STOP_INTERVAL == 0 and should_stop():
                 raise SynthesisCancelled("the check of the strategy was stopped")
-            if place >= limit:
+            if place >= limit or not self._follow(place, position):
                 return False
-            self._follow(position)
-            if self.lost is not None:
-                return False
-        return self.lost is None
+        return True
 
-    def _follow(self, position: Position) -> None:
+    def _follow(self, number: int, position: Position) -> bool:
+        """Find all that follows a position; return False where something does not go on."""
         (state, held), memory, mode = position
         event, after = self._run.decided(state, memory, mode)
-        targets = []
-        for events, _, node in self._controller.moves((state, held)):
-            if events[0] not in self._controller.requests:
-                targets.append(self._arrived(node, memory, mode, position, events))
-        self.moves[position] = tuple(item for item in targets if item is not None)
+        moves = self._moves(number)
+        if moves is None:
+            return False
+        targets = [
+            self._known(end, node, self._run.observed(end[0], memory), mode, number, events)
+            for end, node, events in moves
+        ]
+        turn: int | None
         if event is None:
-            self.turns[position] = self._known((state, held), memory, after, position, ())
-            return
-        target = self._controller.after(state, event)
-        if target is None:
-            self.lost = MissedGoal(None, self._trace(position), state)
-            return
-        # Bits that are held for goals of other actions stay.
-        held = held if target == state else self._controller.forgotten(target, held)
-        found = self._arrived((target, held), memory, after, position, (event,))
-        if found is not None:
-            self.turns[position] = found
+            turn = self._known((state, held), self._nodes[state, held], memory, after, number, ())
+        else:
+            target = self._controller.after(state, event)
+            if target is None:
+                self.lost = MissedGoal(None, self._trace(number), state)
+                return False
+            # Bits that are held for goals of other actions stay.
+            held = held if target == state else self._controller.forgotten(target, held)
+            turn = self._arrived((target, held), memory, after, number, (event,))
+        if turn is None:
+            return False
+        self.moves.append(targets)
+        self.turns.append((turn, not self._run.goals(state, memory)[mode]))
+        return True
+
+    def _moves(self, number: int) -> list[tuple[Node, int, tuple[str, ...]]] | None:
+        """Return what the surroundings' moves from a position lead to, with the events; None where one does not end."""
+        node = self.positions[number][0]
+        found = self._surroundings.get(self._nodes[node])
+        if found is None:
+            found = []
+            for events, _, target in self._controller.moves(node):
+                if events[0] not in self._controller.requests:
+                    run = self._controller.run(target)
+                    if run.end is None:
+                        self._lose(number, events, target)
+                        return None
+                    found.append((run.end, self._number(run.end), (*events, *run.events)))
+            self._surroundings[self._nodes[node]] = found
+        return found
+
+    def _number(self, node: Node) -> int:
+        return self._nodes.setdefault(node, len(self._nodes))
 
     def _arrived(
-        self, node: Node, memory: Memory, mode: int, before: Position | None, events: tuple[str, ...]
-    ) -> Position | None:
+        self, node: Node, memory: Memory, mode: int, before: int | None, events: tuple[str, ...]
+    ) -> int | None:
         run = self._controller.run(node)
         if run.end is None:
-            self.lost = MissedGoal(None, (*(() if before is None else self._trace(before)), *events), node[0])
+            self._lose(before, events, node)
             return None
-        return self._known(run.end, self._run.observed(run.end[0], memory), mode, before, (*events, *run.events))
+        memory = self._run.observed(run.end[0], memory)
+        return self._known(run.end, self._number(run.end), memory, mode, before, (*events, *run.events))
+
+    def _lose(self, before: int | None, events: tuple[str, ...], node: Node) -> None:
+        self.lost = MissedGoal(None, (*(() if before is None else self._trace(before)), *events), node[0])
 
     def _known(
-        self, node: Node, memory: Memory, mode: int, before: Position | None, events: tuple[str, ...]
-    ) -> Position:
-        position = (node, memory, mode)
-        if position not in self._parents:
-            self._parents[position] = before, events
-            self._queue.append(position)
-        return position
+        self, node: Node, place: int, memory: Memory, mode: int, before: int | None, events: tuple[str, ...]
+    ) -> int:
+        """Return the number of a position, `place` being that of its node."""
+        key = place, memory, mode
+        number = self._numbers.get(key)
+        if number is None:
+            number = self._numbers[key] = len(self.positions)
+            self.positions.append((node, memory, mode))
+            self._parents.append((before, events))
+        return number
 
-    def _trace(self, position: Position) -> tuple[str, ...]:
+    def _trace(self, number: int) -> tuple[str, ...]:
         found: list[tuple[str, ...]] = []
-        before: Position | None = position
+        before: int | None = number
         while before is not None:
             before, events = self._parents[before]
             found.append(events)
         return tuple(event for events in reversed(found) for event in events)
 
-    def missed(self, goals: int) -> MissedGoal | None:
-        """Return a run that misses a goal although every assumption comes true again and again, or None."""
-        positions = list(self.turns)
-        judged = {item: self._run.goals(item[0][0], item[1]) for item in positions}
-        owed = {item: self._run.assumptions(item[0][0], item[1]) for item in positions}
-        for goal in range(goals):
-            passing = {item: target for item, target in self.turns.items() if not judged[item][goal]}
-            graph: dict[Position, Sequence[Position]] = {
-                item: (*self.moves[item], *((passing[item],) if item in passing else ())) for item in positions
-            }
-            numbers = components(graph)
-            met: dict[int, list[Position]] = {}
-            for item, target in passing.items():
-                if numbers[target] == numbers[item]:
-                    met.setdefault(numbers[item], []).append(item)
-            for found in met.values():
-                if all(any(holding) for holding in zip(*(owed[item] for item in found), strict=True)):
-                    return MissedGoal(goal, self._trace(found[0]), found[0][0][0])
+    def missed(self) -> MissedGoal | None:
+        """Return a run that misses a goal although every assumption comes true again and again, or None.
+
+        The mode never passes over a goal that is not true. On a cycle that misses a goal it therefore stays the same,
+        and the goal of that mode is missed, too: only turns count at which the approached goal is not true.
+        """
+        graph = {
+            number: (*targets, turn) if is_owed else targets
+            for number, (targets, (turn, is_owed)) in enumerate(zip(self.moves, self.turns, strict=True))
+        }
+        numbers = components(graph)
+        met: dict[int, list[int]] = {}
+        for number, (turn, is_owed) in enumerate(self.turns):
+            if is_owed and numbers[turn] == numbers[number]:
+                met.setdefault(numbers[number], []).append(number)
+        for found in sorted(met.values(), key=lambda found: self.positions[found[0]][2]):
+            positions = [self.positions[number] for number in found]
+            owed = {self._run.assumptions(node[0], memory) for node, memory, _ in positions}
+            if all(map(any, zip(*owed, strict=True))):
+                return MissedGoal(positions[0][2], self._trace(found[0]), positions[0][0][0])
         return None

@@ -25,10 +25,14 @@ from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import FixedPoint, Problem, safe_states
 from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.nodes import implies
 from robosc.synthesis.transitions import Steps, transition_of
 
 MAXIMUM_CASES = 256
 """Cases of a message's data beyond which the data of its events counts as independent."""
+
+_REMEMBERED = 8
+"""Predicates of which it is remembered from where moves lead into them."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,9 +90,11 @@ class ControllerArena:
         }
         # Variables of the memory after it was observed.
         self._observing = {place: encoding.choice(2).names[0] for place in self._observed}
-        self._arrived: tuple[Any, Any] | None = None
+        self._arrived: list[tuple[Any, Any]] = []
+        self._surrounded: list[tuple[Any, Any, Any]] = []
         reachable = self._reachable()
         self._silent = tuple(self._silent_steps(executable, owed.cancels, encoder, reachable))
+        self._ends_alike = all(steps.is_deterministic for _, steps in self._silent)
         self.positions = reachable & ~encoding.any_of(first for first, _ in self._silent)
         for group in owed.exclusive:
             self.positions = self.positions & self._at_most_one([encoder.holds(place.read) for place in group])
@@ -177,32 +183,58 @@ class ControllerArena:
 
     def arriving(self, predicate: Any) -> Any:
         """Return the states from which silent steps end in a stable state that, once observed, is in a predicate."""
-        if self._arrived is not None and self._arrived[0] == predicate:
-            return self._arrived[1]
+        for number, (other, arrived) in enumerate(self._arrived):
+            if other == predicate:
+                self._arrived.append(self._arrived.pop(number))
+                return arrived
+        found = None
+        for other, arrived in reversed(self._arrived):
+            # Steps that may lead to what predicates are together may lead to one of them, and the other way round.
+            if implies(self._manager, other, predicate):
+                found = arrived | self._newly_arriving(predicate & ~other)
+                break
+            if self._ends_alike and implies(self._manager, predicate, other):
+                found = arrived & ~self._newly_arriving(other & ~predicate)
+                break
+        if found is None:
+            found = self._newly_arriving(predicate)
+        self._arrived.append((predicate, found))
+        del self._arrived[:-_REMEMBERED]
+        return found
+
+    def _newly_arriving(self, predicate: Any) -> Any:
         observed = self._manager.let(self._observed, predicate) if self._observed else predicate
-        found = self.positions & observed
-        while True:
-            wider = found
+        found = fresh = self.positions & observed
+        while fresh != self._manager.false:
+            before = self._manager.false
             for first, steps in self._silent:
                 self._monitor.check_stop()
-                wider = wider | (first & steps.some(wider))
-            if wider == found:
-                self._arrived = predicate, found
-                return found
-            found = wider
+                before = before | (first & steps.some(fresh))
+            fresh = before & ~found
+            found = found | fresh
+        return found
 
     def surroundings(self, predicate: Any) -> Any:
         """Return the positions from which every batch leads into a predicate."""
         arriving = self.arriving(predicate)
-        found = self.positions
+        found, bad = self.positions, ~arriving
+        for number in reversed(range(len(self._surrounded))):
+            wider, arrived, inside = self._surrounded[number]
+            if implies(self._manager, predicate, wider):
+                # The rest of what leads out of the predicate leads out of the wider one, too.
+                self._surrounded.append(self._surrounded.pop(number))
+                found, bad = inside, arrived & ~arriving
+                break
         for case in self._cases:
-            inside = arriving
+            outside = bad
             for part in reversed(case):
                 self._monitor.check_stop()
-                after = part.steps.only(inside)
+                before = part.steps.some(outside)
                 # An event that cannot happen here changes nothing.
-                inside = after & (inside if part.may_be_left_out else part.steps.sources | inside)
-            found = found & inside
+                outside = before | (outside if part.may_be_left_out else outside & ~part.steps.sources)
+            found = found & ~outside
+        self._surrounded.append((predicate, arriving, found))
+        del self._surrounded[:-_REMEMBERED]
         return found
 
     def turn(self, predicate: Any) -> Any:

@@ -18,8 +18,8 @@ from typing import Any
 
 from robosc.automata.state import Subject
 from robosc.conditions.cover import Words, cover
-from robosc.conditions.formula import OPERANDS, STEPS, length
-from robosc.conditions.literals import operands
+from robosc.conditions.formula import OPERANDS, STEPS
+from robosc.conditions.literals import length, operands
 from robosc.conditions.multivalued import MAXIMUM_SUBJECTS, Effort, EffortExceededError, space_of
 from robosc.conditions.relations import Relations, comparable
 from robosc.conditions.rendering import SHORT, TOTAL_STEPS, Formulas

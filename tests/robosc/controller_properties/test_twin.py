@@ -77,13 +77,14 @@ def test_enums_of_one_field_agree(record_property: Callable[[str, object], None]
         twin = twin_of(supervisor, TWIN_LIMIT)
         if twin is None:
             continue
-        controller = Controller(ExecutableSystem(supervisor.model, Deployment.CONTROLLER), supervisor.added)
+        executable = ExecutableSystem(supervisor.model, Deployment.CONTROLLER)
+        controller, unaware = (Controller(executable, supervisor.added) for _ in range(2))
         found = search(controller, limit=LIMIT, confluence=ConfluenceSearch(controller, LIMIT))
         assert found.states == len(twin.states), seed
         shown = (twin.has_livelock, twin.has_conflict, twin.is_blocking)
         assert (found.livelock is not None, found.conflict is not None, found.blocking is not None) == shown, seed
-        controller._choices.clear()
-        apart = search(controller, limit=LIMIT, confluence=ConfluenceSearch(controller, LIMIT))
+        unaware._choices.clear()
+        apart = search(unaware, limit=LIMIT, confluence=ConfluenceSearch(unaware, LIMIT))
         met["compared"] += 1
         met["fewer states"] += found.states < apart.states
     for name, count in sorted(met.items()):
@@ -239,15 +240,16 @@ def test_any_supervisor_is_judged(seed: int) -> None:
     used = Semantics(supervisor.executable.automata)
     before = verify_explicitly(used.system, {}, limit=150, semantics=used)
     assert before == verify_explicitly(used.system, {}, limit=150)
+    seasoned = Controller(supervisor.executable, supervisor.added, used)
     first, second, third = (
         check_controller(
             supervisor.executable,
             supervisor.added,
             is_nonblocking=False,
             limit=150,
-            semantics=semantics,
+            controller=controller,
         )
-        for semantics in (None, used, used)
+        for controller in (None, seasoned, seasoned)
     )
     assert first == second == third
     assert len(first.method) < 500

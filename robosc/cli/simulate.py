@@ -190,23 +190,27 @@ def counter_run(arguments: argparse.Namespace) -> "CounterRun | None":
     """Return the run against the surroundings; None if the model has errors, which have been reported.
 
     Raises:
-        CommandError: There is no counter-strategy: every goal can be reached, there are none, or it is too large.
+        CommandError: There is no counter-strategy: all goals and missions can be reached, there are none, or it is
+            too large.
     """
+    from robosc.certification.goals import GoalExplanation
     from robosc.cli import synth
     from robosc.cli.arguments import read_bundle
     from robosc.json_documents import diagnostics_json
     from robosc.pipeline.counter_run import CounterRun, NoCounterStrategyError
+    from robosc.strategies import goals_and_missions
 
     bundle = read_bundle(arguments)
     given = argparse.Namespace(**{**vars(arguments), "deployment": str(Deployment.CONTROLLER)})
     outcome = synth.make(given, bundle, allow_livelock=True)
-    if outcome.goals is not None:
+    if isinstance(outcome.explanation, GoalExplanation):
         try:
-            return CounterRun(outcome.goals)
+            return CounterRun(outcome.explanation)
         except NoCounterStrategyError as error:
             raise CommandError(str(error), ExitCode.FAILED) from error
     if outcome.supervisor is not None:
-        why = "every goal can be reached" if outcome.supervisor.model.goals else "the model has no goals"
+        aims = goals_and_missions(outcome.supervisor.model)
+        why = f"the {aims} can be reached" if aims else "the model has no goals or missions"
         raise CommandError(f"--counter-strategy: the surroundings have none, since {why}", ExitCode.FAILED)
     if arguments.json:
         print_json(
@@ -434,7 +438,11 @@ def opposition_json(run_: "ManualRun") -> dict[str, object]:
 
     if not isinstance(run_, CounterRun):
         return {}
-    return {"denied": run_.denied, "assumptions": list(run_.came_true)}
+    return {
+        "denied": run_.denied,
+        "denied_next": list(run_.denied_next),
+        "assumptions": list(run_.came_true),
+    }
 
 
 def finding_json(finding: "WalkFinding") -> dict[str, object]:

@@ -88,8 +88,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     group.add_argument(
         "--counter-strategy",
         action="store_true",
-        help="let the surroundings play, so that goals that cannot be reached are never reached: you choose requests, "
-        "or 'wait', in commands or in --events; in --random chance does",
+        help="let the surroundings play, so that goals or missions that cannot be reached are never reached: you "
+        "choose requests, or 'wait', in commands or in --events; in --random chance does",
     )
     group.add_argument("--seed", type=int, default=0, metavar="SEED", help="seed of the chance (default: 0)")
     group.add_argument(
@@ -176,12 +176,12 @@ def _refuse_beside_counter_strategy(arguments: argparse.Namespace) -> None:
     Raises:
         UsageError: Something does not.
     """
-    automata.refuse(arguments.strategy, "--strategy: there is none where goals cannot be reached")
+    automata.refuse(arguments.strategy, "--strategy: there is none where goals or missions cannot be reached")
     automata.refuse(
         arguments.until_finding is not None, "--until-finding: the surroundings do not play by chance in this run"
     )
     if automata.is_given(arguments) or arguments.model.suffix == ".rsup":
-        raise UsageError("--counter-strategy is for the model of a robot, whose goals cannot be reached")
+        raise UsageError("--counter-strategy is for the model of a robot, whose goals or missions cannot be reached")
     if arguments.deployment == str(Deployment.LAYER):
         raise UsageError("--counter-strategy is for controllers: goals have no effect in a supervision layer")
 

@@ -172,6 +172,29 @@ def test_a_visit_is_denied_while_its_mission_goes_as_far_as_it_can() -> None:
     assert run.missions[0].visit == 1
 
 
+VISITS = ("Base.inside", "Base.outside", "Door.opening", "Door.shut or Door.opening")
+
+
+def test_another_visit_is_denied_only_if_it_was_announced(record_property: Callable[[str, object], None]) -> None:
+    met: Counter[str] = Counter()
+    for seed in range(30):
+        dice = Random(seed)
+        made = dice.sample(VISITS, dice.randint(1, 4))
+        made.insert(dice.randint(0, len(made)), "Door.ajar")
+        run = run_of(MISSION.replace("Base.inside then Door.ajar", " then ".join(made)))
+        for _ in range(20):
+            denied, following = run.denied, set(run.denied_next)
+            turn(run, dice)
+            if run.denied != denied:
+                met["another denied"] += 1
+                assert run.denied in following, (seed, run.denied)
+            assert set(run.denied_next) <= following, (seed, run.denied_next)
+        met["announced"] += bool(run_of(MISSION.replace("Base.inside then Door.ajar", " then ".join(made))).denied_next)
+    for name, count in sorted(met.items()):
+        record_property(name, count)
+    assert met["another denied"] >= met["announced"] > 10, met
+
+
 def test_what_is_taken_back_is_taken_again_with_all_that_followed() -> None:
     run = run_of(MODEL)
     run.walk(20, 4)

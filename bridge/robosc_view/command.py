@@ -85,8 +85,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument(
         "--counter-strategy",
         action="store_true",
-        help="with MODEL, whose goals cannot be reached: let the surroundings play, so that they are never reached; "
-        "you choose requests, or wait",
+        help="with MODEL, whose goals or missions cannot be reached: let the surroundings play, so that they are never "
+        "reached; you choose requests, or wait",
     )
     add_given_supervisor_options(parser, "stands")
     scene = parser.add_argument(
@@ -253,7 +253,9 @@ def _refuse_beside_counter_strategy(arguments: argparse.Namespace) -> None:
     """
     is_played = arguments.model is not None and not (arguments.bridge or arguments.ros2 or arguments.log)
     if not is_played or is_automata(arguments.model) or arguments.model.suffix == ".rsup":
-        raise UsageError("--counter-strategy is for the model of a robot (MODEL), whose goals cannot be reached")
+        raise UsageError(
+            "--counter-strategy is for the model of a robot (MODEL), whose goals or missions cannot be reached"
+        )
     if arguments.deployment == "layer":
         raise UsageError("--counter-strategy is for controllers: goals have no effect in a supervision layer")
 

@@ -307,7 +307,15 @@ def run_text(run: "ManualRun", entries: int, report: RunReport, beginning: int =
     undone = run.undone
     opposition = None
     if isinstance(run, CounterRun):
-        opposition = {"goals": list(run.reached), "denied": run.denied, "assumptions": list(run.came_true)}
+        # In the order of the goals and missions of the definition.
+        goals = ["true" if is_true else "not yet" for is_true in run.reached]
+        missions = [item.words for item in run.missions]
+        opposition = {
+            "goals": [*goals, *missions],
+            "denied": run.denied,
+            "denied_next": list(run.denied_next),
+            "assumptions": list(run.came_true),
+        }
     return _text(
         {
             "type": "run",

@@ -501,6 +501,8 @@ def playable(made: SynthesizedModel, scene: Any = None) -> Robot:
     play |= {"events": events, "forms": tuple(Form)}
     if made.denied is not None:
         # A link, and a test, would load the model, which has no supervisor.
-        goals = [f"goal {goal_text(item)}" for item in run.supervisor.model.goals]
-        play |= {"forms": (Form.LOG,), "link": None, "goals": goals}
+        model = run.supervisor.model
+        goals = [f"goal {goal_text(item)}" for item in model.goals]
+        missions = [f"mission {item.name}" for item in model.missions]
+        play |= {"forms": (Form.LOG,), "link": None, "goals": [*goals, *missions]}
     return robot_of(made.supervisor, SourceKind.MODEL, version="", can_command=False, scene=scene, play=play)

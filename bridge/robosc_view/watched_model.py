@@ -189,12 +189,12 @@ def denied_model(outcome: SynthesisOutcome, text: str | None) -> SynthesizedMode
     Raises:
         NoSupervisorError: There is no counter-strategy.
     """
-    goals = outcome.goals
+    goals = outcome.explanation
     findings = tuple(finding_text(item.severity, item.message, item.code) for item in outcome.diagnostics)
-    if goals is None:
+    if not isinstance(goals, GoalExplanation):
         errors = [item.message for item in outcome.diagnostics if item.severity is Severity.ERROR]
         raise NoSupervisorError(outcome.reason or (errors or ["the surroundings have no counter-strategy"])[0])
-    if goals.counter is None:
+    if goals.supervisor is None or goals.counter is None:
         raise NoSupervisorError("the counter-strategy of the surroundings is too large to be played")
     return SynthesizedModel(goals.supervisor, findings, text, denied=goals)
 

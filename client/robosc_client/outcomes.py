@@ -12,7 +12,9 @@ from robosc.automata.semantics import Semantics
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.automata.structure import System
 from robosc.certification import OutcomeStatus, SynthesisOutcome
+from robosc.certification.goals import GoalExplanation
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
+from robosc.explanation import EmptyExplanation
 from robosc.exploration import Graph, GraphState, graph_columns, marks
 from robosc.expressions import Value
 from robosc.json_documents import json_text
@@ -83,7 +85,7 @@ def automata_synthesis_of(found: Synthesis, model: LoadedAutomata) -> SystemSynt
         raise ServiceError("the server's supervisor is refused: it was made of other automata")
     diagnostics, reason = Findings(found.diagnostics, model), visible(found.reason)
     statistics = None if supervisor is None else supervisor.statistics
-    return SystemSynthesis(found.status, reason, supervisor, statistics, diagnostics, found.explanation)
+    return SystemSynthesis(found.status, reason, supervisor, statistics, diagnostics, _of_automata(found))
 
 
 def automata_supervisor_of(content: bytes) -> SystemSupervisor:
@@ -115,7 +117,18 @@ def automata_exploration_of(found: Exploration, model: LoadedAutomata) -> Automa
             raise malformed("it has a result for a model that has errors")
         graph = _automata_graph(found.graph, system)
     diagnostics = Findings(found.diagnostics, model)
-    return AutomataExploration(found.status, diagnostics, visible(found.reason), graph, found.explanation)
+    return AutomataExploration(found.status, diagnostics, visible(found.reason), graph, _of_automata(found))
+
+
+def _of_automata(found: Synthesis | Exploration) -> EmptyExplanation | None:
+    """Return the explanation of why there is no supervisor of automata.
+
+    Raises:
+        ServiceError: It explains goals, which automata do not have.
+    """
+    if isinstance(found.explanation, GoalExplanation):
+        raise malformed("the explanation is of a model in another language")
+    return found.explanation
 
 
 def _automata_graph(found: StateGraph, system: System) -> Graph:

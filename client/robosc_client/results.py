@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import msgspec
 
 from robosc.certification import Progress
+from robosc.certification.goals import GoalExplanation
 from robosc.errors import Diagnostic
 from robosc.explanation import EmptyExplanation
 from robosc.expressions import Value
@@ -50,7 +51,8 @@ class Synthesis(Outcome):
             automata with `robosc.SystemSupervisor.read`.
         summary: Summary of the supervisor in numbers and texts, or None if there is no supervisor.
         statistics: Figures of the work, or None where there was no synthesis.
-        explanation: Explanation of why no supervisor exists, or None where there is nothing to explain.
+        explanation: Explanation of why no supervisor exists or goals cannot be reached, or None where there is nothing
+            to explain.
         signature: Content of the file's signature (`.rsup.sig`), as the server made it; empty where it signs nothing.
             Untrusted: `robosc.signatures.signer` returns whose it is.
     """
@@ -61,7 +63,7 @@ class Synthesis(Outcome):
     supervisor: bytes
     summary: Summary | None
     statistics: Statistics | None
-    explanation: EmptyExplanation | None = None
+    explanation: EmptyExplanation | GoalExplanation | None = None
     signature: bytes = b""
 
     def _product(self) -> object:
@@ -112,14 +114,15 @@ class Exploration(Outcome):
         diagnostics: Every finding about the model, sorted by place.
         reason: Reason why there is no graph, in one sentence; empty where there is one.
         graph: The graph, or None.
-        explanation: Explanation of why no supervisor exists, or None where there is nothing to explain.
+        explanation: Explanation of why no supervisor exists or goals cannot be reached, or None where there is nothing
+            to explain.
     """
 
     status: SynthesisStatus
     diagnostics: tuple[Diagnostic, ...]
     reason: str
     graph: StateGraph | None
-    explanation: EmptyExplanation | None = None
+    explanation: EmptyExplanation | GoalExplanation | None = None
 
     def _product(self) -> object:
         return self.graph

@@ -60,8 +60,10 @@ class GoalExplanation:
             even without requirements. False if the search was given up, and none are listed.
         helpful: Assumptions with which the goals can be reached, as a user writes them; empty if none are known.
         nearest: The nearest that can be reached if it is hopeless, where it is known.
-        supervisor: Supervisor that has no strategy for the goals.
-        counter: Counter-strategy of the surroundings against the goals; None if it would be too large.
+        has_counter_strategy: True if the surroundings have a counter-strategy that is not too large to be played.
+        supervisor: Supervisor that has no strategy for the goals; None if a server has sent the explanation.
+        counter: Counter-strategy of the surroundings against the goals; None if it would be too large, or if a server
+            has sent the explanation.
     """
 
     goals: tuple[Part, ...]
@@ -70,8 +72,9 @@ class GoalExplanation:
     is_minimal: bool
     helpful: tuple[str, ...]
     nearest: NearestPlace | None
-    supervisor: Supervisor = field(hash=False, compare=False)
-    counter: CounterStrategy | None = field(hash=False, compare=False)
+    has_counter_strategy: bool
+    supervisor: Supervisor | None = field(default=None, hash=False, compare=False)
+    counter: CounterStrategy | None = field(default=None, hash=False, compare=False)
 
     def __repr__(self) -> str:
         return f"<{len(self.goals)} goals cannot be reached; {len(self.blamed)} requirements are to blame>"
@@ -100,7 +103,7 @@ class GoalExplanation:
                 "state": dict(nearest.state),
                 "missing": list(nearest.missing),
             },
-            "has_counter_strategy": self.counter is not None,
+            "has_counter_strategy": self.has_counter_strategy,
         }
 
     def _lines(self) -> Iterator[str]:
@@ -162,6 +165,7 @@ def goal_explanation(
             len(result.unreached) > 1,
             *(near.events, near.state, near.missing),
         ),
+        has_counter_strategy=blame.counter is not None,
         supervisor=supervisor,
         counter=blame.counter,
     )

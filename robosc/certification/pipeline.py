@@ -63,8 +63,7 @@ class SynthesisOutcome:
         diagnostics: Every finding about the model, sorted by place; with a supervisor, also those of synthesis.
         statistics: Figures of the synthesis, or None where there was none.
         reason: Reason why there is no supervisor, in one sentence; empty where there is one.
-        explanation: Explanation of what is to blame where no supervisor exists.
-        goals: Explanation of what is to blame where goals cannot be reached.
+        explanation: Explanation of what is to blame where no supervisor exists, or goals cannot be reached.
     """
 
     status: OutcomeStatus
@@ -72,8 +71,7 @@ class SynthesisOutcome:
     diagnostics: tuple[Diagnostic, ...]
     statistics: Statistics | None = None
     reason: str = ""
-    explanation: "EmptyExplanation | None" = None
-    goals: GoalExplanation | None = None
+    explanation: "EmptyExplanation | GoalExplanation | None" = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,9 +222,7 @@ def make_supervisor(
                 without = Supervisor.supervising(problem.system, result.added, certificate)
                 goals = goal_explanation(without, places, found, blame)
             reason = f"no strategy is made for the {goals_and_missions(model)}"
-            return SynthesisOutcome(
-                OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, reason, goals=goals
-            )
+            return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, reason, goals)
         check = check_strategy(
             problem.system,
             result.added,

@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from enum import StrEnum
     from pathlib import Path
 
+    from robosc.certification.goals import GoalExplanation
     from robosc.explanation import EmptyExplanation
     from robosc.pipeline.exploring import Exploration
     from robosc.pipeline.loading import LoadedAutomata
@@ -428,7 +429,7 @@ class WithoutSupervisor:
     status: "SynthesisStatus"
     diagnostics: tuple[Diagnostic, ...]
     reason: str
-    explanation: "EmptyExplanation | None"
+    explanation: "EmptyExplanation | GoalExplanation | None"
 
 
 def require_supported(outcome: "Exploration | Generation | Verification") -> None:

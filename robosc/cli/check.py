@@ -14,6 +14,7 @@ from robosc.source import Bundle
 
 if TYPE_CHECKING:
     from robosc.certification import SynthesisOutcome
+    from robosc.certification.goals import GoalExplanation
     from robosc.explanation import EmptyExplanation
 
 
@@ -105,14 +106,14 @@ class _Synthesized:
         status: Outcome of the synthesis.
         reason: Reason why there is no supervisor; empty if there is one.
         has_failed: True if a robot without errors has no supervisor.
-        explanation: Explanation of what is to blame if no supervisor exists.
+        explanation: Explanation of what is to blame if no supervisor exists, or goals cannot be reached.
     """
 
     diagnostics: tuple[Diagnostic, ...]
     status: str
     reason: str
     has_failed: bool
-    explanation: "EmptyExplanation | None" = None
+    explanation: "EmptyExplanation | GoalExplanation | None" = None
 
 
 def _synthesized(outcome: "SynthesisOutcome") -> _Synthesized:

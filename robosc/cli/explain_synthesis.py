@@ -16,7 +16,7 @@ from robosc.cli.output import ExitCode, ProgressLine, print_json
 from robosc.errors import UnsupportedModelError
 from robosc.json_documents import diagnostics_json
 from robosc.model.structure import Deployment
-from robosc.source import Bundle
+from robosc.source import Bundle, visible
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -40,8 +40,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="explain what synthesis did to a model",
         description="Explain the result of synthesis. Without a supervisor: a shortest run into trouble, and what is "
         "to blame. With one: what restricts each controllable event, why an event can never happen or cannot happen "
-        "in a state, and warnings about what never restricts, never happens, is never reached or only waits. Takes "
-        "automata (FILE.cif, .gen, .wmod), too.",
+        "in a state, and warnings about what never restricts, never happens, is never reached or only waits. If goals "
+        "or missions cannot be reached: what is to blame for that, unless --event, --state or --after asks for "
+        "something else. Takes automata (FILE.cif, .gen, .wmod), too.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,
     )
@@ -85,6 +86,7 @@ def run_with(arguments: argparse.Namespace, explain: "Callable[[Bundle], Explain
     Raises:
         UnsupportedModelError: The model is outside what synthesis handles.
     """
+    from robosc.certification.goals import GoalExplanation
     from robosc.explanation import document, explanation_text
     from robosc.pipeline.results import NoSupervisor, SynthesisStatus
 
@@ -92,6 +94,15 @@ def run_with(arguments: argparse.Namespace, explain: "Callable[[Bundle], Explain
     found = explain(bundle)
     if found.status is SynthesisStatus.UNSUPPORTED_MODEL:
         raise UnsupportedModelError(found.reason)
+    if isinstance(found.explanation, GoalExplanation):
+        goals = automata.WithoutSupervisor(found.status, found.diagnostics, found.reason, found.explanation)
+        if arguments.json:
+            print_json(
+                {"status": str(found.status), **synth.reasons_json(goals), **diagnostics_json(found.diagnostics)}
+            )
+        else:
+            sys.stdout.write(f"{bundle.main.name}: {visible(found.reason)}\n{synth.why_text(found.explanation)}")
+        return ExitCode.FAILED
     if isinstance(found.explanation, NoSupervisor):
         why = automata.WithoutSupervisor(found.status, found.diagnostics, found.reason, None)
         if arguments.json:
@@ -111,10 +122,7 @@ def run_with(arguments: argparse.Namespace, explain: "Callable[[Bundle], Explain
 
 
 def _explained(arguments: argparse.Namespace, bundle: Bundle) -> "Explained":
-    from robosc.certification import SynthesisOutcome
-    from robosc.pipeline.explaining import ExplanationSubject, explained
-    from robosc.pipeline.findings import Findings
-    from robosc.pipeline.results import Explained, NoSupervisor, SynthesisStatus
+    from robosc.pipeline.explaining import ExplanationSubject, explained, result_of
 
     progress = ProgressLine()
     try:
@@ -127,10 +135,4 @@ def _explained(arguments: argparse.Namespace, bundle: Bundle) -> "Explained":
         )
     finally:
         progress.clear()
-    if isinstance(found, SynthesisOutcome):
-        nothing = NoSupervisor(found.reason, found.diagnostics)
-        status = SynthesisStatus(str(found.status))
-        return Explained(status, Findings(found.diagnostics, bundle), found.reason, nothing)
-    problem, explanation = found
-    status = SynthesisStatus.SUPERVISOR if explanation.empty is None else SynthesisStatus.EMPTY
-    return Explained(status, Findings(problem.diagnostics, bundle), "", explanation)
+    return result_of(found, bundle)

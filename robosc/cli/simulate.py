@@ -88,8 +88,8 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     group.add_argument(
         "--counter-strategy",
         action="store_true",
-        help="let the surroundings play, so that goals that cannot be reached are never reached: you choose requests, "
-        "or 'wait', in commands or in --events; in --random chance does",
+        help="let the surroundings play, so that goals or missions that cannot be reached are never reached: you "
+        "choose requests, or 'wait', in commands or in --events; in --random chance does",
     )
     group.add_argument("--seed", type=int, default=0, metavar="SEED", help="seed of the chance (default: 0)")
     group.add_argument(
@@ -176,12 +176,12 @@ def _refuse_beside_counter_strategy(arguments: argparse.Namespace) -> None:
     Raises:
         UsageError: Something does not.
     """
-    automata.refuse(arguments.strategy, "--strategy: there is none where goals cannot be reached")
+    automata.refuse(arguments.strategy, "--strategy: there is none where goals or missions cannot be reached")
     automata.refuse(
         arguments.until_finding is not None, "--until-finding: the surroundings do not play by chance in this run"
     )
     if automata.is_given(arguments) or arguments.model.suffix == ".rsup":
-        raise UsageError("--counter-strategy is for the model of a robot, whose goals cannot be reached")
+        raise UsageError("--counter-strategy is for the model of a robot, whose goals or missions cannot be reached")
     if arguments.deployment == str(Deployment.LAYER):
         raise UsageError("--counter-strategy is for controllers: goals have no effect in a supervision layer")
 
@@ -190,23 +190,27 @@ def counter_run(arguments: argparse.Namespace) -> "CounterRun | None":
     """Return the run against the surroundings; None if the model has errors, which have been reported.
 
     Raises:
-        CommandError: There is no counter-strategy: every goal can be reached, there are none, or it is too large.
+        CommandError: There is no counter-strategy: all goals and missions can be reached, there are none, or it is
+            too large.
     """
+    from robosc.certification.goals import GoalExplanation
     from robosc.cli import synth
     from robosc.cli.arguments import read_bundle
     from robosc.json_documents import diagnostics_json
     from robosc.pipeline.counter_run import CounterRun, NoCounterStrategyError
+    from robosc.strategies import goals_and_missions
 
     bundle = read_bundle(arguments)
     given = argparse.Namespace(**{**vars(arguments), "deployment": str(Deployment.CONTROLLER)})
     outcome = synth.make(given, bundle, allow_livelock=True)
-    if outcome.goals is not None:
+    if isinstance(outcome.explanation, GoalExplanation):
         try:
-            return CounterRun(outcome.goals)
+            return CounterRun(outcome.explanation)
         except NoCounterStrategyError as error:
             raise CommandError(str(error), ExitCode.FAILED) from error
     if outcome.supervisor is not None:
-        why = "every goal can be reached" if outcome.supervisor.model.goals else "the model has no goals"
+        aims = goals_and_missions(outcome.supervisor.model)
+        why = f"the {aims} can be reached" if aims else "the model has no goals or missions"
         raise CommandError(f"--counter-strategy: the surroundings have none, since {why}", ExitCode.FAILED)
     if arguments.json:
         print_json(
@@ -434,7 +438,11 @@ def opposition_json(run_: "ManualRun") -> dict[str, object]:
 
     if not isinstance(run_, CounterRun):
         return {}
-    return {"denied": run_.denied, "assumptions": list(run_.came_true)}
+    return {
+        "denied": run_.denied,
+        "denied_next": list(run_.denied_next),
+        "assumptions": list(run_.came_true),
+    }
 
 
 def finding_json(finding: "WalkFinding") -> dict[str, object]:

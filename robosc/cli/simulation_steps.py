@@ -9,6 +9,7 @@ from robosc.source import visible
 
 if TYPE_CHECKING:
     from robosc.certification.supervisor_file import StateInWords
+    from robosc.pipeline.counter_run import CounterRun
     from robosc.pipeline.manual_run import ManualRun
     from robosc.pipeline.simulation import Run
     from robosc.pipeline.steps import Step
@@ -102,7 +103,14 @@ def _strategy_lines(run_: "ManualRun") -> list[str]:
     goals = ", ".join(f"{number} {'true' if is_true else 'not yet'}" for number, is_true in enumerate(run_.reached, 1))
     lines = [*([f"goals     {goals}"] if goals else []), *(f"mission   {item}" for item in run_.missions)]
     if isinstance(run_, CounterRun):
-        denied = "the turn: silent steps do not end" if run_.denied is None else f"{run_.denied}, whatever you do"
+        denied = _denied_text(run_)
         came = ", ".join(f"{number} came true {count} times" for number, count in enumerate(run_.came_true, 1))
         return [*lines, *([f"assumed   {came}"] if came else []), f"denied    {denied}"]
     return [*lines, f"strategy  {run_.chosen or 'waits'}"] if run_.has_strategy else []
+
+
+def _denied_text(run_: "CounterRun") -> str:
+    if run_.denied is None:
+        return "the turn: silent steps do not end"
+    following = " or ".join(run_.denied_next)
+    return f"{run_.denied}; if it comes true, {following}" if following else f"{run_.denied}, whatever you do"

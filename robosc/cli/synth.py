@@ -47,8 +47,8 @@ class Reasons(Protocol):
         """Reason why there is no supervisor, in one sentence; empty if there is one."""
 
     @property
-    def explanation(self) -> "EmptyExplanation | None":
-        """Explanation of what is to blame if no supervisor exists."""
+    def explanation(self) -> "EmptyExplanation | GoalExplanation | None":
+        """Explanation of what is to blame if no supervisor exists, or goals cannot be reached."""
 
 
 class Outcome(Reasons, Protocol):
@@ -193,34 +193,27 @@ def report_problems(outcome: Outcome, bundle: Bundle) -> None:
 
 def report_reasons(outcome: Reasons, bundle: Bundle) -> None:
     """Write the reason why there is no supervisor to standard error, if there is none."""
-    from robosc.explanation import empty_text
-
     if outcome.reason:
         sys.stderr.write(f"{bundle.main.name}: {outcome.reason}\n")
     if outcome.explanation is not None:
-        sys.stderr.write(empty_text(outcome.explanation))
-    goals = goals_explained(outcome)
-    if goals is not None:
-        sys.stderr.write(f"{goals}\n")
-        if goals.counter is not None:
-            sys.stderr.write(
-                "'robosc simulate' and 'robosc view' with '--counter-strategy' play the surroundings, against you\n"
-            )
+        sys.stderr.write(why_text(outcome.explanation))
 
 
-def goals_explained(outcome: Reasons) -> "GoalExplanation | None":
-    """Return the explanation why goals cannot be reached; None if that is not the reason, or a server's answer."""
-    found: GoalExplanation | None = getattr(outcome, "goals", None)
-    return found
+def why_text(explanation: "EmptyExplanation | GoalExplanation") -> str:
+    """Return the text on why there is no supervisor, and how a person can play against the surroundings."""
+    from robosc.explanation import EmptyExplanation, empty_text
+
+    if isinstance(explanation, EmptyExplanation):
+        return empty_text(explanation)
+    hint = "'robosc simulate' and 'robosc view' with '--counter-strategy' play the surroundings, against you\n"
+    return f"{explanation}\n{hint if explanation.has_counter_strategy else ''}"
 
 
 def reasons_json(outcome: Reasons) -> dict[str, object]:
     """Return the reason why there is no supervisor, as JSON values."""
-    from robosc.explanation import document
+    from robosc.explanation import EmptyExplanation, document
 
-    goals = goals_explained(outcome)
-    return {
-        "reason": outcome.reason,
-        "explanation": document(outcome.explanation) if outcome.explanation else None,
-        **({} if goals is None else {"goals": goals.document()}),
-    }
+    why = outcome.explanation
+    if why is None or isinstance(why, EmptyExplanation):
+        return {"reason": outcome.reason, "explanation": None if why is None else document(why)}
+    return {"reason": outcome.reason, "explanation": None, "goals": why.document()}

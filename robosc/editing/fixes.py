@@ -1,7 +1,7 @@
 """Fixes that an editor can apply automatically: the same ones that findings describe in words."""
 
 import re
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 from robosc.errors import Diagnostic, LanguageError
@@ -15,6 +15,7 @@ _NODE = re.compile(
     r"(?:Write '(?P<meant>.+?)'(?P<elsewhere> in the robot(?:, and '(?P<here>.+?)')?)? instead of|Remove) "
     r"'(?P<written>.+)'\."
 )
+_ASSUMED = re.compile(r"'(assume [^']+)'")
 _BEFORE = re.compile(r"Write '([^']+)' before it\b")
 _WORDS = {"&": "and", "|": "or"}
 _LONGEST_TITLE = 60
@@ -63,6 +64,10 @@ def _laid_out(text: str, indent: str) -> str:
     return f"\n{indent}".join(line.removeprefix("    " * around) for line in lines)
 
 
+def _shortened(text: str) -> str:
+    return text if len(text) <= _LONGEST_TITLE else f"{text[:_LONGEST_TITLE]}..."
+
+
 class _Line:
     """The line of a finding: what it covers there, and what stands before it."""
 
@@ -105,6 +110,8 @@ class _Line:
                     yield from self._changed("Remove 'initial'", head.start(), head.end(), "")
             case "type-mismatch":
                 yield from self._types(found.fix)
+            case "unreachable-goal":
+                yield from self._assumptions(_ASSUMED.findall(found.fix))
             case "syntax-error":
                 yield from self._syntax(found.fix)
             case code if code.startswith("duplicate-"):
@@ -143,7 +150,7 @@ class _Line:
         length = _length(written, behind)
         if length is None:
             return
-        title = f"Write '{meant if len(meant) <= _LONGEST_TITLE else meant[:_LONGEST_TITLE] + '...'}'"
+        title = f"Write '{_shortened(meant)}'"
         place = Location(self._location.file, self._location.line, self._location.column, length)
         if here is None:
             indent = self._line[: len(self._line) - len(self._line.lstrip())]
@@ -151,11 +158,29 @@ class _Line:
             return
         end = behind.rfind("}")
         if end >= length:
-            before = f"{self._before}{behind[:end]}"
-            line, column = before.count("\n"), len(before) - before.rfind("\n") - 1
-            closing = Location(place.file, place.line + line, column + 1, 1)
             more = f"    {_laid_out(meant, '    ')}\n}}"
-            yield Fix(f"{title} in the robot", place, here, ((closing, more),))
+            yield Fix(f"{title} in the robot", place, here, ((self._place_behind(behind[:end]), more),))
+
+    def _assumptions(self, assumptions: Sequence[str]) -> Iterator[Fix]:
+        """Assumptions at the end of the robot, since a visit is in the middle of a mission."""
+        behind = f"{self._line[self._begin :]}\n{self._rest()}"
+        ends = [
+            start for token, kind, start in zip(*tokenize(behind), strict=True) if (token, kind) == ("}", Kind.SIGN)
+        ]
+        if not assumptions or not ends:
+            return
+        before = f"{self._before}{behind[: ends[-1]]}"
+        start = "\n" if before[before.rfind("\n") + 1 :].strip() else ""
+        lines = "".join(f"    {item}\n" for item in assumptions)
+        yield Fix(
+            f"Write '{_shortened(' '.join(assumptions))}'", self._place_behind(behind[: ends[-1]]), f"{start}{lines}}}"
+        )
+
+    def _place_behind(self, text: str) -> Location:
+        """Return the place of the character behind a text that begins at the place of the finding."""
+        before = f"{self._before}{text}"
+        line, column = before.count("\n"), len(before) - before.rfind("\n") - 1
+        return Location(self._location.file, self._location.line + line, column + 1, 1)
 
     def _directions(self, fix: str) -> Iterator[Fix]:
         right = re.match(r"Write '(incoming|outgoing) message'", fix)

@@ -51,18 +51,21 @@ class CounterRun(Run):
         explanation: Explanation why the goals of a model cannot be reached: the `explanation` of its synthesis.
 
     Raises:
-        NoCounterStrategyError: The counter-strategy is too large.
+        NoCounterStrategyError: The counter-strategy is too large, or a server has sent the explanation.
     """
 
     def __init__(self, explanation: GoalExplanation) -> None:
+        supervisor = explanation.supervisor
+        if supervisor is None:
+            raise NoCounterStrategyError("a server sends no counter-strategy: synthesize the model on this machine")
         if explanation.counter is None:
             raise NoCounterStrategyError("the counter-strategy of the surroundings is too large to be played")
         self._explanation = explanation
-        executable = explanation.supervisor.executable
+        executable = supervisor.executable
         owed, system = executable.obligations, executable.remembering_automata
         self._player = CounterPlayer.of(system, owed, explanation.counter)
         self._semantics = Semantics(executable.executed_automata)
-        self._controller = Controller(executable, explanation.supervisor.added)
+        self._controller = Controller(executable, supervisor.added)
         self._batches = executable.batches
         self._inputs = executable.executed_automata.inputs
         # The interpreter knows no automata with one location, such as those of messages.
@@ -84,8 +87,8 @@ class CounterRun(Run):
         self._came: tuple[int, ...] = (0,) * len(owed.assumptions)
         self._is_within = False
         self._is_answering = False
-        super().__init__(explanation.supervisor)
-        self._random_data = RandomData(explanation.supervisor.model)
+        super().__init__(supervisor)
+        self._random_data = RandomData(supervisor.model)
         self._answer()
 
     # Views
@@ -105,6 +108,11 @@ class CounterRun(Run):
         """Name of the goal or visit that the surroundings deny now, `goal 1`; None where silent steps do not end."""
         aim = self._player.denied(self._whole)
         return None if aim is None else self._aims[aim].name
+
+    @property
+    def denied_next(self) -> tuple[str, ...]:
+        """Names of the goals and visits one of which they deny instead if that one comes true; else it never does."""
+        return tuple(self._aims[aim].name for aim in self._player.denied_next(self._whole))
 
     @property
     def missions(self) -> tuple[MissionProgress, ...]:

@@ -4,11 +4,13 @@ from dataclasses import dataclass, replace
 from typing import overload
 
 from robosc.automata import System, check_system
-from robosc.certification import Progress, SynthesisOutcome, SynthesisProblem, prepare
+from robosc.certification import OutcomeStatus, Progress, SynthesisOutcome, SynthesisProblem, make_supervisor, prepare
+from robosc.certification.goals import GoalExplanation
 from robosc.certification.progress import OnProgress, ShouldStop, ignored, never
 from robosc.diagnostics import Page, page
 from robosc.errors import Diagnostic, UnsupportedModelError
 from robosc.explanation import (
+    EmptyExplanation,
     Explanation,
     ModelWords,
     SystemWords,
@@ -22,6 +24,7 @@ from robosc.pipeline.options import DEFAULT_OPTIONS, SynthesisOptions
 from robosc.pipeline.results import Explained, NoSupervisor, SynthesisStatus
 from robosc.pipeline.synthesis import Unsupported, findings_of
 from robosc.source import Bundle
+from robosc.strategies import goals_and_missions
 from robosc.synthesis import EngineOptions
 
 
@@ -58,6 +61,8 @@ def explain(
     should_stop: ShouldStop = never,
 ) -> Explained | Page:
     """Explain the effect of synthesis on a model (restrictions of events, or the parts to blame), or explain a finding.
+
+    Of a model whose goals or missions cannot be reached, that is explained, unless an event, a state or a run is given.
 
     Args:
         model: The model, as `load` returns it, the path of one, or a `robosc.automata.System`; or a finding, whose code
@@ -102,13 +107,17 @@ def explain(
         return Explained(
             SynthesisStatus.UNSUPPORTED_MODEL, diagnostics, attempt.reason, NoSupervisor(attempt.reason, diagnostics)
         )
+    return result_of(found, bundle)
+
+
+def result_of(found: SynthesisOutcome | tuple[SynthesisProblem, Explanation], bundle: Bundle) -> Explained:
+    """Return what `explained` has found, as the result of an explanation."""
     if isinstance(found, SynthesisOutcome):
-        diagnostics = Findings(found.diagnostics, bundle)
-        return Explained(
-            SynthesisStatus.MODEL_ERRORS, diagnostics, found.reason, NoSupervisor(found.reason, diagnostics)
-        )
-    problem, explanation = found
-    return Explained(_status(explanation), Findings(problem.diagnostics, bundle), "", explanation)
+        diagnostics, why = Findings(found.diagnostics, bundle), found.explanation
+        explanation = why if isinstance(why, GoalExplanation) else NoSupervisor(found.reason, diagnostics)
+        return Explained(SynthesisStatus.MODEL_ERRORS, diagnostics, found.reason, explanation)
+    problem, whole = found
+    return Explained(_status(whole), Findings(problem.diagnostics, bundle), "", whole)
 
 
 def _status(explanation: Explanation) -> SynthesisStatus:
@@ -138,10 +147,29 @@ def explained(
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> SynthesisOutcome | tuple[SynthesisProblem, Explanation]:
-    """Return the synthesis problem with an explanation, or the outcome of an attempt that ended before synthesis."""
+    """Return the synthesis problem with an explanation, or the outcome of an attempt without a supervisor to explain.
+
+    An attempt ends before synthesis if the model has errors, and after it if goals are not reached; the latter matters
+    only where nothing in particular is asked.
+    """
     problem = prepare(bundle, deployment)
     if isinstance(problem, SynthesisOutcome):
         return problem
+    has_goals = deployment is Deployment.CONTROLLER and goals_and_missions(problem.model)
+    if has_goals and asked == ExplanationSubject():
+        made = make_supervisor(
+            bundle,
+            deployment=deployment,
+            engine=engine,
+            verify_limit=0,
+            allow_livelock=True,
+            should_stop=should_stop,
+            on_progress=on_progress,
+        )
+        if made.status is OutcomeStatus.MODEL_ERRORS:
+            return made
+        if isinstance(made.explanation, EmptyExplanation):
+            return problem, Explanation(made.explanation)
     words = ModelWords(problem.model, problem.places, problem.system.automata, deployment)
     return problem, _explanation(words, engine, asked, on_progress, should_stop)
 

@@ -47,10 +47,15 @@ class MissionProgress:
     detours: tuple[DetourProgress, ...]
 
     def __str__(self) -> str:
+        return f"{self.name}: {self.words}"
+
+    @property
+    def words(self) -> str:
+        """Progress in words, without the name of the mission."""
         if not self.is_asked:
-            return f"{self.name}: not asked for"
+            return "not asked for"
         own = "every visit is true" if self.is_round else f"at visit {self.visit}, {self.condition}"
-        return "; ".join([f"{self.name}: {own}", *map(str, self.detours)])
+        return "; ".join([own, *map(str, self.detours)])
 
 
 def progress(mission: Mission, place: MissionPlace) -> MissionProgress:

@@ -169,7 +169,7 @@ class Generation(Outcome):
         diagnostics: Every finding about the model, sorted by place.
         reason: Reason why there are no files, in one sentence; empty if there are files.
         files: The files, or None.
-        explanation: Explanation of why no supervisor exists, or None.
+        explanation: Explanation of why no supervisor exists or goals cannot be reached, or None.
         target: The requested target; empty if it is not known.
     """
 
@@ -177,7 +177,7 @@ class Generation(Outcome):
     diagnostics: tuple[Diagnostic, ...]
     reason: str
     files: "GeneratedFiles | None"
-    explanation: "EmptyExplanation | None" = None
+    explanation: "EmptyExplanation | GoalExplanation | None" = None
     target: str = ""
 
     def write(self, folder: FileName, *, force: bool = False) -> "Written":
@@ -208,14 +208,16 @@ class Explained(Outcome):
     Attributes:
         status: Outcome of the synthesis.
         diagnostics: Every finding about the model, sorted by place.
-        reason: Reason why there is no explanation, in one sentence; empty if there is one.
-        explanation: The explanation; a `NoSupervisor` if the model has errors or is not supported.
+        reason: Reason why there is no supervisor to explain, in one sentence; empty if its effects, or a missing
+            supervisor, are explained.
+        explanation: The explanation; a `GoalExplanation` if goals cannot be reached, a `NoSupervisor` if the model has
+            other errors or is not supported.
     """
 
     status: SynthesisStatus
     diagnostics: Findings
     reason: str
-    explanation: "Explanation | NoSupervisor"
+    explanation: "Explanation | GoalExplanation | NoSupervisor"
 
     def _product(self) -> object:
         return None if isinstance(self.explanation, NoSupervisor) else self.explanation

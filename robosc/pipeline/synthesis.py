@@ -179,10 +179,8 @@ def status_of(attempt: Attempt) -> tuple[SynthesisStatus, str]:
 
 def why_not(attempt: Attempt, diagnostics: Findings) -> EmptyExplanation | GoalExplanation | NoSupervisor:
     """Return the explanation of why an attempted synthesis has no supervisor."""
-    if isinstance(attempt, SynthesisOutcome):
-        found = attempt.explanation or attempt.goals
-        if found is not None:
-            return found
+    if isinstance(attempt, SynthesisOutcome) and attempt.explanation is not None:
+        return attempt.explanation
     _, reason = status_of(attempt)
     return NoSupervisor(reason, diagnostics)
 

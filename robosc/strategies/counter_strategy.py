@@ -188,6 +188,16 @@ class CounterPlayer:
         stage = self.stage(state)
         return None if stage is None else self._stages[stage].goal
 
+    def denied_next(self, state: State) -> tuple[int, ...]:
+        """Return the numbers of the goals one of which is denied from then on if the one that is denied comes true.
+
+        Only in a position of the first stage the goal is denied for ever, whatever the controller does; from any other
+        the controller can get to a stage before. None where all of these deny the same goal.
+        """
+        before = reversed(self._stages[: self.stage(state) or 0])
+        goals = tuple(dict.fromkeys(item.goal for item in before))
+        return () if set(goals) == {self.denied(state)} else goals
+
     def rank(self, state: State, aim: int) -> Rank | None:
         """Return the rank of a position, or None if the counter-strategy does not know the position.
 

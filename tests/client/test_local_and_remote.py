@@ -20,8 +20,34 @@ from support.service import served
 
 NAVIGATION = EXAMPLES / "navigation" / "navigation.rscd"
 WRONG = "robot R { component C { outgoing message m with type: nothing } }"
+DENIED = """robot Courier {
+    component Door {
+        outgoing message opened with type: none
+        outgoing message people with type: integer(0..3)
+        behaviour {
+            variable people: integer(0..3) = 2
+            variable is_seen: boolean
+            on response from people do people := value, is_seen := true
+            initial marked state shut { on response from opened goto ajar }
+            marked state ajar { }
+        }
+    }
+    component Base {
+        incoming message enter with type: none
+        incoming message leave with type: none
+        behaviour {
+            initial marked state outside { on request to enter goto inside }
+            marked state inside { on request to leave goto outside }
+        }
+    }
+    requirement enter needs Door.ajar
+    requirement leave needs Door.people < 2 and Door.is_seen
+    AIMS
+}"""
 TEXTS = {
     "navigation": NAVIGATION.read_text(encoding="utf-8"),
+    "denied": DENIED.replace("AIMS", "mission delivery { visit Base.inside then Base.outside }"),
+    "hopeless": DENIED.replace("AIMS", "requirement always Base.outside goal once Base.inside"),
     "empty": EMPTY,
     "wrong": WRONG,
     "unsupported": UNSUPPORTED,
@@ -46,6 +72,7 @@ def require_alike(local: Any, remote: Any, *, is_made: bool) -> None:
     assert (local.reason, tuple(local.diagnostics)) == (remote.reason, tuple(remote.diagnostics))
     explanation = None if isinstance(local.explanation, robosc.NoSupervisor) else local.explanation
     assert explanation == remote.explanation
+    assert str(explanation) == str(remote.explanation)
     assert is_made == (local.status is robosc.SynthesisStatus.SUPERVISOR)
     for result in (local, remote):
         assert "\n" not in repr(result)
@@ -131,6 +158,25 @@ def test_explain(client: Client, model: robosc.LoadedModel) -> None:
             continue
         assert client.explain(model, **question) == local
         assert str(client.explain(model, **question)) == str(local)
+
+
+def test_goals_that_cannot_be_reached(client: Client) -> None:
+    hopeless = client.synthesize(robosc.load(text=TEXTS["hopeless"], name="hopeless.rscd")).explanation
+    assert isinstance(hopeless, robosc.GoalExplanation) and hopeless.nearest is not None
+    # Values of each kind come as they were.
+    assert {name: type(value) for name, value in hopeless.nearest.state.items()} == {
+        **dict.fromkeys(("Door", "Base"), str),
+        "Door.people": int,
+        "Door.is_seen": bool,
+    }
+    local = robosc.synthesize(robosc.load(text=TEXTS["denied"], name="denied.rscd")).explanation
+    remote = client.explain(robosc.load(text=TEXTS["denied"], name="denied.rscd")).explanation
+    assert isinstance(local, robosc.GoalExplanation) and isinstance(remote, robosc.GoalExplanation)
+    assert local == remote and local.document() == remote.document()
+    assert remote.has_counter_strategy
+    assert [item.text for item in remote.blamed] == ["requirement enter needs Door.ajar"]
+    with pytest.raises(robosc.NoCounterStrategyError, match="on this machine"):
+        robosc.CounterRun(remote)
 
 
 def test_generate(client: Client, model: robosc.LoadedModel, tmp_path: Path) -> None:

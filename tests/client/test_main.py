@@ -73,6 +73,25 @@ robot R {
 }
 """
 
+DENIED = """
+robot R {
+    component Door {
+        outgoing message opened with type: none
+        behaviour { initial marked state shut { on response from opened goto ajar } marked state ajar { } }
+    }
+    component Base {
+        incoming message enter with type: none
+        incoming message leave with type: none
+        behaviour {
+            initial marked state outside { on request to enter goto inside }
+            marked state inside { on request to leave goto outside }
+        }
+    }
+    requirement enter needs Door.ajar
+    mission delivery { visit Base.inside then Base.outside }
+}
+"""
+
 LIVELOCK = """
 robot R {
     component C { behaviour { initial marked state a { transition goto b } state b { transition goto a } } }
@@ -232,6 +251,19 @@ class TestSameAsHere:
     def test_check_that_does_not_synthesize(self, both: Both, how: Any) -> None:
         assert both("check", EXAMPLES[0], *how).status == 2
 
+    @pytest.mark.parametrize(
+        "command", [["synth"], ["check", "--synthesize"], ["explore"], ["generate", "--target", "c99", "-o", "out"]]
+    )
+    def test_goals_that_cannot_be_reached(self, both: Both, tmp_path: Path, command: Any) -> None:
+        model = write(tmp_path, DENIED)
+        found = both(command[0], model, *command[1:])
+        assert found.status == 1
+        assert "  assume Door.shut leads to Door.ajar\n" in found.errors
+        assert "'--counter-strategy' play the surroundings" in found.errors
+        document = json.loads(both(command[0], model, *command[1:], "--json").output)
+        assert document["goals"]["blamed"][0]["text"] == "requirement enter needs Door.ajar"
+        assert document["explanation"] is None
+
     @pytest.mark.parametrize("states", [0, 5, 200_000])
     def test_verify_limit(self, both: Both, states: int) -> None:
         found = both("synth", NAVIGATION, "--verify-limit", states, "-o", "robot.rsup")
@@ -270,7 +302,7 @@ class TestSameAsHere:
         model = next(path for path in EXAMPLES if path.stem == name)
         assert both("explain-synthesis", model, *how).status == status
 
-    @pytest.mark.parametrize("text", ["robot R {", "library L { }", EMPTY, UNSUPPORTED])
+    @pytest.mark.parametrize("text", ["robot R {", "library L { }", EMPTY, DENIED, UNSUPPORTED])
     @pytest.mark.parametrize("how", [[], ["--json"]])
     def test_explain_synthesis_without_a_supervisor(self, both: Both, tmp_path: Path, text: str, how: Any) -> None:
         assert both("explain-synthesis", write(tmp_path, text), *how).status == 1
@@ -337,14 +369,14 @@ class TestSameAsHere:
         write(library, LIBRARY, "parts.rscd")
         assert both("synth", write(model, WITH_LIBRARY), "-L", library, "-o", "robot.rsup").status == 0
 
-    @pytest.mark.parametrize("text", [ERRONEOUS, EMPTY, "robot R {", "robot", "", "x\0", LIBRARY])
+    @pytest.mark.parametrize("text", [ERRONEOUS, EMPTY, DENIED, "robot R {", "robot", "", "x\0", LIBRARY])
     @pytest.mark.parametrize(
         "command",
         [["check"], ["synth", "-o", "robot.rsup"], ["synth", "--json"], ["generate", "--target", "ros2", "-o", "out"]],
     )
     def test_trouble(self, both: Both, tmp_path: Path, text: str, command: Any) -> None:
         found = both(command[0], write(tmp_path, text), *command[1:])
-        assert found.status == (0 if command == ["check"] and text in (EMPTY, LIBRARY) else 1)
+        assert found.status == (0 if command == ["check"] and text in (EMPTY, DENIED, LIBRARY) else 1)
         assert found.files == {}
         assert "Traceback" not in found.output + found.errors
 

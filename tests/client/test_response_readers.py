@@ -324,6 +324,61 @@ class TestExplanation:
         refused(ExplanationReader(automata), [explanation()], "another language")
 
 
+def goals(**fields: Any) -> pb.GoalExplanation:
+    part = pb.ModelPart(kind="goal", text="goal once Base.inside", location=pb.Location(file="r.rscd", line=1))
+    nearest = pb.NearestState(
+        goal="goal once Base.inside",
+        events=["open.request"],
+        state=[pb.PartValue(name="Door", text="shut"), pb.PartValue(name="Door.x", number=0.5)],
+        missing=["enter.request"],
+    )
+    return pb.GoalExplanation(**{"goals": [part], "is_hopeless": True, "nearest": nearest, **fields})
+
+
+class TestGoals:
+    def test_result(self) -> None:
+        found = assembled(SynthesisReader(), [synthesis(status=pb.SYNTHESIS_STATUS_MODEL_ERRORS, goals=goals())])
+        assert isinstance(found.explanation, robosc.GoalExplanation)
+        assert found.explanation.nearest is not None
+        assert found.explanation.nearest.state == {"Door": "shut", "Door.x": 0.5}
+        assert found.explanation.supervisor is None
+
+    def test_hostile_words_are_harmless_on_a_terminal(self) -> None:
+        hostile = goals(goals=[pb.ModelPart(text="\x1b]0;title\x07")], helpful=["\x1b[2J"])
+        found = assembled(SynthesisReader(), [synthesis(status=pb.SYNTHESIS_STATUS_MODEL_ERRORS, goals=hostile)])
+        assert all(line.isprintable() for line in str(found.explanation).splitlines())
+
+    @pytest.mark.parametrize(
+        ("message", "words"),
+        [
+            (goals(goals=[]), "no goals"),
+            (goals(nearest=pb.NearestState(goal="goal")), "not allowed"),
+            (goals(nearest=pb.NearestState(is_reached=True, state=[pb.PartValue(name="x")])), "no value"),
+            (goals(goals=[pb.ModelPart()] * 100_001), "parts of an explanation"),
+            (goals(blamed=[pb.ModelPart()] * 100_001), "parts of an explanation"),
+            (goals(helpful=[""] * 100_001), "parts of an explanation"),
+            (goals(nearest=pb.NearestState(events=[""] * 100_001)), "parts of an explanation"),
+            (goals(nearest=pb.NearestState(state=[pb.PartValue()] * 100_001)), "parts of an explanation"),
+            (goals(nearest=pb.NearestState(missing=[""] * 100_001)), "parts of an explanation"),
+        ],
+    )
+    def test_refused(self, message: pb.GoalExplanation, words: str) -> None:
+        refused(SynthesisReader(), [synthesis(status=pb.SYNTHESIS_STATUS_MODEL_ERRORS, goals=message)], words)
+        result = pb.ExplanationResult(status=pb.EXPLANATION_STATUS_MODEL_ERRORS, goals=message)
+        refused(ExplanationReader(), [pb.ExplainResponse(result=result)], words)
+
+    def test_of_another_status_or_language(self) -> None:
+        refused(SynthesisReader(), [synthesis(goals=goals())], "contradicts")
+        both = synthesis(status=pb.SYNTHESIS_STATUS_MODEL_ERRORS, goals=goals(), explanation="{}")
+        refused(SynthesisReader(), [both], "contradicts")
+        for fields in ({"status": pb.EXPLANATION_STATUS_EMPTY}, {"explanation": "{}"}):
+            chosen: dict[str, Any] = {"status": pb.EXPLANATION_STATUS_MODEL_ERRORS, "goals": goals(), **fields}
+            refused(ExplanationReader(), [pb.ExplainResponse(result=pb.ExplanationResult(**chosen))], "contradicts")
+        automata = robosc.load(text="plant p: location: initial; marked; end", name="p.cif")
+        result = pb.ExplanationResult(status=pb.EXPLANATION_STATUS_MODEL_ERRORS, goals=goals())
+        refused(ExplanationReader(automata), [pb.ExplainResponse(result=result)], "another language")
+
+
 class TestOthers:
     def test_verification(self) -> None:
         found = assembled(VerificationReader(), [verification()])

@@ -185,6 +185,41 @@ def test_that_there_is_no_supervisor_is_reported_at_the_robot(tmp_path: Path) ->
         assert lens.command.title == "no supervisor"
 
 
+DENIED = """robot Courier {
+    component Door {
+        outgoing message opened with type: none
+        behaviour { initial marked state shut { on response from opened goto ajar } marked state ajar { } }
+    }
+    component Base {
+        incoming message enter with type: none
+        behaviour { initial marked state outside { on request to enter goto inside } marked state inside { } }
+    }
+    requirement enter needs Door.ajar
+    mission delivery {
+        visit Base.outside or Base.inside
+        then Base.inside
+    }
+}
+"""
+
+
+def test_a_mission_that_cannot_be_made_is_reported_with_what_is_to_blame_and_what_helps(tmp_path: Path) -> None:
+    with Editor(tmp_path) as editor:
+        editor.open("courier.rscd", DENIED)
+        found = editor.findings("courier.rscd", lambda found: any(item.code == "unreachable-goal" for item in found))
+        shown = next(item for item in found if item.code == "unreachable-goal")
+        assert part_of(DENIED, shown.range) == "Base.inside"
+        assert shown.related_information is not None
+        (blamed,) = shown.related_information
+        assert blamed.message == "this requirement is to blame"
+        assert part_of(DENIED, blamed.location.range) == "requirement"
+        (action,) = everywhere(editor, "courier.rscd")
+        assert action.title == "Write 'assume Door.shut leads to Door.ajar'"
+        assert action.edit is not None and action.edit.changes is not None
+        text = with_edits(DENIED, action.edit.changes[editor.uri("courier.rscd")])
+        assert text.endswith("    }\n    assume Door.shut leads to Door.ajar\n}\n")
+
+
 def test_without_synthesis_there_are_the_findings_of_the_checks(tmp_path: Path) -> None:
     with Editor(tmp_path, "--synthesis-seconds", "0") as editor:
         editor.open("trap.rscd", TRAP)

@@ -230,11 +230,12 @@ export function startPlay(send, token) {
         mark(button, "title", run[type]);
       }
       if (run.opposition) {
-        const { goals, denied, assumptions } = run.opposition;
+        const { goals, denied, denied_next: next, assumptions } = run.opposition;
         const kept = assumptions.map((times, i) => `assumption ${i + 1} came true ${count(times, "time", "times")}`);
-        const what = denied === null ? "Silent steps do not end." : `The surroundings deny ${denied}, whatever you do.`;
+        const limit = next.length > 0 ? `; if it comes true, ${next.join(" or ")}.` : ", whatever you do.";
+        const what = denied === null ? "Silent steps do not end." : `The surroundings deny ${denied}${limit}`;
         say(byId("play-denied"), kept.length > 0 ? `${what} They keep to what is assumed: ${kept.join(", ")}.` : what);
-        byId("play-goals").querySelectorAll(".play-goal").forEach((place, i) => say(place, goals[i] ? "true" : "not yet"));
+        byId("play-goals").querySelectorAll(".play-goal").forEach((place, i) => say(place, goals[i]));
       }
       say(byId("play-count"), `${count(run.steps, "event", "events")}${run.is_marked ? " · marked" : ""}`);
     },

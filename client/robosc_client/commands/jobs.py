@@ -9,6 +9,7 @@ from enum import StrEnum
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from robosc.certification.goals import GoalExplanation
 from robosc.cli import automata
 from robosc.cli.arguments import (
     MAXIMUM_LIMIT,
@@ -549,8 +550,12 @@ def result_json(found: TaskResult) -> dict[str, Any]:
         case Formatted():
             return {"text": found.text, **diagnostics_json(found.diagnostics)}
         case Explained():
-            explanation = None if isinstance(found.explanation, NoSupervisor) else document(found.explanation)
-            summary = {"status": str(found.status), "reason": found.reason, "explanation": explanation}
+            why = found.explanation
+            summary: dict[str, Any] = {"status": str(found.status), "reason": found.reason, "explanation": None}
+            if isinstance(why, GoalExplanation):
+                summary["goals"] = why.document()
+            elif not isinstance(why, NoSupervisor):
+                summary["explanation"] = document(why)
             return {**summary, **diagnostics_json(found.diagnostics)}
     result = {"status": str(found.status), **reasons_json(found), **diagnostics_json(found.diagnostics)}
     match found:

@@ -2,8 +2,11 @@
 
 from collections.abc import Sequence
 
+from robosc.certification.goals import GoalExplanation, NearestPlace
 from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.explanation import EmptyExplanation, Explanation, from_text, whole_from_text
+from robosc.explanation.parts import Part
+from robosc.expressions import Value
 from robosc.pipeline.findings import Findings
 from robosc.source import Bundle, Location, visible
 from robosc.targets import TargetInfo
@@ -140,6 +143,68 @@ def explanation_of(text: str) -> EmptyExplanation | None:
         return from_text(text) if text else None
     except ValueError as error:
         raise malformed(str(error)) from error
+
+
+def reasons_of(
+    status: SynthesisStatus, message: pb.SynthesisResult | pb.GenerationResult | pb.ExplorationResult
+) -> EmptyExplanation | GoalExplanation | None:
+    """Return the explanation of why there is no supervisor, or None if there is none.
+
+    Raises:
+        ServiceError: It is invalid, or does not belong to the status.
+    """
+    if not message.HasField("goals"):
+        return explanation_of(message.explanation)
+    if status is not SynthesisStatus.MODEL_ERRORS or message.explanation:
+        raise malformed("its status contradicts its explanation")
+    return goal_explanation_of(message.goals)
+
+
+def goal_explanation_of(message: pb.GoalExplanation) -> GoalExplanation:
+    """Return the explanation of why goals cannot be reached.
+
+    Raises:
+        ServiceError: It explains nothing, or has too many parts.
+    """
+    nearest = message.nearest
+    for items in (message.goals, message.blamed, message.helpful, nearest.events, nearest.state, nearest.missing):
+        require_at_most(MAXIMUM_ITEMS, len(items), "parts of an explanation")
+    if not message.goals:
+        raise malformed("an explanation has no goals")
+    return GoalExplanation(
+        goals=tuple(map(_part, message.goals)),
+        is_hopeless=message.is_hopeless,
+        blamed=tuple(map(_part, message.blamed)),
+        is_minimal=message.is_minimal,
+        helpful=tuple(message.helpful),
+        nearest=_nearest(nearest) if message.HasField("nearest") else None,
+        has_counter_strategy=message.has_counter_strategy,
+    )
+
+
+def _nearest(message: pb.NearestState) -> NearestPlace:
+    if not (message.is_reached or message.missing):
+        raise malformed("an explanation does not say what is not allowed")
+    return NearestPlace(
+        message.goal,
+        message.is_reached,
+        message.has_others,
+        tuple(message.events),
+        {item.name: _value(item) for item in message.state},
+        tuple(message.missing),
+    )
+
+
+def _value(message: pb.PartValue) -> Value:
+    kind = message.WhichOneof("value")
+    if kind is None:
+        raise malformed("a part of a state has no value")
+    value: Value = getattr(message, kind)
+    return value
+
+
+def _part(message: pb.ModelPart) -> Part:
+    return Part(message.kind, message.text, _location(message.location) if message.HasField("location") else None)
 
 
 def summary_of(message: pb.Summary) -> Summary:

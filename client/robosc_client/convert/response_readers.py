@@ -21,9 +21,10 @@ from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client.convert.response_fields import (
     diagnostics_of,
-    explanation_of,
     explanation_status_of,
+    goal_explanation_of,
     progress_of,
+    reasons_of,
     statistics_of,
     status_of,
     summary_of,
@@ -157,7 +158,7 @@ class SynthesisReader(_StreamReader):
             supervisor=message.supervisor,
             summary=summary_of(message.summary) if message.HasField("summary") else None,
             statistics=statistics_of(message.statistics) if message.HasField("statistics") else None,
-            explanation=explanation_of(message.explanation),
+            explanation=reasons_of(status, message),
             signature=message.signature,
         )
 
@@ -235,7 +236,7 @@ class GenerationReader(_StreamReader):
             diagnostics_of(head.diagnostics),
             head.reason,
             files,
-            explanation_of(head.explanation),
+            reasons_of(self._status, head),
             self._target,
         )
 
@@ -302,7 +303,7 @@ class ExplorationReader(_StreamReader):
             diagnostics_of(head.diagnostics),
             head.reason,
             self._graph() if head.size else None,
-            explanation_of(head.explanation),
+            reasons_of(self._status, head),
         )
 
     def _graph(self) -> StateGraph:
@@ -359,6 +360,13 @@ class ExplanationReader(_StreamReader):
         if status is None:
             return
         diagnostics = diagnostics_of(message.diagnostics, self._bundle)
+        if message.HasField("goals"):
+            if status is not SynthesisStatus.MODEL_ERRORS or message.explanation:
+                raise malformed("its status contradicts its explanation")
+            if isinstance(self._bundle, LoadedAutomata):
+                raise malformed("the explanation is of a model in another language")
+            self._found = Explained(status, diagnostics, self._problem, goal_explanation_of(message.goals))
+            return
         if status not in (SynthesisStatus.SUPERVISOR, SynthesisStatus.EMPTY):
             if message.explanation:
                 raise malformed("its status contradicts its explanation")

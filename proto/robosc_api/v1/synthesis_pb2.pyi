@@ -198,7 +198,7 @@ class Progress(_message.Message):
     def __init__(self, stage: _Optional[str] = ..., message: _Optional[str] = ...) -> None: ...
 
 class SynthesisResult(_message.Message):
-    __slots__ = ("status", "diagnostics", "supervisor", "reason", "summary", "statistics", "explanation", "supervisor_digest", "signature")
+    __slots__ = ("status", "diagnostics", "supervisor", "reason", "summary", "statistics", "explanation", "supervisor_digest", "signature", "goals")
     STATUS_FIELD_NUMBER: _ClassVar[int]
     DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
     SUPERVISOR_FIELD_NUMBER: _ClassVar[int]
@@ -208,6 +208,7 @@ class SynthesisResult(_message.Message):
     EXPLANATION_FIELD_NUMBER: _ClassVar[int]
     SUPERVISOR_DIGEST_FIELD_NUMBER: _ClassVar[int]
     SIGNATURE_FIELD_NUMBER: _ClassVar[int]
+    GOALS_FIELD_NUMBER: _ClassVar[int]
     status: SynthesisStatus
     diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
     supervisor: bytes
@@ -217,7 +218,66 @@ class SynthesisResult(_message.Message):
     explanation: str
     supervisor_digest: bytes
     signature: bytes
-    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., supervisor: _Optional[bytes] = ..., reason: _Optional[str] = ..., summary: _Optional[_Union[Summary, _Mapping]] = ..., statistics: _Optional[_Union[Statistics, _Mapping]] = ..., explanation: _Optional[str] = ..., supervisor_digest: _Optional[bytes] = ..., signature: _Optional[bytes] = ...) -> None: ...
+    goals: GoalExplanation
+    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., supervisor: _Optional[bytes] = ..., reason: _Optional[str] = ..., summary: _Optional[_Union[Summary, _Mapping]] = ..., statistics: _Optional[_Union[Statistics, _Mapping]] = ..., explanation: _Optional[str] = ..., supervisor_digest: _Optional[bytes] = ..., signature: _Optional[bytes] = ..., goals: _Optional[_Union[GoalExplanation, _Mapping]] = ...) -> None: ...
+
+class GoalExplanation(_message.Message):
+    __slots__ = ("goals", "is_hopeless", "blamed", "is_minimal", "helpful", "nearest", "has_counter_strategy")
+    GOALS_FIELD_NUMBER: _ClassVar[int]
+    IS_HOPELESS_FIELD_NUMBER: _ClassVar[int]
+    BLAMED_FIELD_NUMBER: _ClassVar[int]
+    IS_MINIMAL_FIELD_NUMBER: _ClassVar[int]
+    HELPFUL_FIELD_NUMBER: _ClassVar[int]
+    NEAREST_FIELD_NUMBER: _ClassVar[int]
+    HAS_COUNTER_STRATEGY_FIELD_NUMBER: _ClassVar[int]
+    goals: _containers.RepeatedCompositeFieldContainer[ModelPart]
+    is_hopeless: bool
+    blamed: _containers.RepeatedCompositeFieldContainer[ModelPart]
+    is_minimal: bool
+    helpful: _containers.RepeatedScalarFieldContainer[str]
+    nearest: NearestState
+    has_counter_strategy: bool
+    def __init__(self, goals: _Optional[_Iterable[_Union[ModelPart, _Mapping]]] = ..., is_hopeless: _Optional[bool] = ..., blamed: _Optional[_Iterable[_Union[ModelPart, _Mapping]]] = ..., is_minimal: _Optional[bool] = ..., helpful: _Optional[_Iterable[str]] = ..., nearest: _Optional[_Union[NearestState, _Mapping]] = ..., has_counter_strategy: _Optional[bool] = ...) -> None: ...
+
+class ModelPart(_message.Message):
+    __slots__ = ("kind", "text", "location")
+    KIND_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    LOCATION_FIELD_NUMBER: _ClassVar[int]
+    kind: str
+    text: str
+    location: Location
+    def __init__(self, kind: _Optional[str] = ..., text: _Optional[str] = ..., location: _Optional[_Union[Location, _Mapping]] = ...) -> None: ...
+
+class NearestState(_message.Message):
+    __slots__ = ("goal", "is_reached", "has_others", "events", "state", "missing")
+    GOAL_FIELD_NUMBER: _ClassVar[int]
+    IS_REACHED_FIELD_NUMBER: _ClassVar[int]
+    HAS_OTHERS_FIELD_NUMBER: _ClassVar[int]
+    EVENTS_FIELD_NUMBER: _ClassVar[int]
+    STATE_FIELD_NUMBER: _ClassVar[int]
+    MISSING_FIELD_NUMBER: _ClassVar[int]
+    goal: str
+    is_reached: bool
+    has_others: bool
+    events: _containers.RepeatedScalarFieldContainer[str]
+    state: _containers.RepeatedCompositeFieldContainer[PartValue]
+    missing: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, goal: _Optional[str] = ..., is_reached: _Optional[bool] = ..., has_others: _Optional[bool] = ..., events: _Optional[_Iterable[str]] = ..., state: _Optional[_Iterable[_Union[PartValue, _Mapping]]] = ..., missing: _Optional[_Iterable[str]] = ...) -> None: ...
+
+class PartValue(_message.Message):
+    __slots__ = ("name", "truth", "integer", "number", "text")
+    NAME_FIELD_NUMBER: _ClassVar[int]
+    TRUTH_FIELD_NUMBER: _ClassVar[int]
+    INTEGER_FIELD_NUMBER: _ClassVar[int]
+    NUMBER_FIELD_NUMBER: _ClassVar[int]
+    TEXT_FIELD_NUMBER: _ClassVar[int]
+    name: str
+    truth: bool
+    integer: int
+    number: float
+    text: str
+    def __init__(self, name: _Optional[str] = ..., truth: _Optional[bool] = ..., integer: _Optional[int] = ..., number: _Optional[float] = ..., text: _Optional[str] = ...) -> None: ...
 
 class Statistics(_message.Message):
     __slots__ = ("engine", "state_bits", "iterations", "peak_nodes")
@@ -334,20 +394,22 @@ class GenerateResponse(_message.Message):
     def __init__(self, progress: _Optional[_Union[Progress, _Mapping]] = ..., result: _Optional[_Union[GenerationResult, _Mapping]] = ..., chunk: _Optional[_Union[FileChunk, _Mapping]] = ...) -> None: ...
 
 class GenerationResult(_message.Message):
-    __slots__ = ("status", "diagnostics", "reason", "files", "explanation", "digest")
+    __slots__ = ("status", "diagnostics", "reason", "files", "explanation", "digest", "goals")
     STATUS_FIELD_NUMBER: _ClassVar[int]
     DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     FILES_FIELD_NUMBER: _ClassVar[int]
     EXPLANATION_FIELD_NUMBER: _ClassVar[int]
     DIGEST_FIELD_NUMBER: _ClassVar[int]
+    GOALS_FIELD_NUMBER: _ClassVar[int]
     status: SynthesisStatus
     diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
     reason: str
     files: _containers.RepeatedCompositeFieldContainer[GeneratedFile]
     explanation: str
     digest: bytes
-    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., files: _Optional[_Iterable[_Union[GeneratedFile, _Mapping]]] = ..., explanation: _Optional[str] = ..., digest: _Optional[bytes] = ...) -> None: ...
+    goals: GoalExplanation
+    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., files: _Optional[_Iterable[_Union[GeneratedFile, _Mapping]]] = ..., explanation: _Optional[str] = ..., digest: _Optional[bytes] = ..., goals: _Optional[_Union[GoalExplanation, _Mapping]] = ...) -> None: ...
 
 class GeneratedFile(_message.Message):
     __slots__ = ("path", "size", "digest", "executable")
@@ -392,7 +454,7 @@ class ExploreResponse(_message.Message):
     def __init__(self, progress: _Optional[_Union[Progress, _Mapping]] = ..., result: _Optional[_Union[ExplorationResult, _Mapping]] = ..., chunk: _Optional[bytes] = ...) -> None: ...
 
 class ExplorationResult(_message.Message):
-    __slots__ = ("status", "diagnostics", "reason", "explanation", "states", "transitions", "size", "digest")
+    __slots__ = ("status", "diagnostics", "reason", "explanation", "states", "transitions", "size", "digest", "goals")
     STATUS_FIELD_NUMBER: _ClassVar[int]
     DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
@@ -401,6 +463,7 @@ class ExplorationResult(_message.Message):
     TRANSITIONS_FIELD_NUMBER: _ClassVar[int]
     SIZE_FIELD_NUMBER: _ClassVar[int]
     DIGEST_FIELD_NUMBER: _ClassVar[int]
+    GOALS_FIELD_NUMBER: _ClassVar[int]
     status: SynthesisStatus
     diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
     reason: str
@@ -409,7 +472,8 @@ class ExplorationResult(_message.Message):
     transitions: int
     size: int
     digest: bytes
-    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., explanation: _Optional[str] = ..., states: _Optional[int] = ..., transitions: _Optional[int] = ..., size: _Optional[int] = ..., digest: _Optional[bytes] = ...) -> None: ...
+    goals: GoalExplanation
+    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., explanation: _Optional[str] = ..., states: _Optional[int] = ..., transitions: _Optional[int] = ..., size: _Optional[int] = ..., digest: _Optional[bytes] = ..., goals: _Optional[_Union[GoalExplanation, _Mapping]] = ...) -> None: ...
 
 class VerifyRequest(_message.Message):
     __slots__ = ("bundle", "options", "supervisor", "properties", "property_files", "maximum_states", "strict")
@@ -472,16 +536,18 @@ class ExplainResponse(_message.Message):
     def __init__(self, progress: _Optional[_Union[Progress, _Mapping]] = ..., result: _Optional[_Union[ExplanationResult, _Mapping]] = ...) -> None: ...
 
 class ExplanationResult(_message.Message):
-    __slots__ = ("status", "diagnostics", "reason", "explanation")
+    __slots__ = ("status", "diagnostics", "reason", "explanation", "goals")
     STATUS_FIELD_NUMBER: _ClassVar[int]
     DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
     REASON_FIELD_NUMBER: _ClassVar[int]
     EXPLANATION_FIELD_NUMBER: _ClassVar[int]
+    GOALS_FIELD_NUMBER: _ClassVar[int]
     status: ExplanationStatus
     diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
     reason: str
     explanation: str
-    def __init__(self, status: _Optional[_Union[ExplanationStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., explanation: _Optional[str] = ...) -> None: ...
+    goals: GoalExplanation
+    def __init__(self, status: _Optional[_Union[ExplanationStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., explanation: _Optional[str] = ..., goals: _Optional[_Union[GoalExplanation, _Mapping]] = ...) -> None: ...
 
 class FormatRequest(_message.Message):
     __slots__ = ("file",)

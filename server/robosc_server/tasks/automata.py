@@ -5,7 +5,6 @@ from typing import Any
 
 from robosc.certification import OutcomeStatus, Progress
 from robosc.errors import UnsupportedModelError
-from robosc.explanation import EmptyExplanation, to_text
 from robosc.exploration import Graph
 from robosc.json_documents import json_text
 from robosc.pipeline.exploring import Exploration, explore
@@ -109,7 +108,7 @@ def _result_fields(made: SystemSynthesis | Generation | Exploration) -> dict[str
         else pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL,
         "diagnostics": to_proto.findings(made.diagnostics),
         "reason": made.reason,
-        "explanation": to_text(made.explanation) if isinstance(made.explanation, EmptyExplanation) else "",
+        **to_proto.reasons(made.explanation),
     }
 
 

@@ -3,9 +3,9 @@
 from typing import Any
 
 from robosc.certification import Progress
-from robosc.explanation import RequestError, to_text
+from robosc.explanation import RequestError
 from robosc.pipeline.explaining import explain
-from robosc.pipeline.results import NoSupervisor, SynthesisStatus
+from robosc.pipeline.results import SynthesisStatus
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.convert import from_proto, to_proto
 from robosc_server.tasks.synthesis_attempt import OnReport
@@ -51,5 +51,5 @@ def explanation(request: pb.ExplainRequest, maximum_nodes: int, on_report: OnRep
         status=_STATUSES[found.status],
         diagnostics=to_proto.findings(found.diagnostics),
         reason=found.reason,
-        explanation="" if isinstance(found.explanation, NoSupervisor) else to_text(found.explanation),
+        **to_proto.reasons(found.explanation),
     )

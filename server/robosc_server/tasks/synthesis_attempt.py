@@ -6,7 +6,6 @@ from typing import Any, Protocol, Self
 
 from robosc.certification import OutcomeStatus, SynthesisOutcome, make_supervisor
 from robosc.errors import UnsupportedModelError
-from robosc.explanation import to_text
 from robosc.model.structure import Deployment
 from robosc.targets import TargetRefusal
 from robosc_api.v1 import synthesis_pb2 as pb
@@ -69,7 +68,7 @@ class SynthesisAttempt:
         return self.made
 
     def result_fields(self) -> dict[str, Any]:
-        """Return the fields that every result has: `status`, `diagnostics`, `reason` and `explanation`."""
+        """Return the fields that every result has: `status`, `diagnostics`, `reason`, and an explanation if any."""
         made, error = self.made, self.error
         diagnostics = self.refusal.diagnostics if self.refusal else made.diagnostics if made else ()
         if error is not None or made is None:
@@ -79,5 +78,5 @@ class SynthesisAttempt:
             "status": to_proto.STATUSES[OutcomeStatus.MODEL_ERRORS if self.refusal else made.status],
             "diagnostics": to_proto.findings(diagnostics),
             "reason": made.reason,
-            "explanation": to_text(made.explanation) if made.explanation else "",
+            **to_proto.reasons(made.explanation),
         }

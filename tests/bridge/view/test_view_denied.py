@@ -65,7 +65,7 @@ async def test_the_surroundings_answer_each_turn(file: Path) -> None:
         play = (await page.receive("definition"))["play"]
         assert (play["goals"], play["forms"], play["link"]) == (["goal always eventually Door.ajar"], ["log"], None)
         run = await page.receive("run")
-        assert run["opposition"] == {"goals": [False], "denied": "goal 1", "assumptions": [0]}
+        assert run["opposition"] == {"goals": ["not yet"], "denied": "goal 1", "denied_next": [], "assumptions": [0]}
         assert run["blocked"]["opened.response"] == ["the surroundings decide it"]
         run = await done(page, "event", line="open")
         assert run["lines"][0] == "open.request: Door = opening"
@@ -74,7 +74,7 @@ async def test_the_surroundings_answer_each_turn(file: Path) -> None:
         # The assumption comes true by a door that is stuck.
         for _ in range(4):
             run = await done(page, "wait")
-        assert run["opposition"]["goals"] == [False]
+        assert run["opposition"]["goals"] == ["not yet"]
         assert run["opposition"]["assumptions"][0] > 0
         assert any(entry["event"] == "stuck.response" for entry in page.entries())
         assert not any(entry["event"] == "opened.response" for entry in page.entries())
@@ -84,6 +84,36 @@ async def test_the_surroundings_answer_each_turn(file: Path) -> None:
         run = await done(page, "walk", steps=10, seed=2, until_finding=True)
         assert (run["kind"], "findings are looked for" in run["lines"][0]) == ("wrong", True)
         assert (await done(page, "undo"))["steps"] < count + 10
+
+
+async def test_a_mission_that_cannot_be_made(file: Path) -> None:
+    mission = "mission delivery { visit Bell.rung then Door.ajar }"
+    bell = """component Bell {
+        incoming message ring with type: none
+        behaviour { initial marked state still { on request to ring goto rung } marked state rung { } }
+    }
+    """
+    file.write_text(GATE.replace("goal always eventually Door.ajar", f"{bell}{mission}"), encoding="utf-8")
+    async with page_of(file) as page:
+        # Without a goal in the list, the page would show neither the wait button nor what is denied.
+        assert (await page.receive("definition"))["play"]["goals"] == ["mission delivery"]
+        opposition = (await page.receive("run"))["opposition"]
+        assert opposition["goals"] == ["at visit 1, Bell.rung"]
+        assert opposition["denied"] == "visit 1 of mission delivery"
+        assert opposition["denied_next"] == ["visit 2 of mission delivery"]
+        await done(page, "event", line="ring")
+        run = await done(page, "event", line="open")
+        for _ in range(4):
+            run = await done(page, "wait")
+        opposition = run["opposition"]
+        assert opposition["goals"] == ["at visit 2, Door.ajar"]
+        assert (opposition["denied"], opposition["denied_next"]) == ("visit 2 of mission delivery", [])
+    file.write_text(file.read_text("utf-8").replace(mission, f"goal once Door.ajar {mission}"), encoding="utf-8")
+    async with page_of(file) as page:
+        goals = (await page.receive("definition"))["play"]["goals"]
+        assert goals == ["goal once Door.ajar", "mission delivery"]
+        run = await page.receive("run")
+        assert run["opposition"]["goals"] == ["not yet", "at visit 1, Bell.rung"]
 
 
 async def test_a_page_that_comes_back_repeats_its_turns(file: Path) -> None:

@@ -89,3 +89,73 @@ def test_a_model_with_errors(capsys: pytest.CaptureFixture[str], tmp_path: Path)
     assert "unknown-name" in capsys.readouterr().err
     status, document = run_json(capsys, "explain-synthesis", str(path))
     assert (status, document["status"], document["explanation"]) == (1, "model errors", None)
+
+
+ROOM = """robot Courier {
+    component Door {
+        outgoing message opened with type: none
+        behaviour { initial marked state shut { on response from opened goto ajar } marked state ajar { } }
+    }
+    component Base {
+        incoming message enter with type: none
+        incoming message leave with type: none
+        behaviour {
+            initial marked state outside { on request to enter goto inside }
+            marked state inside { on request to leave goto outside }
+        }
+    }
+    requirement enter needs Door.ajar
+    mission delivery { visit Base.inside then Base.outside }
+}
+"""
+
+
+@pytest.fixture
+def room(tmp_path: Path) -> str:
+    path = tmp_path / "room.rscd"
+    path.write_text(ROOM, encoding="utf-8")
+    return str(path)
+
+
+def test_a_mission_that_cannot_be_made(room: str, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["synth", room]) == 1
+    synth = capsys.readouterr().err
+    assert main(["explain-synthesis", room]) == 1
+    captured = capsys.readouterr()
+    assert captured.err == ""
+    assert captured.out.splitlines() == [
+        "room.rscd: no strategy is made for the missions",
+        "can be kept from coming true:",
+        "  room.rscd:15:30: visit Base.inside (visit 1 of mission delivery)",
+        "to blame: this alone is enough",
+        "  room.rscd:14:5: requirement enter needs Door.ajar",
+        "can be reached, if the surroundings do so, with:",
+        "  assume Door.shut leads to Door.ajar",
+        "'robosc simulate' and 'robosc view' with '--counter-strategy' play the surroundings, against you",
+    ]
+    assert synth.endswith(captured.out)
+    status, document = run_json(capsys, "explain-synthesis", room)
+    assert (status, document["status"], document["explanation"]) == (1, "model errors", None)
+    assert [item["code"] for item in document["diagnostics"]] == ["unreachable-goal"]
+    assert document["goals"]["helpful"] == ["Door.shut leads to Door.ajar"]
+    assert document["goals"] == run_json(capsys, "synth", room)[1]["goals"]
+
+
+def test_a_question_is_answered_whatever_the_goals(room: str, capsys: pytest.CaptureFixture[str]) -> None:
+    for words in (["--event", "leave"], ["--state", "Base.inside"], ["--after", ""]):
+        assert main(["explain-synthesis", room, *words]) == 0
+        assert "leave.request" in capsys.readouterr().out
+    assert main(["explain-synthesis", room, "--deployment", "layer"]) == 0
+    assert "enter.request: restricted" in capsys.readouterr().out
+
+
+def test_a_mission_that_can_be_made_and_an_assumption_that_can_be_broken(
+    room: str, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assume = "    assume {}\n    mission"
+    Path(room).write_text(ROOM.replace("    mission", assume.format("Door.shut leads to Door.ajar")), encoding="utf-8")
+    assert main(["explain-synthesis", room]) == 0
+    assert "leave.request: free" in capsys.readouterr().out
+    Path(room).write_text(ROOM.replace("    mission", assume.format("always eventually Base.inside")), encoding="utf-8")
+    assert main(["explain-synthesis", room]) == 1
+    assert "preventable-assumption" in capsys.readouterr().err

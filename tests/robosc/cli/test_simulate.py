@@ -369,6 +369,33 @@ def test_the_surroundings_play_against_the_user(
     assert "taken back: open.request" in found
 
 
+def test_a_mission_that_cannot_be_made_is_played_against(
+    denied: str, folder: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    mission = "mission rounds { visit Door.ajar then Door.shut }"
+    (folder / denied).write_text(DENIED.replace("goal always eventually Door.ajar", mission), encoding="utf-8")
+    monkeypatch.setattr("sys.stdin", io.StringIO("open\nwait 2\n"))
+    assert main(["simulate", denied, "--counter-strategy"]) == 0
+    found = capsys.readouterr().out.splitlines()
+    assert found[-5:] == [
+        "the surroundings wait, too",
+        "now       Door = opening",
+        "mission   rounds: at visit 1, Door.ajar",
+        "denied    visit 1 of mission rounds, whatever you do",
+        "allowed   nothing",
+    ]
+    # The first visit can be made, and the second one is denied then.
+    mission = "mission rounds { visit Door.shut then Door.opening then Door.ajar }"
+    (folder / denied).write_text(DENIED.replace("goal always eventually Door.ajar", mission), encoding="utf-8")
+    monkeypatch.setattr("sys.stdin", io.StringIO("state\n"))
+    assert main(["simulate", denied, "--counter-strategy"]) == 0
+    assert "denied    visit 2 of mission rounds; if it comes true, visit 3 of mission rounds" in capsys.readouterr().out
+    (folder / "moves.txt").write_text("open\n", encoding="utf-8")
+    assert main(["simulate", denied, "--counter-strategy", "--json", "--events", "moves.txt"]) == 0
+    end = json.loads(capsys.readouterr().out.splitlines()[-1])
+    assert (end["denied"], end["denied_next"]) == ("visit 3 of mission rounds", [])
+
+
 def test_scripts_against_the_surroundings_say_whose_each_event_is(
     denied: str, folder: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -390,7 +417,8 @@ def test_scripts_against_the_surroundings_say_whose_each_event_is(
         (["denied.rscd", "--counter-strategy", "--deployment", "layer"], 2, "for controllers"),
         (["gate.rsup", "--counter-strategy"], 2, "for the model of a robot"),
         (["gate.rscd", "--counter-strategy"], 1, "the model has no goals"),
-        (["reached.rscd", "--counter-strategy"], 1, "every goal can be reached"),
+        (["reached.rscd", "--counter-strategy"], 1, "the goals can be reached"),
+        (["made.rscd", "--counter-strategy"], 1, "the missions can be reached"),
         (["broken.rscd", "--counter-strategy"], 1, "syntax-error"),
         (["broken.rscd", "--counter-strategy", "--json", "--random", "1"], 1, ""),
     ],
@@ -399,6 +427,8 @@ def test_no_counter_strategy(
     denied: str, folder: Path, capsys: pytest.CaptureFixture[str], words: list[str], status: int, message: str
 ) -> None:
     (folder / "reached.rscd").write_text(DENIED.replace("Door.ajar", "Door.shut or Door.opening"), encoding="utf-8")
+    made = DENIED.replace("goal always eventually Door.ajar", "mission calls { visit Door.shut or Door.opening }")
+    (folder / "made.rscd").write_text(made, encoding="utf-8")
     (folder / "broken.rscd").write_text("robot", encoding="utf-8")
     try:
         found = main(["simulate", *words])

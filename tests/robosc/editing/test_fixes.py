@@ -2,6 +2,7 @@
 
 import pytest
 
+from robosc.certification import make_supervisor
 from robosc.editing.fixes import fixes
 from robosc.model.check import inspect
 from robosc.source import Bundle, SourceFile
@@ -121,3 +122,50 @@ def test_a_field_that_is_the_only_one_is_meant() -> None:
 }
 """
     assert text in titles_and_texts(text.replace("data: boolean", "openn: boolean")).values()
+
+
+DENIED = """robot Courier {
+    component Door {
+        incoming message open with type: none
+        outgoing message opened with type: none
+        behaviour {
+            initial marked state shut { on request to open goto opening }
+            state opening { on response from opened goto ajar }
+            marked state ajar { }
+        }
+    }
+    GOAL
+} // Not its end: }
+"""
+
+
+@pytest.mark.parametrize(
+    "goal",
+    [
+        "goal once Door.ajar",
+        "mission delivery {\n        visit Door.shut or Door.ajar\n        then Door.ajar\n    }",
+        "mission delivery { visit Door.ajar }",
+    ],
+)
+@pytest.mark.parametrize("end", ["\n}", " }"])
+def test_assumptions_that_help_are_written_at_the_end_of_the_robot(goal: str, end: str) -> None:
+    text = DENIED.replace("GOAL", goal).replace("\n}", end)
+    made = make_supervisor(Bundle(SourceFile("r.rscd", text)))
+    (found,) = (item for item in made.diagnostics if item.code == "unreachable-goal")
+    assert found.location is not None
+    lines, line = text.split("\n"), found.location.line
+    (fix,) = fixes(found, lines[line - 1], lambda: "\n".join(lines[line:]))
+    assert fix.title == "Write 'assume Door.opening leads to Door.ajar'"
+    begin = sum(len(line) + 1 for line in lines[: fix.location.line - 1]) + fix.location.column - 1
+    assert text[begin : begin + fix.location.length] == "}"
+    changed = text[:begin] + fix.text + text[begin + 1 :]
+    assert changed.endswith("\n    assume Door.opening leads to Door.ajar\n} // Not its end: }\n")
+    assert make_supervisor(Bundle(SourceFile("r.rscd", changed))).supervisor is not None
+
+
+def test_no_assumption_is_written_where_none_is_known_to_help() -> None:
+    text = DENIED.replace("GOAL", "goal once Door.ajar and Door.shut")
+    made = make_supervisor(Bundle(SourceFile("r.rscd", text)))
+    (found,) = (item for item in made.diagnostics if item.code == "unreachable-goal")
+    assert found.location is not None
+    assert fixes(found, text.split("\n")[found.location.line - 1], lambda: "}\n") == ()

@@ -2,6 +2,7 @@
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
 from random import Random
 
@@ -158,16 +159,40 @@ MISSION = """robot Porter {
 def test_a_visit_is_denied_while_its_mission_goes_as_far_as_it_can() -> None:
     run = run_of(MISSION)
     assert [str(item) for item in run.missions] == ["rounds: at visit 1, Base.inside"]
-    assert run.denied == "visit 1 of mission rounds"
+    assert (run.denied, run.denied_next) == ("visit 1 of mission rounds", ("visit 2 of mission rounds",))
     assert run.step("enter.request").visits == ("visit 1 of mission rounds",)
     run.step("open.request")
     for _ in range(3):
         run.wait()
     assert run.denied == "visit 2 of mission rounds" and run.missions[0].visit == 2
+    assert run.denied_next == ()
     assert run.state.components["Door"] == "opening"
     run.undo()
     run.undo()
     assert run.missions[0].visit == 1
+
+
+VISITS = ("Base.inside", "Base.outside", "Door.opening", "Door.shut or Door.opening")
+
+
+def test_another_visit_is_denied_only_if_it_was_announced(record_property: Callable[[str, object], None]) -> None:
+    met: Counter[str] = Counter()
+    for seed in range(30):
+        dice = Random(seed)
+        made = dice.sample(VISITS, dice.randint(1, 4))
+        made.insert(dice.randint(0, len(made)), "Door.ajar")
+        run = run_of(MISSION.replace("Base.inside then Door.ajar", " then ".join(made)))
+        for _ in range(20):
+            denied, following = run.denied, set(run.denied_next)
+            turn(run, dice)
+            if run.denied != denied:
+                met["another denied"] += 1
+                assert run.denied in following, (seed, run.denied)
+            assert set(run.denied_next) <= following, (seed, run.denied_next)
+        met["announced"] += bool(run_of(MISSION.replace("Base.inside then Door.ajar", " then ".join(made))).denied_next)
+    for name, count in sorted(met.items()):
+        record_property(name, count)
+    assert met["another denied"] >= met["announced"] > 10, met
 
 
 def test_what_is_taken_back_is_taken_again_with_all_that_followed() -> None:
@@ -211,15 +236,20 @@ def test_the_log_is_saved_and_no_test(tmp_path: Path) -> None:
 
 def test_a_counter_strategy_that_is_too_large_is_not_played() -> None:
     made = run_of(MODEL).explanation
-    without = GoalExplanation(made.goals, False, (), True, (), None, made.supervisor, None)
-    with pytest.raises(NoCounterStrategyError):
+    without = GoalExplanation(made.goals, False, (), True, (), None, False, made.supervisor, None)
+    with pytest.raises(NoCounterStrategyError, match="too large"):
         CounterRun(without)
 
 
+def test_an_explanation_of_a_server_is_not_played() -> None:
+    with pytest.raises(NoCounterStrategyError, match="on this machine"):
+        CounterRun(replace(run_of(MODEL).explanation, supervisor=None, counter=None))
+
+
 def test_a_walk_that_gets_nowhere_ends() -> None:
-    idle = GoalExplanation((), False, (), True, (), None, run_of(MODEL).supervisor, CounterStrategy(()))
+    idle = GoalExplanation((), False, (), True, (), None, True, run_of(MODEL).supervisor, CounterStrategy(()))
     run = CounterRun(idle)
-    assert run.denied is None
+    assert (run.denied, run.denied_next) == (None, ())
     assert {step.event for step in run.walk(30)} == {"ring.request"}
     door = run_of(DOOR)
     assert [step.event for step in door.walk(100)] == ["open.request"]

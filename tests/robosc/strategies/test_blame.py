@@ -9,6 +9,7 @@ import pytest
 
 from robosc.automata import ExecutableSystem
 from robosc.certification import SynthesisOutcome, SynthesisProblem, make_supervisor, prepare
+from robosc.certification.goals import GoalExplanation
 from robosc.conditions.goals import assumption_text
 from robosc.errors import Diagnostic, Severity, SynthesisCancelled
 from robosc.model.structure import Deployment, Model
@@ -211,11 +212,12 @@ def test_requirements_that_exclude_a_goal_together_are_named_with_what_is_neares
     assert found.message.endswith("2 requirements are enough for that, and each of them is needed")
     assert len(found.related) == 2
     assert "assume" not in found.fix
-    assert made.goals is not None and made.goals.nearest is not None
-    assert [item.kind for item in made.goals.blamed] == ["requirement", "invariant"]
-    assert str(made.goals).splitlines()[-1].startswith("the nearest to goal once Base.inside")
-    assert made.goals.nearest.missing == ("enter.request",)
-    assert made.goals.nearest.events == ()
+    why = made.explanation
+    assert isinstance(why, GoalExplanation) and why.nearest is not None
+    assert [item.kind for item in why.blamed] == ["requirement", "invariant"]
+    assert str(why).splitlines()[-1].startswith("the nearest to goal once Base.inside")
+    assert why.nearest.missing == ("enter.request",)
+    assert why.nearest.events == ()
 
 
 def test_a_goal_that_excludes_itself_has_no_requirement_to_blame_and_nothing_near() -> None:
@@ -229,10 +231,11 @@ def test_a_goal_that_excludes_itself_has_no_requirement_to_blame_and_nothing_nea
 def test_a_state_that_is_reached_once_only_is_shown_as_the_nearest() -> None:
     goals = "goal always eventually Base.inside goal always eventually Base.outside"
     made = outcome_of(f"requirement leave needs Door.shut and Door.ajar {goals} assume Door.opening leads to Door.ajar")
-    assert made.goals is not None and made.goals.is_hopeless and made.goals.nearest is not None
-    assert made.goals.nearest.is_reached
-    assert made.goals.nearest.events == ("open.request", "opened.response", "enter.request")
-    assert str(made.goals.nearest).endswith("but not again and again together with the others")
+    why = made.explanation
+    assert isinstance(why, GoalExplanation) and why.is_hopeless and why.nearest is not None
+    assert why.nearest.is_reached
+    assert why.nearest.events == ("open.request", "opened.response", "enter.request")
+    assert str(why.nearest).endswith("but not again and again together with the others")
 
 
 def test_more_assumptions_than_are_tried_together_are_not_suggested(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -263,7 +266,7 @@ ASKING = """robot R {
 def test_an_assumption_that_the_robot_can_break_is_not_suggested() -> None:
     made = make_supervisor(bundle_of(ASKING))
     # It could be idle for ever by never asking.
-    assert made.goals is not None and made.goals.helpful == ()
+    assert isinstance(made.explanation, GoalExplanation) and made.explanation.helpful == ()
     assume = "assume Asker.idle leads to Asker.answered assume Asker.answered leads to Asker.idle }"
     broken = make_supervisor(bundle_of(f"{ASKING.rstrip('}')}{assume}"))
     assert [item.code for item in broken.diagnostics if item.severity is Severity.ERROR] == [

@@ -1,11 +1,16 @@
 """Content of responses: findings and figures, as messages."""
 
 from collections.abc import Iterable
+from typing import Any
 
 from robosc.automata import to_automata
 from robosc.certification import OutcomeStatus
+from robosc.certification.goals import GoalExplanation, NearestPlace
 from robosc.conditions.summary import added_texts, summary_text
 from robosc.errors import Diagnostic, RelatedPlace, Severity
+from robosc.explanation import EmptyExplanation, Explanation, to_text
+from robosc.explanation.parts import Part
+from robosc.expressions import Value
 from robosc.pipeline.goals import goal_summary
 from robosc.source import Location
 from robosc.supervisor import Supervisor
@@ -38,6 +43,57 @@ def findings(diagnostics: Iterable[Diagnostic]) -> list[pb.Diagnostic]:
         )
         for item in diagnostics
     ]
+
+
+def reasons(explanation: object) -> dict[str, Any]:
+    """Return the fields `explanation` and `goals` of a result; empty where there is no explanation of either kind."""
+    match explanation:
+        case GoalExplanation():
+            return {"goals": goal_explanation(explanation)}
+        case EmptyExplanation() | Explanation():
+            return {"explanation": to_text(explanation)}
+    return {}
+
+
+def goal_explanation(found: GoalExplanation) -> pb.GoalExplanation:
+    """Return the explanation of why goals cannot be reached, without the counter-strategy."""
+    return pb.GoalExplanation(
+        goals=map(_part, found.goals),
+        is_hopeless=found.is_hopeless,
+        blamed=map(_part, found.blamed),
+        is_minimal=found.is_minimal,
+        helpful=found.helpful,
+        nearest=None if found.nearest is None else _nearest(found.nearest),
+        has_counter_strategy=found.has_counter_strategy,
+    )
+
+
+def _part(part: Part) -> pb.ModelPart:
+    return pb.ModelPart(
+        kind=part.kind, text=part.text, location=_location(part.location) if part.location is not None else None
+    )
+
+
+def _nearest(found: NearestPlace) -> pb.NearestState:
+    return pb.NearestState(
+        goal=found.goal,
+        is_reached=found.is_reached,
+        has_others=found.has_others,
+        events=found.events,
+        state=[_value(name, value) for name, value in found.state.items()],
+        missing=found.missing,
+    )
+
+
+def _value(name: str, value: Value) -> pb.PartValue:
+    match value:
+        case bool():
+            return pb.PartValue(name=name, truth=value)
+        case int():
+            return pb.PartValue(name=name, integer=value)
+        case float():
+            return pb.PartValue(name=name, number=value)
+    return pb.PartValue(name=name, text=value)
 
 
 def _location(location: Location) -> pb.Location:

@@ -158,6 +158,8 @@ class Aim:
         number: Number of the goal from 0; of a visit in its mission, where those of detours follow its own.
         mission: Number of the mission from 0; None for a goal.
         visit: Condition that the visit is about, as it is written; None for a goal.
+        interruption: Condition over the state and the memory under which the visit is not asked for: its mission is
+            not, or a detour is under way. None if there is no such case.
     """
 
     name: str
@@ -166,6 +168,7 @@ class Aim:
     number: int
     mission: int | None = None
     visit: Expression | None = None
+    interruption: Expression | None = None
 
 
 def counted(aims: Collection[Aim]) -> str:
@@ -225,6 +228,7 @@ def journey(mission: Mission, number: int) -> Journey:
         moved = Binary("or", _arrives(stages, place), conjunction(at[place], *visits))
         places.append(Place(stands, conjunction(*asked, moved)))
     aims: list[Aim] = []
+    idle = _negated(asked[0]) if asked else None
     groups = [tuple(places)]
     under_way: list[Expression] = []
     for order, detour in enumerate(mission.detours, start=1):
@@ -235,7 +239,9 @@ def journey(mission: Mission, number: int) -> Journey:
         for visit, (condition, place_) in enumerate(zip(detour.visits, group, strict=True), start=1):
             target = _negated(place_.read)
             place_number = len(mission.visits) + len(aims)
-            aims.append(Aim(f"visit {visit} of {title}", AimKind.DETOUR_VISIT, target, place_number, number, condition))
+            kind = AimKind.DETOUR_VISIT
+            aims.append(Aim(f"visit {visit} of {title}", kind, target, place_number, number, condition, idle))
+    interrupted = [*map(_negated, asked), *under_way]
     own = [
         Aim(
             f"visit {visit + 1} of {name}",
@@ -244,6 +250,7 @@ def journey(mission: Mission, number: int) -> Journey:
             visit,
             number,
             condition,
+            _any(interrupted) if interrupted else None,
         )
         for visit, condition in enumerate(mission.visits)
     ]

@@ -159,6 +159,8 @@ class Aim:
         mission: Number of the mission from 0; None for a goal.
         visit: Condition that the visit is about, as it is written; None for a goal.
         here: Condition over the state and the memory that the mission or detour is at the visit; None for a goal.
+        interruption: Condition over the state and the memory under which the visit is not asked for: its mission is
+            not, or a detour is under way. None if there is no such case.
     """
 
     name: str
@@ -168,6 +170,7 @@ class Aim:
     mission: int | None = None
     visit: Expression | None = None
     here: Expression | None = None
+    interruption: Expression | None = None
 
 
 def counted(aims: Collection[Aim]) -> str:
@@ -229,6 +232,7 @@ def journey(mission: Mission, number: int) -> Journey:
         moved = Binary("or", _arrives(stages, place), conjunction(at[place], *visits))
         places.append(Place(stands, conjunction(*asked, moved)))
     aims: list[Aim] = []
+    idle = _negated(asked[0]) if asked else None
     groups = [tuple(places)]
     under_way: list[Expression] = []
     for order, detour in enumerate(mission.detours, start=1):
@@ -240,7 +244,8 @@ def journey(mission: Mission, number: int) -> Journey:
             target = _negated(place_.read)
             place_number = len(mission.visits) + len(aims)
             words = f"visit {visit} of {title}"
-            aims.append(Aim(words, AimKind.DETOUR_VISIT, target, place_number, number, condition, place_.read))
+            aims.append(Aim(words, AimKind.DETOUR_VISIT, target, place_number, number, condition, place_.read, idle))
+    interrupted = [*map(_negated, asked), *under_way]
     own = [
         Aim(
             f"visit {visit + 1} of {name}",
@@ -250,6 +255,7 @@ def journey(mission: Mission, number: int) -> Journey:
             number,
             condition,
             conjunction(*asked, at[visit]),
+            _any(interrupted) if interrupted else None,
         )
         for visit, condition in enumerate(mission.visits)
     ]

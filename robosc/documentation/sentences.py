@@ -69,7 +69,7 @@ def mission_sentences(mission: Mission) -> str:
         start += "The robot reaches, round after round, "
     texts = [f"{start}{_in_turn(mission.visits)}."]
     texts += [
-        f"Whenever {code(expression_text(detour.trigger))}, it reaches before that {_in_turn(detour.visits)}."
+        f"Whenever {code(expression_text(detour.trigger))}, it first reaches {_in_turn(detour.visits)}."
         for detour in mission.detours
     ]
     return " ".join(texts)

@@ -35,6 +35,13 @@ class Arena(Protocol):
         """Return the positions in which the controller, at its turn, has a choice that leads into a predicate."""
 
 
+class TwoSidedArena(Arena, Protocol):
+    """A game in which moves of both sides can be looked at together."""
+
+    def together(self, predicate: Any) -> Any:
+        """Return the positions from which a move of either side can lead into a predicate."""
+
+
 @dataclass(frozen=True, slots=True)
 class Approach:
     """A step towards a goal: positions that a round of the least fixed point has added.
@@ -44,12 +51,15 @@ class Approach:
         nearer: Positions from which progress was known before.
         progress: Positions in which the controller, at its turn, makes progress.
         waiting: For each assumption, the positions in which the controller stays while that assumption fails.
+        onwards: Positions that a request leads into, where the controller makes progress by one: those of the first
+            part if it can, else those of the next one.
     """
 
     positions: Any
     nearer: Any
     progress: Any
     waiting: tuple[Any, ...]
+    onwards: tuple[Any, ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -118,6 +128,58 @@ def solve(
     return Solution(winning, tuple(approaches), rounds)
 
 
+def approach_uninterrupted(
+    arena: TwoSidedArena,
+    assumptions: Sequence[Any],
+    goal: Any,
+    interrupted: Any,
+    winning: Any,
+    *,
+    false: Any,
+    check_stop: Callable[[], object] = lambda: None,
+) -> tuple[Approach, ...]:
+    """Return steps towards a goal that also counts as true where it is interrupted, such as by a detour.
+
+    Interruptions are left to the surroundings: the controller neither brings them about nor waits for them where it can
+    make progress without them. Only where there is no other way, it does.
+
+    Args:
+        arena: The game.
+        assumptions: Predicates that the surroundings make true again and again.
+        goal: Positions in which the goal is true, interrupted ones among them.
+        interrupted: Positions in which it is interrupted.
+        winning: The positions from which the controller wins.
+        false: The predicate that is true nowhere.
+        check_stop: Function called before each step; it may end the work with an error.
+    """
+    failing = [~item for item in assumptions] or [false]
+    calm = winning & ~interrupted
+    # An assumption that only an interruption makes true is not worth waiting for.
+    hopeful = [~item & _leading(arena, item & calm, calm, check_stop) for item in assumptions] or [false]
+    search = _Search(arena, failing, winning, false, check_stop)
+    reached = goal & arena.turn(winning)
+    found: list[Approach] = []
+    while True:
+        before = [item.positions for item in found]
+        nearer = before[-1] if before else false
+        step = search.step(reached, nearer, hopeful, (nearer & calm,))
+        if step is None:
+            step = search.step(reached, nearer, failing, (*(item & calm for item in before), *before))
+        if step is None:
+            return tuple(found)
+        found.append(step)
+
+
+def _leading(arena: TwoSidedArena, found: Any, within: Any, check_stop: Callable[[], object]) -> Any:
+    """Return the positions from which moves of both sides can lead to some, without leaving others."""
+    before = None
+    while found != before:
+        check_stop()
+        before = found
+        found = found | (within & arena.together(found))
+    return found
+
+
 @dataclass(frozen=True, slots=True)
 class _Search:
     """Search for the positions from which a goal is approached.
@@ -172,8 +234,26 @@ class _Search:
                 positions = positions | item
             if positions == nearer:
                 return found
-            found.append(Approach(positions, nearer, progress, waiting))
+            found.append(Approach(positions, nearer, progress, waiting, (nearer,)))
             nearer, last = positions, progress
+
+    def step(self, reached: Any, nearer: Any, failing: Sequence[Any], onwards: tuple[Any, ...]) -> Approach | None:
+        """Return one step towards a goal, or None if it adds no position.
+
+        Args:
+            reached: Positions in which the goal is true, and the controller's turn leads to where it goes on winning.
+            nearer: Positions from which progress was known before.
+            failing: For each assumption, the positions in which it fails and is waited for.
+            onwards: Positions that requests may lead into, those of the first part before those of the next one.
+        """
+        progress = reached
+        for item in onwards[-1:]:
+            progress = progress | self.arena.turn(item)
+        waiting = tuple(self._waiting(progress, item, self.winning) for item in failing)
+        positions = nearer
+        for item in waiting:
+            positions = positions | item
+        return None if positions == nearer else Approach(positions, nearer, progress, waiting, onwards)
 
     def _waiting(self, progress: Any, failing: Any, bound: Any) -> Any:
         """Return the largest set in which each turn makes progress, or stays in the set while an assumption fails.

@@ -5,15 +5,17 @@ goal or visit of a mission is approached; once it is true the next one in turn i
 goal: that the mission is not at it any more.
 """
 
-from collections.abc import Callable, Collection, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 from robosc.automata import ExecutableSystem
 from robosc.automata.goal_memory import holds
+from robosc.expressions import Expression
 from robosc.strategies.arena import ControllerArena
 from robosc.strategies.counter_strategy import CounterStage, CounterStrategy, oppose
-from robosc.strategies.gr1 import Approach, Solution, solve
+from robosc.strategies.gr1 import Approach, Solution, approach_uninterrupted, solve
 from robosc.strategies.preferences import preferred_order
 from robosc.supervisor import AddedCondition, Choice, DecisionDiagram, Strategy
 from robosc.synthesis.diagrams import extract
@@ -107,12 +109,18 @@ class StrategySynthesis:
         is_won = self.arena.can_begin(solution.winning)
         unreached = () if is_won else self._unreached()
         preventable = self.preventable(allowed)
+        unneeded = self._unneeded(solution) if is_won else ()
+        if is_won:
+            solution = self._uninterrupted(solution)
+            # Visits that are not interrupted may need more, though interruptions would do.
+            visits = [solution.approaches[number] for number, _ in self._interruptible()]
+            unneeded = tuple(item for item in unneeded if not any(self._rely(steps, item) for steps in visits))
         return StrategyResult(
             strategy=self._strategy(solution) if is_won and not preventable else None,
             unreached=unreached,
             is_hopeless=bool(unreached) and not self.can_be_reached(unreached),
             preventable=preventable,
-            unneeded=self._unneeded(solution) if is_won else (),
+            unneeded=unneeded,
             positions=self._count(self.arena.positions),
             winning=self._count(solution.winning),
             rounds=solution.rounds,
@@ -290,6 +298,24 @@ class StrategySynthesis:
     def _count(self, predicate: Any) -> int:
         return count_models(self._manager, predicate, self._encoding.state_names)
 
+    def _interruptible(self) -> Iterator[tuple[int, Expression]]:
+        """Yield the numbers of the visits that can be interrupted, with the condition that they are."""
+        for number, item in enumerate(self._aims):
+            if item.interruption is not None:
+                yield number, item.interruption
+
+    def _uninterrupted(self, solution: Solution) -> Solution:
+        """Return a solution whose steps towards visits do without interruptions, as far as they can."""
+        approaches = list(solution.approaches)
+        for number, interruption in self._interruptible():
+            approaches[number] = approach_uninterrupted(
+                *(self.arena, self.assumptions, self.goals[number], self.arena.condition(interruption)),
+                solution.winning,
+                false=self.false,
+                check_stop=self._monitor.check_stop,
+            )
+        return replace(solution, approaches=tuple(approaches))
+
     def _strategy(self, solution: Solution) -> Strategy:
         simplifier = Simplifier(self._encoding, self._seconds)
         met = self.arena.met()
@@ -301,8 +327,8 @@ class StrategySynthesis:
         decided = self.goals[number]
         for approach in solution.approaches[number]:
             here = approach.positions & ~approach.nearer
-            for event in self._requests:
-                found = here & ~decided & self.arena.choice(event, approach.nearer)
+            for target, event in product(approach.onwards, self._requests):
+                found = here & ~decided & self.arena.choice(event, target)
                 if found != self._manager.false:
                     chosen[event] = chosen.get(event, self._manager.false) | found
                     decided = decided | found

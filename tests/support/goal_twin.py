@@ -61,6 +61,7 @@ class _Visit:
 
     mission: MissionTwin
     is_done: Callable[[Mark, Any], bool]
+    is_interrupted: Callable[[Mark, Any], bool] | None
 
     @property
     def start(self) -> Mark:
@@ -169,7 +170,11 @@ def game_of(executable: ExecutableSystem, added: Iterable[AddedCondition], limit
 
     model = executable.model
     twins = [mission_twin(mission, test) for mission in model.missions]
-    visits = [_Visit(twin, is_done) for twin in twins for _, is_done in twin.aims()]
+    visits = [
+        _Visit(twin, is_done, is_interrupted)
+        for twin in twins
+        for (_, is_done), is_interrupted in zip(twin.aims(), twin.interruptions(), strict=True)
+    ]
     game = Game(items(model.assumptions, "assumption"), [*items(model.goals, "goal"), *visits])
     everything = [*game.assumptions, *game.goals]
 
@@ -387,44 +392,94 @@ def components(vertices: list[Any], after: Callable[[Any], set[Any]]) -> Iterato
             yield component
 
 
-def distances(game: Game, won: set[Position], goal: int) -> dict[Position, int]:
-    """Return the distance of each winning position from a goal, by the rounds of the least fixed point.
+def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position, int], set[Position]]:
+    """Return the distance of each winning position from a goal, and those from which only interruptions help.
 
     A position has distance k + 1 where, for some assumption, the surroundings cannot prevent that each turn gets to
     distance k or less, or to the goal, or stays where that assumption fails. This is the definition, round by round:
     N. Piterman, A. Pnueli and Y. Sa'ar, "Synthesis of reactive(1) designs", VMCAI 2006, LNCS 3855, pp. 364-380.
+
+    Of a visit no turn may lead to where it is interrupted, and no assumption counts that only comes true there, as long
+    as there are such positions.
 
     Args:
         game: The game.
         won: The positions from which the controller wins.
         goal: Number of the goal or visit.
     """
-    item = game.goals[goal]
+    item, is_calm = game.goals[goal], _is_calm(game, goal)
+    calm = won if is_calm is None else set(filter(is_calm, won))
     found: dict[Position, int] = {}
+    last_resort = set[Position]()
 
     def turns(position: Position) -> set[Any]:
         return {position, *game.choices[position].values()}
 
     reached = {position for position in won if game.holds(position, item) and turns(position) & won}
     failing = [{position for position in won if not game.holds(position, owed)} for owed in game.assumptions]
+    hopeful = []
+    for failed in failing:
+        hope = calm - failed
+        while wider := {at for at in calm if (turns(at) | game.successors[at]) & hope} - hope:
+            hope |= wider
+        hopeful.append(failed & hope)
     while True:
-        progress = {position for position in won if position in reached or turns(position) & found.keys()}
-        near = set[Position]()
-        # The empty assumption is one that never fails.
-        for failed in failing or [set[Position]()]:
-            staying = set(won)
-            while True:
-                kept = {
-                    position
-                    for position in staying
-                    if game.successors[position] <= staying
-                    and (position in progress or (position in failed and turns(position) & staying))
-                }
-                if kept == staying:
-                    break
-                staying = kept
-            near |= staying
-        if near <= found.keys():
-            return found
+        for waited, allowed in ((failing, won),) if is_calm is None else ((hopeful, calm), (failing, won)):
+            onwards = found.keys() & allowed
+            progress = {position for position in won if position in reached or turns(position) & onwards}
+            near = set[Position]()
+            # The empty assumption is one that never fails.
+            for failed in waited or [set[Position]()]:
+                staying = set(won)
+                while True:
+                    kept = {
+                        position
+                        for position in staying
+                        if game.successors[position] <= staying
+                        and (position in progress or (position in failed and turns(position) & staying))
+                    }
+                    if kept == staying:
+                        break
+                    staying = kept
+                near |= staying
+            if not near <= found.keys():
+                break
+        else:
+            return found, last_resort
+        fresh = near - found.keys()
+        if is_calm is not None and waited is failing:
+            last_resort |= fresh
         rank = max(found.values(), default=0) + 1
-        found |= {position: rank for position in near if position not in found}
+        found |= dict.fromkeys(fresh, rank)
+
+
+def _is_calm(game: Game, goal: int) -> Callable[[Position], bool] | None:
+    """Return whether a visit is not interrupted in a position; None if it never is, or if it is a goal."""
+    item, number = game.goals[goal], len(game.assumptions) + goal
+    is_interrupted = None if isinstance(item, Item) else item.is_interrupted
+    return None if is_interrupted is None else lambda position: not is_interrupted(position[1][number], position[0][0])
+
+
+def leading(
+    game: Game, far: dict[Position, int], last_resort: set[Position], position: Position, goal: int
+) -> set[str]:
+    """Return the requests that a strategy may choose in a position, before it looks at preferences.
+
+    Args:
+        game: The game.
+        far: Distance of each position.
+        last_resort: Positions from which only interruptions help: there what leads nearest is chosen, of what does not
+            interrupt the visit, if there is any.
+        position: The position.
+        goal: Number of the goal or visit.
+    """
+    is_calm = _is_calm(game, goal)
+    near = {name: end for name, end in game.choices[position].items() if far.get(end, 10**9) < far[position]}
+    if is_calm is None:
+        return set(near)
+    calm = {name: end for name, end in near.items() if is_calm(end)}
+    if position not in last_resort:
+        return set(calm)
+    near = calm or near
+    least = min((far[end] for end in near.values()), default=0)
+    return {name for name, end in near.items() if far[end] == least}

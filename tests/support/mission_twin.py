@@ -23,12 +23,14 @@ class MissionTwin:
         asked: Condition behind `while`.
         visits: Conditions of its visits.
         detours: For each detour its trigger and the conditions of its visits.
+        has_while: True if there is a condition behind `while`.
     """
 
     name: str
     asked: Test
     visits: Sequence[Test]
     detours: Sequence[tuple[Test, Sequence[Test]]]
+    has_while: bool = False
 
     @property
     def start(self) -> Mark:
@@ -69,6 +71,14 @@ class MissionTwin:
                 name = f"visit {number} of detour {order} of mission {self.name}"
                 yield name, partial(self._is_detour_done, order, number)
 
+    def interruptions(self) -> Iterator[Callable[[Mark, Any], bool] | None]:
+        """Yield for each visit, then for those of each detour, whether it is not asked for; None: it always is."""
+        own = (lambda mark, state: not self.asked(state) or any(mark[1:])) if self.has_while or self.detours else None
+        yield from [own] * len(self.visits)
+        of_detour = (lambda mark, state: not self.asked(state)) if self.has_while else None
+        for _, visits in self.detours:
+            yield from [of_detour] * len(visits)
+
     def _is_own_done(self, number: int, mark: Mark, state: Any) -> bool:
         return not self.asked(state) or mark[0] != number or self.visits[number - 1](state) or any(mark[1:])
 
@@ -99,4 +109,5 @@ def mission_twin(mission: Mission, test: Callable[[Expression], Test]) -> Missio
         (lambda state: True) if mission.condition is None else test(mission.condition),
         [test(item) for item in mission.visits],
         [(test(item.trigger), [test(visit) for visit in item.visits]) for item in mission.detours],
+        mission.condition is not None,
     )

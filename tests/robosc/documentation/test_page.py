@@ -253,7 +253,7 @@ def test_a_requirement_is_a_sentence(requirement: str, lines: list[str]) -> None
             "Missions",
             [
                 "m: While C.b, the robot reaches, round after round, C.a, then C.b and C.a. Whenever C.a or C.b, it "
-                "reaches before that C.a, then C.b. Whenever C.b, it reaches before that C.a."
+                "first reaches C.a, then C.b. Whenever C.b, it first reaches C.a."
             ],
         ),
         (

@@ -23,6 +23,7 @@ from robosc.strategies.preferences import preferred_order
 from robosc.supervisor import Supervisor
 from support.execution import Bench
 from support.missions import strategic, strategy_result, with_conditions
+from support.models import model_of
 
 ROUNDS = """robot Courier {
     component Base {
@@ -113,6 +114,86 @@ def test_a_detour_comes_first_and_then_the_mission_goes_on_where_it_was() -> Non
     assert sent(bench, 3) == ["to_kitchen", "charge", "to_kitchen"]
     bench.executor.receive("/call", None)
     assert sent(bench, 3) == ["to_office", "charge", "to_kitchen"]
+
+
+SPINNER = """robot Spinner {
+    component Base {
+        incoming message go with identifier: "/go", type: none
+        incoming message spin with identifier: "/spin", type: none
+        incoming message halt with identifier: "/halt", type: none
+        outgoing message fog with identifier: "/fog", type: boolean
+        behaviour {
+            variable foggy: boolean
+            on response from fog do foggy := value
+            initial marked state still { on request to go goto driving on request to spin goto spinning }
+            marked state driving { on request to halt goto still }
+            marked state spinning { on request to halt goto still }
+        }
+    }
+    requirement go needs !Base.foggy
+    assume always eventually !Base.foggy
+    mission patrol {
+        visit Base.driving then Base.still
+        on Base.spinning and Base.foggy from anywhere visit Base.still
+    }
+}"""
+
+
+def test_no_request_is_made_to_begin_a_detour_instead_of_a_visit() -> None:
+    model = model_of(SPINNER)
+    assert strategy_result(model).unneeded == ()
+    bench = bench_of(model)
+    bench.executor.receive("/fog", True)
+    assert sent(bench, 5) == []
+    bench.executor.receive("/fog", False)
+    assert sent(bench, 3) == ["go", "halt", "go"]
+
+
+def test_a_detour_is_begun_where_the_way_to_a_visit_leads_through_it() -> None:
+    text = """robot House {
+        component Base {
+            incoming message forth with identifier: "/forth", type: none
+            incoming message back with identifier: "/back", type: none
+            behaviour {
+                initial marked state dock { on request to forth goto hall }
+                marked state hall { on request to forth goto kitchen on request to back goto dock }
+                marked state kitchen { on request to back goto hall }
+            }
+        }
+        component Light {
+            incoming message light with identifier: "/light", type: none
+            behaviour {
+                initial marked state dark { on request to light goto bright }
+                marked state bright { on request to back goto dark }
+            }
+        }
+        requirement light needs Base.hall
+        mission rounds {
+            visit Base.kitchen then Base.dock
+            on Base.hall and Light.dark from anywhere visit Light.bright
+        }
+    }"""
+    bench = bench_of(model_of(text))
+    assert sent(bench, 8) == ["forth", "light", "forth", "back", "light", "back", "forth", "light"]
+    # Without the requirement no detour is needed.
+    bench = bench_of(model_of(text.replace("requirement light needs Base.hall", "")))
+    assert sent(bench, 3) == ["light", "forth", "forth"]
+
+
+def test_a_visit_is_not_put_off_until_its_mission_is_not_asked_for_any_more() -> None:
+    """The surroundings end each mission sooner or later; until then, it is made."""
+    text = (
+        ROUNDS.rstrip().removesuffix("}")
+        + """
+        mission rounds while Operator.working { visit Base.kitchen then Base.office }
+        mission waiting while Operator.resting { visit Base.dock then Base.kitchen }
+        assume always eventually Operator.working
+    }"""
+    )
+    bench = bench_of(model_of(text))
+    assert sent(bench, 3) == ["to_kitchen", "charge", "to_kitchen"]
+    bench.executor.receive("/begin", None)
+    assert sent(bench, 2) == ["to_office", "to_kitchen"]
 
 
 def test_of_requests_that_lead_nearer_the_preferred_one_is_chosen() -> None:

@@ -90,8 +90,8 @@ class ControllerArena:
         reachable = self._reachable()
         self._silent = tuple(self._silent_steps(executable, owed.cancels, encoder, reachable))
         self.positions = reachable & ~encoding.any_of(first for first, _ in self._silent)
-        for group in owed.exclusive:
-            self.positions = self.positions & self._at_most_one([encoder.holds(place.read) for place in group])
+        for tour in owed.tours:
+            self.positions = self.positions & self._at_most_one([encoder.holds(place.read) for place in tour.places])
         self.observed = self.positions
         for place in owed.places:
             before, after = encoder.holds(place.read), encoder.holds(place.update)

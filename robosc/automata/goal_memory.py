@@ -181,23 +181,7 @@ def counted(aims: Collection[Aim]) -> str:
 
 
 @dataclass(frozen=True, slots=True)
-class Journey:
-    """A mission as aims.
-
-    Attributes:
-        aims: Its visits, then those of each detour.
-        exclusive: Places of the memory in groups; in each group at most one is true at a time: of the mission, where it
-            is at its first visit if none is true, then of each detour, which is idle if none is true.
-        is_round: Condition over the state that the mission is asked for and every visit of its own is true.
-    """
-
-    aims: tuple[Aim, ...]
-    exclusive: tuple[tuple[Place, ...], ...]
-    is_round: Expression
-
-
-@dataclass(frozen=True, slots=True)
-class _Stage:
+class Stage:
     """Stage of a mission or a detour.
 
     Attributes:
@@ -207,6 +191,39 @@ class _Stage:
 
     here: Expression
     is_passed: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Tour:
+    """The stages of a mission or a detour, round and round: each stable state moves it on to one that is not passed.
+
+    Attributes:
+        stages: The stages. The first one is that of a mission at its first visit, or of an idle detour.
+        places: For each later stage the place of the memory that says that it is the current one. At most one is true
+            at a time; at the first stage none is.
+        asked: Condition without which it is at its first stage; None where there is none.
+        stays: True if it stays at its stage where every stage is passed, as a mission does; a detour is idle then.
+    """
+
+    stages: tuple[Stage, ...]
+    places: tuple[Place, ...]
+    asked: Expression | None
+    stays: bool
+
+
+@dataclass(frozen=True, slots=True)
+class Journey:
+    """A mission as aims.
+
+    Attributes:
+        aims: Its visits, then those of each detour.
+        tours: Memory that it needs: that of the mission, then of each detour.
+        is_round: Condition over the state that the mission is asked for and every visit of its own is true.
+    """
+
+    aims: tuple[Aim, ...]
+    tours: tuple[Tour, ...]
+    is_round: Expression
 
 
 def journey(mission: Mission, number: int) -> Journey:
@@ -220,50 +237,47 @@ def journey(mission: Mission, number: int) -> Journey:
         number: Its number in the model, from 0.
     """
     name = f"mission {mission.name}"
-    asked = () if mission.condition is None else (holds(mission.condition),)
+    asked = None if mission.condition is None else holds(mission.condition)
     visits = [holds(item) for item in mission.visits]
     names = [f"{name} is at visit {visit}" for visit in range(2, len(visits) + 1)]
     later = [_remembered(item) for item in names]
     at = [_negated(_any(later)), *later]
-    stages = [_Stage(*item) for item in zip(at, visits, strict=True)]
-    places = []
-    for place, stands in enumerate(names, start=1):
-        # One whole round at most: where every visit is true, it stays.
-        moved = Binary("or", _arrives(stages, place), conjunction(at[place], *visits))
-        places.append(Place(stands, conjunction(*asked, moved)))
+    stages = tuple(Stage(*item) for item in zip(at, visits, strict=True))
+    # One whole round at most: where every visit is true, it stays.
+    tours = [_tour(stages, names, asked, stays=True)]
     aims: list[Aim] = []
-    idle = _negated(asked[0]) if asked else None
-    groups = [tuple(places)]
+    wanted = () if asked is None else (asked,)
+    idle = None if asked is None else _negated(asked)
     under_way: list[Expression] = []
     for order, detour in enumerate(mission.detours, start=1):
         title = f"detour {order} of {name}"
-        group = _detour_places(detour, title, asked)
-        groups.append(group)
-        under_way += [item.read for item in group]
-        for visit, (condition, place_) in enumerate(zip(detour.visits, group, strict=True), start=1):
-            target = _negated(place_.read)
+        tour = _detour_tour(detour, title, asked)
+        tours.append(tour)
+        under_way += [item.read for item in tour.places]
+        for visit, (condition, place) in enumerate(zip(detour.visits, tour.places, strict=True), start=1):
+            target = _negated(place.read)
             place_number = len(mission.visits) + len(aims)
             words = f"visit {visit} of {title}"
-            aims.append(Aim(words, AimKind.DETOUR_VISIT, target, place_number, number, condition, place_.read, idle))
-    interrupted = [*map(_negated, asked), *under_way]
+            aims.append(Aim(words, AimKind.DETOUR_VISIT, target, place_number, number, condition, place.read, idle))
+    interrupted = [*map(_negated, wanted), *under_way]
     own = [
         Aim(
             f"visit {visit + 1} of {name}",
             AimKind.VISIT,
-            _any([*map(_negated, asked), _negated(at[visit]), visits[visit], *under_way]),
+            _any([*map(_negated, wanted), _negated(at[visit]), visits[visit], *under_way]),
             visit,
             number,
             condition,
-            conjunction(*asked, at[visit]),
+            conjunction(*wanted, at[visit]),
             _any(interrupted) if interrupted else None,
         )
         for visit, condition in enumerate(mission.visits)
     ]
-    return Journey((*own, *aims), tuple(groups), conjunction(*asked, *visits))
+    return Journey((*own, *aims), tuple(tours), conjunction(*wanted, *visits))
 
 
-def _detour_places(detour: Detour, title: str, asked: Sequence[Expression]) -> tuple[Place, ...]:
-    """Return the places of a detour, one for each visit; where none is true it is idle.
+def _detour_tour(detour: Detour, title: str, asked: Expression | None) -> Tour:
+    """Return the tour of a detour, which has a place for each visit.
 
     Args:
         detour: The detour.
@@ -273,12 +287,25 @@ def _detour_places(detour: Detour, title: str, asked: Sequence[Expression]) -> t
     names = [f"{title} is at visit {visit}" for visit in range(1, len(detour.visits) + 1)]
     at = [_remembered(name) for name in names]
     # Being idle is a stage, too, which is passed where the detour is wanted.
-    idle = _Stage(_negated(_any(at)), holds(detour.trigger))
-    stages = [idle, *(_Stage(here, holds(visit)) for here, visit in zip(at, detour.visits, strict=True))]
-    return tuple(Place(name, conjunction(*asked, _arrives(stages, place))) for place, name in enumerate(names, start=1))
+    idle = Stage(_negated(_any(at)), holds(detour.trigger))
+    stages = (idle, *(Stage(here, holds(visit)) for here, visit in zip(at, detour.visits, strict=True)))
+    return _tour(stages, names, asked, stays=False)
 
 
-def _arrives(stages: Sequence[_Stage], place: int) -> Expression:
+def _tour(stages: tuple[Stage, ...], names: Iterable[str], asked: Expression | None, *, stays: bool) -> Tour:
+    """Return a tour with its places, whose updates have the meaning of `Tour`; names are those of the places."""
+    wanted = () if asked is None else (asked,)
+    passed = [stage.is_passed for stage in stages]
+    places = []
+    for number, name in enumerate(names, start=1):
+        moved = _arrives(stages, number)
+        if stays:
+            moved = Binary("or", moved, conjunction(stages[number].here, *passed))
+        places.append(Place(name, conjunction(*wanted, moved)))
+    return Tour(stages, tuple(places), asked, stays)
+
+
+def _arrives(stages: Sequence[Stage], place: int) -> Expression:
     """Return the condition that a stage is the first one that is not passed, from the current one on, round and round.
 
     Args:
@@ -319,7 +346,7 @@ class Obligations:
         assumptions: Condition of each assumption, true again and again.
         cancels: Own cancels of the executor, in its order.
         places: Places of the memory: of the cancels, of the assumptions, of the goals, of the missions.
-        exclusive: Groups of places, in each of which at most one is true at a time.
+        tours: Tours of the missions and their detours; of the places of each, at most one is true at a time.
         rounds: For each mission, the condition that it is asked for and every visit of its own is true.
     """
 
@@ -327,7 +354,7 @@ class Obligations:
     assumptions: tuple[Expression, ...]
     cancels: tuple[Cancel, ...]
     places: tuple[Place, ...]
-    exclusive: tuple[tuple[Place, ...], ...]
+    tours: tuple[Tour, ...]
     rounds: tuple[Expression, ...]
 
 
@@ -343,7 +370,7 @@ def obligations(executable: "ExecutableSystem") -> Obligations:
         for number, (name, item) in enumerate(zip(names, wanted, strict=True))
     )
     journeys = [journey(mission, number) for number, mission in enumerate(model.missions)]
-    exclusive = tuple(group for item in journeys for group in item.exclusive)
+    tours = tuple(tour for item in journeys for tour in item.tours)
     judged = (item.place for item in (*owed, *wanted))
     return Obligations(
         (*goals, *(aim for item in journeys for aim in item.aims)),
@@ -352,8 +379,8 @@ def obligations(executable: "ExecutableSystem") -> Obligations:
         (
             *(place for cancel in cancels for place in cancel.places),
             *(place for place in judged if place),
-            *(place for group in exclusive for place in group),
+            *(place for tour in tours for place in tour.places),
         ),
-        exclusive,
+        tours,
         tuple(item.is_round for item in journeys),
     )

@@ -201,7 +201,7 @@ def make_supervisor(
         return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, LIVELOCK_REASON)
     certificate = msgspec.structs.replace(certificate, controller=properties.certified())
     strategy = None
-    if (model.goals or model.missions) and deployment is Deployment.CONTROLLER:
+    if model.has_goals and deployment is Deployment.CONTROLLER:
         on_progress(Progress("strategy", counted(problem.system.obligations.aims)))
         found = synthesize_strategy(
             problem.system, result.added, engine=engine, should_stop=should_stop, on_progress=report

@@ -9,7 +9,7 @@ from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.places import Places
 from robosc.model.preferences import contradiction
-from robosc.model.structure import Communication, Detour, Mission, Preference
+from robosc.model.structure import MAXIMUM_VISITS, Communication, Detour, Mission, Preference
 from robosc.model.units import unique
 
 _MOST_SHOWN = 6
@@ -32,6 +32,8 @@ def build_missions(
     missions: list[Mission] = []
     for tree in trees:
         condition = None if tree.condition is None else checker.condition(tree.condition)
+        for part in (tree.visits, *(detour.visits for detour in tree.detours)):
+            _check_number(part, findings)
         visits = _visits(tree.visits, checker)
         detours = [_detour(detour, checker) for detour in tree.detours]
         sound = tuple(detour for detour in detours if detour is not None)
@@ -43,6 +45,17 @@ def build_missions(
         own = (tree.visits, *(detour.visits for detour in tree.detours))
         places.visits.append(tuple(visit.location for part in own for visit in part))
     return tuple(missions)
+
+
+def _check_number(trees: Sequence[syntax.Visit], findings: Findings) -> None:
+    """Report visits of a mission, or of one of its detours, that are too many."""
+    if len(trees) > MAXIMUM_VISITS:
+        findings.error(
+            "too-many-visits",
+            f"these are {len(trees)} visits in a row; a mission, and each of its detours, has at most {MAXIMUM_VISITS}",
+            trees[MAXIMUM_VISITS].location,
+            "Leave out the visits from here on, or move them to another mission, which is approached beside this one.",
+        )
 
 
 def _visits(trees: Iterable[syntax.Visit], checker: ExpressionChecker) -> tuple[Expression, ...] | None:

@@ -20,6 +20,9 @@ MAXIMUM_DEPTH = 100_000
 MAXIMUM_AGE = 86_400.0 * 365
 """Seconds that a sensor may be asked to stay fresh: a year."""
 
+MAXIMUM_VISITS = 50
+"""Visits that a mission, and each of its detours, may have; a strategy has a mode for each of them."""
+
 EventName = Annotated[str, msgspec.Meta(pattern=r"^[A-Za-z_][A-Za-z_0-9]*\.[A-Za-z_][A-Za-z_0-9]*\Z", max_length=511)]
 """`<communication>.<kind>` or `<Component>.tau_<n>`."""
 
@@ -347,7 +350,7 @@ class Mission(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
     Attributes:
         name: Name, unique among the missions of a robot.
-        visits: Conditions that are to hold, one after the other; at least one.
+        visits: Conditions that are to hold, one after the other; at least one, at most `MAXIMUM_VISITS`.
         condition: The condition behind `while`: the mission is asked for as long as it holds. None for always.
         detours: Detours, in source order.
     """

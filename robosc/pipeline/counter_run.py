@@ -4,8 +4,8 @@ The user chooses a request that is allowed, or waits. Then the executor's silent
 send what keeps some goal from coming true for ever, while each of their assumptions comes true again and again.
 """
 
-from collections.abc import Collection, Iterator
-from itertools import islice, repeat
+from collections.abc import Collection, Iterator, Sequence
+from itertools import chain, islice, repeat
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -25,6 +25,7 @@ from robosc.pipeline.saved_runs import ModelOfTest
 from robosc.pipeline.simulation import Run
 from robosc.pipeline.steps import Step
 from robosc.pipeline.walking import ALL_FINDINGS, WalkFinding, WalkFindingKind
+from robosc.strategies.arena import Happening, message_cases
 from robosc.strategies.counter_strategy import CounterPlayer, condition_of
 
 WAIT = "wait"
@@ -36,8 +37,8 @@ _TRIED = 5_000
 _DRAWN = 500
 """Data that is drawn for one event, where none that was tried leads where it should."""
 
-_Move = tuple[tuple[str, State], ...]
-"""Events of a move of the surroundings, each with the state that it leads to."""
+_Move = tuple[tuple[str, State, Data], ...]
+"""Events of a move of the surroundings, each with the state that it leads to, and data if it cannot have any."""
 
 
 class NoCounterStrategyError(RoboscError, ValueError):
@@ -66,7 +67,7 @@ class CounterRun(Run):
         self._player = CounterPlayer.of(system, owed, explanation.counter)
         self._semantics = Semantics(executable.executed_automata)
         self._controller = Controller(executable, supervisor.added)
-        self._batches = executable.batches
+        self._batches = [message_cases(executable, executable.executed_automata, batch) for batch in executable.batches]
         self._inputs = executable.executed_automata.inputs
         # The interpreter knows no automata with one location, such as those of messages.
         self._order = [
@@ -281,21 +282,46 @@ class CounterRun(Run):
         return True
 
     def _take_move(self, move: _Move) -> None:
-        for place, (event, target) in enumerate(move, start=1):
+        for place, (event, target, data) in enumerate(move, start=1):
             self._is_within = place < len(move)
-            super().step(event, self._data_leading_to(event, target))
+            super().step(event, self._data_leading_to(event, target, data))
 
     def _moves(self) -> Iterator[_Move]:
         """Yield the moves of the surroundings that change the state, with as few events as possible."""
         here = self._state_tuple
-        for batch in self._batches:
+        for cases in self._batches:
             found: dict[State, _Move] = {here: ()}
-            for event in batch:
-                for before, move in list(found.items()):
-                    for target in sorted(self._semantics.targets(before, event), key=repr):
-                        found.setdefault(target, (*move, (event, target)))
+            for case in cases:
+                for target, move in self._moves_of(case, here).items():
+                    if target not in found or len(move) < len(found[target]):
+                        found[target] = move
             del found[here]
             yield from found.values()
+
+    def _moves_of(self, case: Sequence[Happening], here: State) -> dict[State, _Move]:
+        """Return what one message of a certain kind can bring about, by the state that it leads to."""
+        found: dict[State, _Move] = {here: ()}
+        for item in case:
+            further: dict[State, _Move] = dict(found) if item.may_be_left_out else {}
+            for before, move in found.items():
+                reached = list(self._reached_by(item, before))
+                # An event that cannot happen here changes nothing.
+                for target, data in reached or [(before, {})]:
+                    following = move if target == before else (*move, (item.event, target, data))
+                    if target not in further or len(following) < len(further[target]):
+                        further[target] = following
+            found = further
+        return found
+
+    def _reached_by(self, item: Happening, before: State) -> Iterator[tuple[State, Data]]:
+        """Yield the states that an event can lead to, each with data that it carries if only some is possible."""
+        if item.options is None:
+            yield from ((target, {}) for target in sorted(self._semantics.targets(before, item.event), key=repr))
+            return
+        for option in item.options:
+            target = self._semantics.target_with(before, item.event, option.data)
+            if target is not None:
+                yield target, dict(option.data)
 
     def _arrival(self, state: State) -> State | None:
         """Return the position in which silent steps end, with the memory then; None if they do not end."""
@@ -308,8 +334,13 @@ class CounterRun(Run):
         whole = (*state, "only", *self._memory)
         return (*state, "only", *(update(whole) for update in self._updates))
 
-    def _data_leading_to(self, event: str, target: State) -> object:
+    def _data_leading_to(self, event: str, target: State, first: Data) -> object:
         """Return data with which an event leads to a state.
+
+        Args:
+            event: The event.
+            target: The state.
+            first: Data that is tried first; what is not in it is unknown.
 
         Raises:
             InternalError: There is none.
@@ -319,7 +350,7 @@ class CounterRun(Run):
         dice = Random(0)  # noqa: S311  # the same data again, no secret
         drawn = (self._random_data.draw(event, dice) for _ in range(_DRAWN))
         before = self._system.snapshot()
-        for data in (*found, *drawn):
+        for data in chain([_given(first)] if first else [], found, drawn):
             self._system.step(event, self._reading(event, data))
             is_there = self._state_tuple == target
             self._system.restore(before)

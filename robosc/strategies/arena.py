@@ -13,7 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from robosc.automata import ExecutableSystem
+from robosc.automata import ExecutableSystem, System
 from robosc.automata.goal_memory import MEMORY, Cancel, Obligations
 from robosc.automata.state import Subject
 from robosc.controller_properties.messages import PossibleData, choices_together
@@ -33,6 +33,48 @@ MAXIMUM_CASES = 256
 
 _REMEMBERED = 8
 """Predicates of which it is remembered from where moves lead into them."""
+
+
+@dataclass(frozen=True, slots=True)
+class Happening:
+    """An event of a batch, as one message can bring it about.
+
+    Attributes:
+        event: The event.
+        options: Data that it can carry; None: any.
+        may_be_left_out: True if it may as well not happen.
+    """
+
+    event: str
+    options: tuple[PossibleData, ...] | None
+    may_be_left_out: bool
+
+
+def message_cases(executable: ExecutableSystem, system: System, batch: Sequence[str]) -> list[tuple[Happening, ...]]:
+    """Return the moves of the surroundings that are one batch, without those that others contain.
+
+    Args:
+        executable: Executable system of the robot.
+        system: Its automata, as they are executed.
+        batch: Events of one message, in source order.
+    """
+    messages = {item.event(EventKind.RESPONSE): item for item in executable.model.communications}
+    choices = None
+    if len(batch) > 1:
+        choices = choices_together(executable.model, system, [messages[event] for event in batch])
+    if choices is None or len(choices) > MAXIMUM_CASES:
+        return [tuple(Happening(event, None, may_be_left_out=True) for event in batch)]
+    # Under the setting `on_unknown: keep` an event does not happen whose enum is unknown.
+    return [
+        tuple(
+            Happening(event, tuple(item for item in options if not (keeps and item.is_unknown)), left_out)
+            for event, options in zip(batch, choice, strict=True)
+            for left_out in [keeps and any(item.may_be_left_out for item in options)]
+        )
+        for choice in choices
+        for keeps in (False, True)
+        if not keeps or any(item.may_be_left_out for options in choice for item in options)
+    ]
 
 
 @dataclass(frozen=True, slots=True)
@@ -96,8 +138,8 @@ class ControllerArena:
         self._silent = tuple(self._silent_steps(executable, owed.cancels, encoder, reachable))
         self._ends_alike = all(steps.is_deterministic for _, steps in self._silent)
         self.positions = reachable & ~encoding.any_of(first for first, _ in self._silent)
-        for group in owed.exclusive:
-            self.positions = self.positions & self._at_most_one([encoder.holds(place.read) for place in group])
+        for tour in owed.tours:
+            self.positions = self.positions & self._at_most_one([encoder.holds(place.read) for place in tour.places])
         self.observed = self.positions
         for place in owed.places:
             before, after = encoder.holds(place.read), encoder.holds(place.update)
@@ -113,22 +155,15 @@ class ControllerArena:
 
     def _cases_of(self, executable: ExecutableSystem, batch: tuple[str, ...]) -> list[tuple[_Part, ...]]:
         """Return the cases of a batch, without those that others contain."""
-        messages = {item.event(EventKind.RESPONSE): item for item in executable.model.communications}
-        choices = None
-        if len(batch) > 1:
-            choices = choices_together(executable.model, self._encoding.system, [messages[event] for event in batch])
-        if choices is None or len(choices) > MAXIMUM_CASES:
-            return [tuple(_Part(self._steps[event], may_be_left_out=True) for event in batch)]
-        # Under the setting `on_unknown: keep` an event does not happen whose enum is unknown.
         return [
             tuple(
-                _Part(self._carrying(event, [item for item in options if not (keeps and item.is_unknown)]), left_out)
-                for event, options in zip(batch, choice, strict=True)
-                for left_out in [keeps and any(item.may_be_left_out for item in options)]
+                _Part(
+                    self._steps[item.event] if item.options is None else self._carrying(item.event, item.options),
+                    item.may_be_left_out,
+                )
+                for item in case
             )
-            for choice in choices
-            for keeps in (False, True)
-            if not keeps or any(item.may_be_left_out for options in choice for item in options)
+            for case in message_cases(executable, self._encoding.system, batch)
         ]
 
     def _carrying(self, event: str, options: Sequence[PossibleData]) -> Steps:

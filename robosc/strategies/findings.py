@@ -52,7 +52,7 @@ def goal_findings(
 
 def layer_goal_findings(model: Model, places: Places, deployment: Deployment) -> tuple[Diagnostic, ...]:
     """Return the diagnostic that goals and missions have no effect in a supervision layer, or none."""
-    if not (model.goals or model.missions) or deployment is not Deployment.LAYER:
+    if not model.has_goals or deployment is not Deployment.LAYER:
         return ()
     what = goals_and_missions(model)
     found = [

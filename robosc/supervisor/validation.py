@@ -31,6 +31,7 @@ from robosc.expressions import (
 from robosc.expressions.inference import Scope, has_type, is_assignable
 from robosc.model.preferences import contradiction
 from robosc.model.structure import (
+    MAXIMUM_VISITS,
     Assumption,
     Behaviour,
     Communication,
@@ -431,6 +432,8 @@ def _validate_missions(model: Model, names: _Names) -> None:
         with _at(f"mission {mission.name}"):
             if not mission.visits or not all(detour.visits for detour in mission.detours):
                 raise InvalidSupervisorError("a mission and each of its detours need a visit")
+            if max(map(len, (mission.visits, *(detour.visits for detour in mission.detours)))) > MAXIMUM_VISITS:
+                raise InvalidSupervisorError(f"a mission and each of its detours have at most {MAXIMUM_VISITS} visits")
             for expression in mission.expressions:
                 _require_boolean(expression, names.scope)
     for number, preference in enumerate(model.preferences, start=1):

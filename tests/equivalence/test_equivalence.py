@@ -14,12 +14,13 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.errors import UnsupportedModelError
-from robosc.model.structure import Deployment
+from robosc.model.structure import MAXIMUM_VISITS, Deployment, Model
 from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from support.c99 import GCC
 from support.effort import examples
 from support.equivalence.c99_target import C99Target, c99_target
+from support.equivalence.observation import Observation
 from support.equivalence.python_targets import PythonTarget, generated_python, observe, reference
 from support.equivalence.random_scenarios import random_scenario
 from support.equivalence.recorded import FOLDER, read_recorded, recorded_text
@@ -28,6 +29,7 @@ from support.equivalence.targets import compare
 from support.equivalence.worlds import WORLDS, live, robot_supervisor
 from support.generated import load_module, loaded_file
 from support.goal_porter import porter_supervisor
+from support.missions import strategic
 from support.models import model_of
 from support.random_controllers import random_controller, random_robot
 from support.random_couriers import strategic_courier
@@ -175,6 +177,61 @@ def test_strategies_in_c(tmp_path: Path) -> None:
         requests += sum(len(item.issued) for item in expected)
         logged.update(line["kind"] for item in expected for line in item.log)
     assert requests > 30 and all(logged[kind] for kind in ("reached", "approach", "owed", "met")), logged
+
+
+def _tour() -> Model:
+    """Return a robot with a mission as long as one may be, and others whose visits may all be true at once."""
+    rooms = range(7)
+    requests = "\n".join(f'incoming message go_{room} with identifier: "/go_{room}", type: none' for room in rooms)
+    states = "\n".join(
+        f"{'initial ' * (room == 0)}marked state r{room} {{ "
+        + " ".join(f"on request to go_{other} goto r{other}" for other in rooms if other != room)
+        + " }"
+        for room in rooms
+    )
+    visits = " then ".join(f"Base.r{5 * number % 7}" for number in range(1, MAXIMUM_VISITS + 1))
+    return model_of(f"""robot Tour {{
+    component Base {{
+        {requests}
+        behaviour {{ {states} }}
+    }}
+    component Operator {{
+        outgoing message work with identifier: "/work", type: boolean
+        outgoing message call with identifier: "/call", type: boolean
+        behaviour {{
+            variable working: boolean
+            variable calling: boolean
+            on response from work do working := value
+            on response from call do calling := value
+            initial marked state present {{ }}
+        }}
+    }}
+    mission rounds {{ visit {visits} }}
+    mission work while Operator.working {{
+        visit not Base.r1 then not Base.r2 then not Base.r3
+        on Operator.calling from anywhere visit Base.r4 then not Base.r4 then not Base.r5
+    }}
+}}""")
+
+
+def _run_of_a_tour() -> tuple[Supervisor, Scenario, list[Observation]]:
+    """Return the robot with a long mission and a run of it, in which it goes round."""
+    supervisor = strategic(_tour())
+    scenario = random_scenario(supervisor, 5, 250)
+    expected = observe(supervisor, scenario)
+    assert sum(len(item.issued) for item in expected) > 2 * MAXIMUM_VISITS
+    return supervisor, scenario, expected
+
+
+def test_a_long_mission_in_python() -> None:
+    supervisor, scenario, expected = _run_of_a_tour()
+    compare(python_target(supervisor), scenario, expected)
+
+
+@needs_gcc
+def test_a_long_mission_in_c(tmp_path: Path) -> None:
+    supervisor, scenario, expected = _run_of_a_tour()
+    compare(C99Target(supervisor, tmp_path), scenario, expected)
 
 
 TWO_WHEELS = """robot TwoWheels {

@@ -1,34 +1,47 @@
-"""Robots with missions for tests: conditions are written as goals, and then become visits."""
-
-from collections.abc import Callable, Sequence
-from typing import Any
+"""Robot with missions for tests, and supervisors with the strategies of such robots."""
 
 import msgspec
 
 from robosc.automata import ExecutableSystem, to_automata
-from robosc.expressions import Expression
 from robosc.model.structure import Deployment, Model
 from robosc.strategies import StrategyResult, synthesize_strategy
 from robosc.supervisor import Supervisor
 from robosc.synthesis import SynthesisStatus, synthesize
 from support.execution import supervisor_of
-from support.models import model_of
+
+_COURIER = """robot Courier {
+    component Base {
+        incoming message to_kitchen with identifier: "/to_kitchen", type: none
+        incoming message to_office with identifier: "/to_office", type: none
+        incoming message charge with identifier: "/charge", type: none
+        behaviour {
+            initial marked state dock { on request to to_kitchen goto kitchen on request to to_office goto office }
+            marked state kitchen { on request to to_office goto office on request to charge goto dock }
+            marked state office { on request to to_kitchen goto kitchen on request to charge goto dock }
+        }
+    }
+    component Caller {
+        outgoing message call with identifier: "/call", type: none
+        behaviour {
+            initial marked state quiet { on response from call goto waiting on request to to_office }
+            marked state waiting { on request to to_office goto quiet }
+        }
+    }
+    component Operator {
+        outgoing message begin with identifier: "/begin", type: none
+        outgoing message rest with identifier: "/rest", type: none
+        behaviour {
+            initial marked state resting { on response from begin goto working }
+            marked state working { on response from rest goto resting }
+        }
+    }
+    §
+}"""
 
 
-def with_conditions(text: str, conditions: Sequence[str], **parts: Callable[[Sequence[Expression]], Any]) -> Model:
-    """Return the model of a text with other parts, which are made of conditions over its states.
-
-    Args:
-        text: Text of a robot.
-        conditions: The conditions, as a user writes them.
-        parts: Functions from the conditions to the parts, by their names: `missions`, `goals`, `preferences`.
-    """
-    lines = "".join(f"goal once {item}\n" for item in conditions)
-    model = model_of(text.rstrip().removesuffix("}") + lines + "}\n")
-    split = len(model.goals) - len(conditions)
-    found = [goal.condition for goal in model.goals[split:]]
-    plain: dict[str, Any] = {"goals": model.goals[:split]}
-    return msgspec.structs.replace(model, **(plain | {name: make(found) for name, make in parts.items()}))
+def courier(*statements: str) -> str:
+    """Return the text of a courier that goes to three places, with statements behind its components."""
+    return _COURIER.replace("§", "\n    ".join(statements))
 
 
 def strategy_result(model: Model) -> StrategyResult:
@@ -40,9 +53,9 @@ def strategy_result(model: Model) -> StrategyResult:
 
 def strategic(model: Model) -> Supervisor:
     """Return the supervisor of a model whose goals and missions can be reached."""
-    result = synthesize(to_automata(model, Deployment.CONTROLLER))
+    added = synthesize(to_automata(model, Deployment.CONTROLLER)).added
     strategy = strategy_result(model).strategy
     assert strategy is not None
-    supervisor = supervisor_of(model, added=result.added)
+    supervisor = supervisor_of(model, added=added)
     certificate = msgspec.structs.replace(supervisor.certificate, goals="not checked")
     return msgspec.structs.replace(supervisor, strategy=strategy, certificate=certificate)

@@ -15,7 +15,7 @@ from robosc.automata.state import Subject
 from robosc.expressions import Binary, Constant, Expression, StateTest, VariableRead
 from robosc.expressions.text import expression_text
 from robosc.expressions.tree import children
-from robosc.model.structure import Deployment, Detour, Mission, Model
+from robosc.model.structure import MAXIMUM_VISITS, Deployment, Detour, Mission, Model
 from support.effort import examples
 from support.mission_twin import MissionTwin, mission_twin
 from support.models import model_of
@@ -43,8 +43,8 @@ class Remembered:
 
     def __init__(self, mission: Mission) -> None:
         found = journey(mission, 0)
-        self.aims, self.groups = found.aims, found.exclusive
-        self.places = tuple(place for group in found.exclusive for place in group)
+        self.aims, self.groups = found.aims, [tour.places for tour in found.tours]
+        self.places = tuple(place for group in self.groups for place in group)
         subjects = [Subject("C", name) for name in NAMES] + [Subject(MEMORY, place.name) for place in self.places]
         numbers = {subject: number for number, subject in enumerate(subjects)}
         self._updates = {place.name: compile_expression(place.update, numbers) for place in self.places}
@@ -153,11 +153,11 @@ def size(expression: Expression) -> int:
     return 1 + sum(map(size, children(expression)))
 
 
-@pytest.mark.parametrize("count", [12, 60])
+@pytest.mark.parametrize("count", [12, MAXIMUM_VISITS])
 def test_a_mission_with_many_visits_stays_small(count: int) -> None:
     long = (ATOMS * 10)[:count]
     found = journey(Mission("m", tuple(long), ATOMS[0], (Detour(ATOMS[1], tuple(long)),)), 0)
-    places = [place for group in found.exclusive for place in group]
+    places = [place for tour in found.tours for place in tour.places]
     assert len(places) == 2 * count - 1 and len(found.aims) == 2 * count
     assert max(size(place.update) for place in places) < 30 * count
     assert max(size(aim.condition) for aim in found.aims) < 8 * count
@@ -211,7 +211,7 @@ def test_what_is_remembered_of_missions_reads_as_sentences(model: Model) -> None
     ]
     assert expression_text(owed.aims[-2].condition) == "detour 2 of mission rounds is not at visit 1"
     # The verb is the last one, whatever the name of a mission.
-    (place,) = journey(Mission("is", (ATOMS[0], ATOMS[1])), 0).exclusive[0]
+    (place,) = journey(Mission("is", (ATOMS[0], ATOMS[1])), 0).tours[0].places
     assert expression_text(journey(Mission("is", (ATOMS[0],)), 0).aims[0].condition).startswith("holds(")
     named = journey(Mission("is", (ATOMS[0], ATOMS[1])), 0).aims[1].condition
     assert expression_text(named).startswith("mission is is not at visit 2 or ")

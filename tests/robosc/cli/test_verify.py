@@ -8,7 +8,9 @@ import pytest
 
 from robosc.cli.main import main
 from robosc.supervisor import decode, encode
+from robosc.targets import generate
 from support.goal_porter import PORTER
+from support.missions import courier
 from support.models import EXAMPLES
 from support.mutants import change
 
@@ -117,6 +119,104 @@ def test_a_strategy_is_checked_and_it_is_said_where_it_is_not(
     status, document = _json(capsys, idle, model)
     assert (status, document["status"], document["checks"]["goals"]) == (1, "failed", "failed")
     assert document["faults"][-1]["trace"] == ["call.response"]
+
+
+COURIER = courier(
+    "mission rounds while Operator.working {",
+    "    visit Base.kitchen then Base.dock",
+    "    on Caller.waiting from anywhere visit Base.office",
+    "}",
+    "mission home { visit Base.dock or Operator.working }",
+    "prefer to_office over to_kitchen",
+)
+
+
+@pytest.fixture(scope="module")
+def missions(tmp_path_factory: pytest.TempPathFactory) -> tuple[str, str]:
+    """Return the paths of a model with missions and of its supervisor."""
+    folder = tmp_path_factory.mktemp("missions")
+    (folder / "courier.rscd").write_text(COURIER)
+    model, path = (str(folder / name) for name in ("courier.rscd", "courier.rsup"))
+    assert main(["synth", model, "-o", path]) == 0
+    return model, path
+
+
+def test_missions_go_from_the_text_through_a_file_into_a_package(
+    capsys: pytest.CaptureFixture[str], missions: tuple[str, str], tmp_path: Path
+) -> None:
+    model, path = missions
+    capsys.readouterr()
+    assert main(["verify", path, model, "--strict"]) == 0
+    assert "  goals                 passed" in capsys.readouterr().out.splitlines()
+    supervisor = decode(Path(path).read_bytes())
+    assert encode(supervisor) == Path(path).read_bytes()
+    assert supervisor.strategy is not None and len(supervisor.strategy.modes) == 4
+    for target in ("python", "c99"):
+        assert main(["generate", model, "--target", target, "-o", str(tmp_path / target)]) == 0
+        written = generate(supervisor, target)
+        assert {name: (tmp_path / target / name).read_text(encoding="utf-8") for name in written} == dict(written)
+
+
+@pytest.mark.parametrize(
+    ("is_idle", "words"),
+    [
+        (True, "under the strategy visit 1 of mission rounds may never"),
+        (False, "the strategy chooses a request that is"),
+    ],
+)
+def test_a_strategy_that_makes_no_visit_or_exchanges_them_fails(
+    capsys: pytest.CaptureFixture[str], missions: tuple[str, str], tmp_path: Path, is_idle: bool, words: str
+) -> None:
+    model, path = missions
+    supervisor = decode(Path(path).read_bytes())
+    assert supervisor.strategy is not None
+    kitchen, dock, *others = supervisor.strategy.modes
+    bad = tmp_path / "bad.rsup"
+    modes = (() if is_idle else dock, kitchen, *others)
+    bad.write_bytes(encode(change(supervisor, strategy=change(supervisor.strategy, modes=modes))))
+    capsys.readouterr()
+    assert main(["verify", "-q", str(bad), model]) == 1
+    lines = capsys.readouterr().out.splitlines()
+    assert lines[2].startswith(f"goals: {words}")
+
+
+NOWHERE = {"node": "state", "component": "Lift", "state": "up"}
+
+
+@pytest.mark.parametrize(
+    ("path", "new", "words"),
+    [
+        ("strategy.modes", [], "the strategy has not one mode for each goal and each visit"),
+        ("strategy.modes", [[]] * 3, "the strategy has not one mode for each goal and each visit"),
+        ("strategy.modes", [[]] * 5, "the strategy has not one mode for each goal and each visit"),
+        ("strategy", None, "a strategy belongs to a controller with goals or missions"),
+        ("certificate.goals", None, "the certificate speaks of goals exactly where there is a strategy"),
+        ("model.missions", [], "a strategy belongs to a controller with goals or missions"),
+        ("model.missions.0.visits", [], "mission rounds: a mission and each of its detours need a visit"),
+        ("model.missions.0.visits.0", NOWHERE, "mission rounds: there is no "),
+        ("model.missions.0.detours.0.visits.0", NOWHERE, "mission rounds: there is no "),
+        ("model.missions.0.detours.0.trigger", NOWHERE, "mission rounds: there is no "),
+        ("model.missions.0.condition", NOWHERE, "mission rounds: there is no "),
+        ("model.preferences.0.preferred", ["fly"], "preference 1: there is no communication fly"),
+        ("model.preferences.0.others", ["call"], "preference 1: call has no request"),
+    ],
+)
+def test_a_file_whose_missions_were_tampered_with_is_refused(
+    capsys: pytest.CaptureFixture[str], missions: tuple[str, str], tmp_path: Path, path: str, new: Any, words: str
+) -> None:
+    model, right = missions
+    document = json.loads(Path(right).read_bytes())
+    at = document["supervisor"]
+    *steps, last = [int(step) if step.isdigit() else step for step in path.split(".")]
+    for step in steps:
+        at = at[step]
+    at[last] = new
+    bad = tmp_path / "bad.rsup"
+    bad.write_text(json.dumps(document), encoding="utf-8")
+    capsys.readouterr()
+    assert main(["verify", str(bad), model]) == 1
+    printed = capsys.readouterr()
+    assert words in printed.out + printed.err
 
 
 def test_a_supervisor_without_its_model_is_wrong_use(capsys: pytest.CaptureFixture[str], right: str) -> None:

@@ -514,6 +514,18 @@ EXTENSION_RULES: list[tuple[str, str, str, str]] = [
         robot(component(STATES), "mission m { visit C.a } mission n { visit C.b }"),
     ),
     (
+        "too-many-visits",
+        "error",
+        robot(component(STATES), f"mission m {{ visit {'C.a then ' * 50}§C.b }}"),
+        robot(component(STATES), f"mission m {{ visit {'C.a then ' * 49}C.b }}"),
+    ),
+    (
+        "too-many-visits",
+        "error",
+        robot(component(STATES), f"mission m {{ visit C.a on C.b from anywhere visit {'C.a then ' * 50}§C.b }}"),
+        robot(component(STATES), f"mission m {{ visit C.a on C.b from anywhere visit {'C.a then ' * 49}C.b }}"),
+    ),
+    (
         "preference-on-outgoing",
         "error",
         robot(component(STATES, f"{GO} outgoing message sent with type: none"), "goal once C.a prefer go over §sent"),

@@ -133,6 +133,56 @@ def test_random_robots_are_denied_a_goal(record_property: Callable[[str, object]
     assert min(met["played"], met["requested"]) > 20 and met["surroundings moved"] > 5, met
 
 
+PATROL = """robot Patrol {
+    interface battery use BatteryState from sensor_msgs
+    datatype object Charge { percentage: double }
+    datatype enum Level from Charge to { value.percentage < 0.2 -> low default -> good }
+    datatype enum Reserve from Charge to { value.percentage < 0.3 -> small default -> large }
+    component Battery {
+        outgoing message level with identifier: "/battery", type: Level links battery
+        behaviour {
+            variable level: Level = good
+            on response from level do level := value
+            initial marked state ready { }
+        }
+    }
+    component Planner {
+        outgoing message reserve with identifier: "/battery", type: Reserve links battery
+        behaviour {
+            variable reserve: Reserve = large
+            on response from reserve do reserve := value
+            initial marked state ready { }
+        }
+    }
+    component Base {
+        incoming message dock with type: none
+        incoming message leave with type: none
+        behaviour {
+            initial marked state away { on request to dock goto docked }
+            marked state docked { on request to leave goto away }
+        }
+    }
+    requirement dock needs Battery.level = good and Planner.reserve = small
+    assume always eventually Battery.level = low
+    goal always eventually Base.docked
+    goal always eventually Base.away
+}
+"""
+
+
+def test_what_several_components_read_in_a_message_comes_together() -> None:
+    run = run_of(PATROL)
+    met = set()
+    for _ in range(6):
+        run.wait()
+        met.add((run.state.variables["Battery.level"], run.state.variables["Planner.reserve"]))
+    assert run.came_true[0] > 0
+    # A battery that is low for one component has a small reserve for the other.
+    assert ("low", "small") in met and ("low", "large") not in met
+    sent = [(step.event, step.data["value"]) for step in run.history]
+    assert sent[:2] == [("level.response", "low"), ("reserve.response", "small")]
+
+
 MISSION = """robot Porter {
     component Base {
         incoming message enter with type: none

@@ -1,7 +1,6 @@
 """Missions and preferences by hand: what strategies do for them, in words and in runs, and what is found about them."""
 
 import json
-from collections.abc import Sequence
 
 import msgspec
 import pytest
@@ -14,45 +13,15 @@ from robosc.conditions.summary import strategy_lines, summary_json
 from robosc.controller_properties import check_strategy
 from robosc.errors import Diagnostic
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.expressions import Expression
 from robosc.model.places import Places
-from robosc.model.structure import Deployment, Detour, Mission, Model, Preference
+from robosc.model.structure import Deployment, Model, Preference
 from robosc.source import Location
 from robosc.strategies import goal_findings, layer_goal_findings
 from robosc.strategies.preferences import preferred_order
 from robosc.supervisor import Supervisor
 from support.execution import Bench
-from support.missions import strategic, strategy_result, with_conditions
+from support.missions import courier, strategic, strategy_result
 from support.models import model_of
-
-ROUNDS = """robot Courier {
-    component Base {
-        incoming message to_kitchen with identifier: "/to_kitchen", type: none
-        incoming message to_office with identifier: "/to_office", type: none
-        incoming message charge with identifier: "/charge", type: none
-        behaviour {
-            initial marked state dock { on request to to_kitchen goto kitchen on request to to_office goto office }
-            marked state kitchen { on request to to_office goto office on request to charge goto dock }
-            marked state office { on request to to_kitchen goto kitchen on request to charge goto dock }
-        }
-    }
-    component Caller {
-        outgoing message call with identifier: "/call", type: none
-        behaviour {
-            initial marked state quiet { on response from call goto waiting on request to to_office }
-            marked state waiting { on request to to_office goto quiet }
-        }
-    }
-    component Operator {
-        outgoing message begin with identifier: "/begin", type: none
-        outgoing message rest with identifier: "/rest", type: none
-        behaviour {
-            initial marked state resting { on response from begin goto working }
-            marked state working { on response from rest goto resting }
-        }
-    }
-}"""
-CONDITIONS = ("Base.kitchen", "Base.office", "Base.dock", "Caller.waiting", "Operator.working")
 
 
 def robot(*visits: str, asked: bool = False, detour: bool = False, prefer: tuple[str, str] | None = None) -> Model:
@@ -64,14 +33,11 @@ def robot(*visits: str, asked: bool = False, detour: bool = False, prefer: tuple
         detour: True if it has a detour to the office on each call.
         prefer: Communication that is preferred, and the one that it is preferred to.
     """
-
-    def made(conditions: Sequence[Expression]) -> tuple[Mission, ...]:
-        named = dict(zip(("kitchen", "office", "dock", "waiting", "working"), conditions, strict=True))
-        detours = (Detour(named["waiting"], (named["office"],)),) if detour else ()
-        return (Mission("rounds", tuple(named[item] for item in visits), named["working"] if asked else None, detours),)
-
-    preferences = () if prefer is None else (Preference((prefer[0],), (prefer[1],)),)
-    return with_conditions(ROUNDS, CONDITIONS, missions=made, preferences=lambda _: preferences)
+    places = " then ".join(f"Base.{item}" for item in visits)
+    condition = " while Operator.working" if asked else ""
+    call = " on Caller.waiting from anywhere visit Base.office" if detour else ""
+    preference = "" if prefer is None else f"prefer {' over '.join(prefer)}"
+    return model_of(courier(f"mission rounds{condition} {{ visit {places}{call} }}", preference))
 
 
 def sent(bench: Bench, periods: int) -> list[str]:
@@ -182,13 +148,10 @@ def test_a_detour_is_begun_where_the_way_to_a_visit_leads_through_it() -> None:
 
 def test_a_visit_is_not_put_off_until_its_mission_is_not_asked_for_any_more() -> None:
     """The surroundings end each mission sooner or later; until then, it is made."""
-    text = (
-        ROUNDS.rstrip().removesuffix("}")
-        + """
-        mission rounds while Operator.working { visit Base.kitchen then Base.office }
-        mission waiting while Operator.resting { visit Base.dock then Base.kitchen }
-        assume always eventually Operator.working
-    }"""
+    text = courier(
+        "mission rounds while Operator.working { visit Base.kitchen then Base.office }",
+        "mission waiting while Operator.resting { visit Base.dock then Base.kitchen }",
+        "assume always eventually Operator.working",
     )
     bench = bench_of(model_of(text))
     assert sent(bench, 3) == ["to_kitchen", "charge", "to_kitchen"]
@@ -210,21 +173,17 @@ def test_of_requests_that_lead_nearer_the_preferred_one_is_chosen() -> None:
                 marked state home { on request to back goto out }
             }
         }
+        §
     }"""
 
-    def way(*preferences: Preference) -> list[str]:
-        made = with_conditions(
-            ways,
-            ("Base.home", "Base.out"),
-            missions=lambda found: (Mission("m", tuple(found)),),
-            preferences=lambda _: preferences,
-        )
-        return sent(bench_of(made), 2)
+    def way(*preferences: str) -> list[str]:
+        mission = "mission m { visit Base.home then Base.out }"
+        return sent(bench_of(model_of(ways.replace("§", "\n".join((mission, *preferences))))), 2)
 
     assert way() == ["left", "back"]
-    assert way(Preference(("right",), ("left",))) == ["right", "back"]
+    assert way("prefer right over left") == ["right", "back"]
     # A request that leads nowhere is not chosen, however much it is preferred.
-    assert way(Preference(("middle",), ("left", "right"))) == ["left", "back"]
+    assert way("prefer middle over { left, right }") == ["left", "back"]
 
 
 def test_preferences_refine_the_order_of_the_source() -> None:
@@ -313,7 +272,11 @@ def test_a_mission_whose_visits_are_all_true_is_at_rest() -> None:
     assert run.step("charge.request").visits == ("visit 1 of mission rounds",)
 
 
-STUCK = ROUNDS.replace("on request to charge goto dock", "").replace("/charge", "/unused")
+STUCK = courier("§").replace("on request to charge goto dock", "").replace("/charge", "/unused")
+
+
+def stuck(mission: str) -> Model:
+    return model_of(STUCK.replace("§", mission))
 
 
 def findings(model: Model, deployment: Deployment = Deployment.CONTROLLER) -> tuple[Diagnostic, ...]:
@@ -342,24 +305,17 @@ def line(found: Diagnostic) -> int:
 
 
 def test_a_visit_that_cannot_be_made_is_found_where_it_stands() -> None:
-    model = with_conditions(
-        STUCK, ("Base.kitchen", "Base.dock", "Base.office"), missions=lambda found: (Mission("m", tuple(found)),)
-    )
-    (found,) = findings(model)
+    (found,) = findings(stuck("mission m { visit Base.kitchen then Base.dock then Base.office }"))
     assert (found.code, line(found)) == ("unreachable-goal", 101)
     assert found.message.startswith(
         "these visits together cannot be reached again and again, whatever the surroundings"
     )
     assert [(item.message, item.location.line) for item in found.related] == [("this visit belongs to them", 100)]
-    (found,) = findings(
-        with_conditions(STUCK, ("Base.dock and Base.office",), missions=lambda found: (Mission("m", tuple(found)),))
-    )
+    (found,) = findings(stuck("mission m { visit Base.dock and Base.office }"))
     assert (line(found), found.message.split(",")[0]) == (100, "this visit cannot be reached again and again")
     (found,) = findings(
-        with_conditions(
-            STUCK,
-            ("Base.kitchen", "Base.office", "Caller.waiting", "Operator.working"),
-            missions=lambda found: (Mission("m", tuple(found[:2]), None, (Detour(found[2], (found[3],)),)),),
+        stuck(
+            "mission m { visit Base.kitchen then Base.office on Caller.waiting from anywhere visit Operator.working }"
         )
     )
     assert found.message == "the surroundings can keep this visit from coming true, for ever"

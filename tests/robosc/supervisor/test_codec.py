@@ -425,6 +425,8 @@ IDLE = {"node": "state", "component": "Base", "state": "idle"}
 INCONSISTENT_MISSIONS: list[tuple[str, Any, str]] = [
     ("missions.0.visits", [], "mission rounds: a mission and each of its detours need a visit"),
     ("missions.0.detours.0.visits", [], "mission rounds: a mission and each of its detours need a visit"),
+    ("missions.0.visits", [IDLE] * 51, "mission rounds: a mission and each of its detours have at most 50 visits"),
+    ("missions.0.detours.0.visits", [IDLE] * 51, "mission rounds: .* at most 50 visits"),
     ("missions.0.visits.1", NUMBER, "mission rounds: a condition is .*, not boolean"),
     ("missions.0.visits.1", ASIDE, "Sensor.level is read in synthesis"),
     ("missions.0.visits.0", RECEIVED, "mission rounds: "),

@@ -65,10 +65,14 @@ def test_a_node_publishes_its_state_in_the_form_that_is_asked_for(
         "communications": {"calibrate": "idle"},
         "transitions": [3, 1],
     }
-    executor = SimpleNamespace(status=SimpleNamespace(value="stopped"), reasons=("scan is stale",))
+    executor = SimpleNamespace(status=SimpleNamespace(value="stopped"), reasons=("scan is stale",), progress=None)
     with imported(generate(example_supervisor(MAZE), "ros2"), tmp_path, f"{PACKAGE}.state_publisher") as generated:
-        generated.StatePublisher(node, "/r", form).publish(executor, look, lambda given: f"text of {len(given)}")
-    assert [item.data for item in node.published.get("/r/state", [])] == ([] if form == "typed" else ["text of 3"])
+        generated.StatePublisher(node, "/r", form).publish(
+            executor, look, lambda given, progress: f"text of {len(given)}, {progress}"
+        )
+    assert [item.data for item in node.published.get("/r/state", [])] == (
+        [] if form == "typed" else ["text of 3, None"]
+    )
     typed = node.published.get("~/state", [])
     assert len(typed) == (form != "json")
     for message in typed:

@@ -35,6 +35,7 @@ from support.random_controllers import random_controller, random_robot
 from support.random_couriers import strategic_courier
 from support.random_goals import strategic_controller
 from support.random_supervisors import CERTIFICATE, random_supervisor
+from support.rounds import long_detour_supervisor
 
 ROBOTS = sorted(WORLDS)
 needs_gcc = pytest.mark.skipif(GCC is None, reason="gcc is not installed")
@@ -142,7 +143,8 @@ def _strategic(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
 
 
 def _couriers(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
-    """Yield random robots with missions, with a run of each under its strategy."""
+    """Yield a robot with a detour of two visits, and random ones with missions, each with a run under its strategy."""
+    yield long_detour_supervisor(), random_scenario(long_detour_supervisor(), first, 200)
     for seed in range(first, first + 60):
         supervisor = strategic_courier(seed)
         if supervisor is not None:

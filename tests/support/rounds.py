@@ -48,9 +48,22 @@ ROUNDS = "\n".join(
 """Its text: each place is reached by one request, which is taken at once."""
 
 
+_LONG_DETOUR = ROUNDS.replace("visit Base.hall", "visit Base.hall then Base.kitchen")
+
+
+def _supervisor_of(text: str) -> Supervisor:
+    made = make_supervisor(bundle_of(text))
+    assert made.supervisor is not None, made.diagnostics
+    return made.supervisor
+
+
 @cache
 def rounds_supervisor() -> Supervisor:
     """Return its supervisor, with its strategy."""
-    made = make_supervisor(bundle_of(ROUNDS))
-    assert made.supervisor is not None, made.diagnostics
-    return made.supervisor
+    return _supervisor_of(ROUNDS)
+
+
+@cache
+def long_detour_supervisor() -> Supervisor:
+    """Return the supervisor of a robot whose detour has two visits."""
+    return _supervisor_of(_LONG_DETOUR)

@@ -13,7 +13,8 @@ import robosc_client
 from robosc.explanation import RequestError
 from robosc.source import SourceFile
 from robosc_api.v1 import synthesis_pb2 as pb
-from robosc_client import AsyncClient, Client, NotThereError, Verify
+from robosc_client import AsyncClient, Client, Explain, NotThereError, Synthesize, Verify
+from robosc_client.commands.jobs import result_json
 from robosc_client.convert.requests import request_of
 from support.models import EMPTY, EXAMPLES, UNSUPPORTED
 from support.service import served
@@ -173,6 +174,15 @@ def test_goals_that_cannot_be_reached(client: Client) -> None:
     remote = client.explain(robosc.load(text=TEXTS["denied"], name="denied.rscd")).explanation
     assert isinstance(local, robosc.GoalExplanation) and isinstance(remote, robosc.GoalExplanation)
     assert local == remote and local.document() == remote.document()
+    # The results of jobs are printed with the same keys.
+    denied = robosc.load(text=TEXTS["denied"], name="denied.rscd")
+    for task in (Explain(model=denied), Synthesize(denied)):
+        job = client.submit(task).job
+        for _ in client.watch(job.id):
+            pass
+        printed = result_json(client.job_result(job.id))
+        assert (printed["status"], printed["explanation"]) == ("model errors", None)
+        assert printed["goals"] == local.document()
     assert remote.has_counter_strategy
     assert [item.text for item in remote.blamed] == ["requirement enter needs Door.ajar"]
     with pytest.raises(robosc.NoCounterStrategyError, match="on this machine"):

@@ -398,5 +398,7 @@ def test_in_a_layer_missions_have_no_effect() -> None:
     (found,) = findings(model, Deployment.LAYER)
     assert (found.code, line(found)) == ("goals-in-layer", 50)
     assert found.message.startswith("missions have no effect in a supervision layer")
-    assert [(item.message, item.location.line) for item in found.related] == [("this preference neither", 60)]
+    assert [(item.message, item.location.line) for item in found.related] == [
+        ("this preference has no effect, either", 60)
+    ]
     assert findings(msgspec.structs.replace(model, missions=()), Deployment.LAYER) == ()

@@ -289,8 +289,12 @@ class ControllerArena:
 
     def together(self, predicate: Any) -> Any:
         """Return the positions from which a move of either side can lead into a predicate."""
+        return self.turn(predicate) | self.responses(predicate)
+
+    def responses(self, predicate: Any) -> Any:
+        """Return the positions from which a move of the surroundings can lead into a predicate."""
         arriving = self.arriving(predicate)
-        found = self.turn(predicate)
+        found = self._manager.false
         for case in self._cases:
             inside = arriving
             for part in reversed(case):

@@ -56,9 +56,9 @@ def layer_goal_findings(model: Model, places: Places, deployment: Deployment) ->
         return ()
     what = goals_and_missions(model)
     found = [
-        *(("this goal neither", place) for place in places.goals),
-        *(("this mission neither", place) for place in places.missions),
-        *(("this preference neither", place) for place in places.preferences),
+        *(("this goal has no effect, either", place) for place in places.goals),
+        *(("this mission has no effect, either", place) for place in places.missions),
+        *(("this preference has no effect, either", place) for place in places.preferences),
     ]
     return (
         Diagnostic(

@@ -5,7 +5,7 @@ goal or visit of a mission is approached; once it is true the next one in turn i
 goal: that the mission is not at it any more.
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
@@ -116,7 +116,7 @@ class StrategySynthesis:
             visits = [solution.approaches[number] for number, _ in self._interruptible()]
             unneeded = tuple(item for item in unneeded if not any(self._rely(steps, item) for steps in visits))
         return StrategyResult(
-            strategy=self._strategy(solution) if is_won and not preventable else None,
+            strategy=self._strategy(solution, allowed) if is_won and not preventable else None,
             unreached=unreached,
             is_hopeless=bool(unreached) and not self.can_be_reached(unreached),
             preventable=preventable,
@@ -316,13 +316,62 @@ class StrategySynthesis:
             )
         return replace(solution, approaches=tuple(approaches))
 
-    def _strategy(self, solution: Solution) -> Strategy:
+    def _strategy(self, solution: Solution, allowed: Collection[int]) -> Strategy:
         simplifier = Simplifier(self._encoding, self._seconds)
         met = self.arena.met()
-        return Strategy(tuple(self._mode(solution, number, simplifier, met) for number in range(len(self.goals))))
+        near = {item: self._left_to_surroundings(self.assumptions[item]) for item in allowed}
+        return Strategy(tuple(self._mode(solution, number, simplifier, met, near) for number in range(len(self.goals))))
 
-    def _mode(self, solution: Solution, number: int, simplifier: Simplifier, met: Any) -> tuple[Choice, ...]:
-        """Return the requests that approach a goal, in order, each with the condition for choosing it."""
+    def _left_to_surroundings(self, assumption: Any) -> Any:
+        """Return the positions from which the surroundings alone can make an assumption true."""
+        found, before = assumption, None
+        while found != before:
+            before = found
+            found = found | self.arena.responses(found)
+        return found
+
+    def _helping(self, approach: Approach, number: int, place: int, near: Any) -> Iterator[tuple[str, Any]]:
+        """Yield requests, each with positions in which it helps the surroundings to make an assumption true.
+
+        While the assumption fails the controller may do whatever stays where it can wait for it. It does what leads to
+        where the surroundings have their part to do, such as calling a service once more.
+
+        Args:
+            approach: Step towards a goal.
+            number: Number of the goal.
+            place: Number of the assumption.
+            near: Positions from which the surroundings alone can make it true.
+        """
+        staying, progress = approach.waiting[place], approach.progress
+        interruption = self._aims[number].interruption
+        if interruption is not None:
+            progress = progress & ~self.arena.condition(interruption)
+        found, before = staying & (near | progress), None
+        while found != before:
+            before = found
+            closer = staying & self.arena.responses(found) & ~found
+            if closer != self._manager.false:
+                found = found | closer
+                continue
+            for event in self._requests:
+                helped = staying & ~found & self.arena.choice(event, before)
+                if helped != self._manager.false:
+                    yield event, helped
+                    found = found | helped
+
+    def _mode(
+        self, solution: Solution, number: int, simplifier: Simplifier, met: Any, near: Mapping[int, Any]
+    ) -> tuple[Choice, ...]:
+        """Return the requests that approach a goal, in order, each with the condition for choosing it.
+
+        Args:
+            solution: The solution.
+            number: Number of the goal.
+            simplifier: Simplifier of the conditions.
+            met: Positions that can be met.
+            near: For each assumption that the robot may keep from coming true, the positions from which the
+                surroundings alone can make it true.
+        """
         chosen: dict[str, Any] = {}
         decided = self.goals[number]
         for approach in solution.approaches[number]:
@@ -330,6 +379,11 @@ class StrategySynthesis:
             for target, event in product(approach.onwards, self._requests):
                 found = here & ~decided & self.arena.choice(event, target)
                 if found != self._manager.false:
+                    chosen[event] = chosen.get(event, self._manager.false) | found
+                    decided = decided | found
+            for place, positions in near.items():
+                for event, helped in self._helping(approach, number, place, positions):
+                    found = here & ~decided & helped
                     chosen[event] = chosen.get(event, self._manager.false) | found
                     decided = decided | found
         care = solution.winning & met & ~self.goals[number]

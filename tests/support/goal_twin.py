@@ -143,6 +143,13 @@ class Game:
             found |= wider
         return found
 
+    def alone(self, item: Item | _Visit) -> set[Position]:
+        """Return the positions from which the surroundings alone can make an assumption or a goal true."""
+        found = {position for position in self.choices if self.holds(position, item)}
+        while wider := {position for position, targets in self.successors.items() if targets & found} - found:
+            found |= wider
+        return found
+
     def holding(self, position: Position, items: Sequence[Item | _Visit]) -> tuple[bool, ...]:
         (state, _), marks = position
         offset = 0 if items is self.assumptions else len(self.assumptions)

@@ -159,6 +159,33 @@ def test_a_visit_is_not_put_off_until_its_mission_is_not_asked_for_any_more() ->
     assert sent(bench, 2) == ["to_office", "to_kitchen"]
 
 
+def test_what_the_surroundings_may_fail_at_is_tried_again() -> None:
+    """The robot could wait for the assumption, which fails for as long as it does not ask."""
+    text = """robot Gripping {
+        component Gripper {
+            incoming message grip with identifier: "/grip", type: none
+            incoming message release with identifier: "/release", type: none
+            outgoing message held with identifier: "/held", type: none
+            outgoing message missed with identifier: "/missed", type: none
+            behaviour {
+                initial marked state open { on request to grip goto closing }
+                state closing { on response from held goto holding on response from missed goto open }
+                marked state holding { on request to release goto open }
+            }
+        }
+        goal always eventually Gripper.holding
+        goal always eventually Gripper.open
+        assume allow Gripper.closing leads to Gripper.holding
+    }"""
+    bench = bench_of(model_of(text))
+    assert sent(bench, 2) == ["grip"]
+    for _ in range(3):
+        bench.executor.receive("/missed", None)
+        assert sent(bench, 2) == ["grip"]
+    bench.executor.receive("/held", None)
+    assert sent(bench, 2) == ["release", "grip"]
+
+
 def test_of_requests_that_lead_nearer_the_preferred_one_is_chosen() -> None:
     ways = """robot Ways {
         component Base {
@@ -327,5 +354,7 @@ def test_in_a_layer_missions_have_no_effect() -> None:
     (found,) = findings(model, Deployment.LAYER)
     assert (found.code, line(found)) == ("goals-in-layer", 50)
     assert found.message.startswith("missions have no effect in a supervision layer")
-    assert [(item.message, item.location.line) for item in found.related] == [("this preference neither", 60)]
+    assert [(item.message, item.location.line) for item in found.related] == [
+        ("this preference has no effect, either", 60)
+    ]
     assert findings(msgspec.structs.replace(model, missions=()), Deployment.LAYER) == ()

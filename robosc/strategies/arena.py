@@ -94,6 +94,8 @@ class ControllerArena:
         self._surrounded: list[tuple[Any, Any, Any]] = []
         reachable = self._reachable()
         self._silent = tuple(self._silent_steps(executable, owed.cancels, encoder, reachable))
+        self._led = tuple(steps.image(first) for first, steps in self._silent)
+        """For each silent step the states that it leads to."""
         self._ends_alike = all(steps.is_deterministic for _, steps in self._silent)
         self.positions = reachable & ~encoding.any_of(first for first, _ in self._silent)
         for group in owed.exclusive:
@@ -207,9 +209,11 @@ class ControllerArena:
         found = fresh = self.positions & observed
         while fresh != self._manager.false:
             before = self._manager.false
-            for first, steps in self._silent:
+            for (first, steps), led in zip(self._silent, self._led, strict=True):
                 self._monitor.check_stop()
-                before = before | (first & steps.some(fresh))
+                within = fresh & led
+                if within != self._manager.false:
+                    before = before | (first & steps.some(within))
             fresh = before & ~found
             found = found | fresh
         return found

@@ -112,6 +112,7 @@ class ControllerArena:
         """Moves of the surroundings: for each, the events of one message, with data that it can hold."""
         self.requests = tuple(event for event in executable.requests if event in self._steps)
         """Events of requests, in source order."""
+        self._possible = {event: self.positions & self._enabled(event) for event in self.requests}
 
     def _cases_of(self, executable: ExecutableSystem, batch: tuple[str, ...]) -> list[tuple[_Part, ...]]:
         """Return the cases of a batch, without those that others contain."""
@@ -253,7 +254,7 @@ class ControllerArena:
         self._monitor.check_stop()
         steps = self._steps[event]
         arriving = self.arriving(predicate)
-        found = self.positions & self._enabled(event) & steps.some(arriving)
+        found = self._possible[event] & steps.some(arriving)
         return found if steps.is_deterministic else found & steps.only(arriving)
 
     def together(self, predicate: Any) -> Any:

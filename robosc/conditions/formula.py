@@ -8,9 +8,10 @@ Sources: R. K. Brayton, "Factoring logic functions", IBM Journal of Research and
 """
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
-from functools import partial
+from functools import lru_cache, partial
 
 from robosc.conditions.cover import MAXIMUM_CUBES, Words, cover
 from robosc.conditions.literals import Vocabulary, joined, operands, spine
@@ -28,6 +29,15 @@ _LONG = 5
 
 _MAXIMUM_OUTCOMES = 4
 """Maximum number of outcomes of one place where a formula is divided by its values."""
+
+_WIDE = 12
+"""Operands from which on more of them allow no more products."""
+
+_SYSTEMS = 2
+"""Systems whose conditions are remembered with their formulas: many are written again after they were chosen."""
+
+_KEPT, _KEPT_NODES = 200, 1_000
+"""Conditions of one system that are remembered, and the nodes that each of them may have."""
 
 STEPS = 30_000
 """Steps that the search for one formula may take: some hundredths of a second."""
@@ -58,7 +68,7 @@ _Factors = frozenset[_Literal]
 
 def _most_cubes(limit: int) -> int:
     """Cubes that a sum of so many operands can have: most of them if it is a product of sums of three."""
-    return min(MAXIMUM_CUBES, max(2, round(3 ** (min(limit, 12) / 3))))
+    return min(MAXIMUM_CUBES, max(2, round(3 ** (min(limit, _WIDE) / 3))))
 
 
 def to_expression(
@@ -82,12 +92,41 @@ def formula_in(vocabulary: Vocabulary, diagram: DecisionDiagram, *, limit: int, 
     if effort.available < 1:
         # Every node takes a step: to read a large diagram for it would take long.
         return None
+    # Beyond these operands the limit decides nothing in a search, so that its result is the same for other limits.
+    most = min(limit, max(_WIDE, len({(node.automaton, node.variable) for node in diagram.nodes})))
+    if effort.available < STEPS or len(diagram.nodes) > _KEPT_NODES:
+        found = _search(vocabulary, diagram, most, effort)
+    else:
+        searches, key = _searches(vocabulary.words), (diagram, most)
+        if key not in searches:
+            left = effort.left
+            if len(searches) == _KEPT:
+                searches.clear()
+            searches[key] = _search(vocabulary, diagram, most, effort), left - effort.left
+        else:
+            # Later results must not depend on earlier searches.
+            with suppress(EffortExceededError):
+                effort.spend(searches[key][1])
+        found = searches[key][0]
+    return found if found is not None and operands(found) <= limit else None
+
+
+@lru_cache(maxsize=_SYSTEMS)
+def _searches(words: Hashable) -> dict[tuple[DecisionDiagram, int], tuple[Expression | None, int]]:
+    """Return the searches that are done for a vocabulary: what each found for a diagram and a limit, and its steps.
+
+    Args:
+        words: All that decides about the vocabulary's tests.
+    """
+    return {}
+
+
+def _search(vocabulary: Vocabulary, diagram: DecisionDiagram, limit: int, effort: Effort) -> Expression | None:
     try:
         space = space_of([diagram], vocabulary.domains, effort.part(STEPS))
-        found = _Formulas(space, vocabulary, limit).shortest(space.of(diagram))
+        return _Formulas(space, vocabulary, limit).shortest(space.of(diagram))
     except EffortExceededError:
         return None
-    return found if found is not None and operands(found) <= limit else None
 
 
 class _Formulas:
@@ -100,6 +139,7 @@ class _Formulas:
         self._limit = limit
         self._known: dict[Node, Expression | None] = {0: FALSE, 1: TRUE}
         self._covers: dict[Node, list[Cube]] = {}
+        self._supports: dict[Node, frozenset[int]] = {}
 
     def shortest(self, node: Node) -> Expression | None:
         """The shortest of the formulas that are found; the first of several."""
@@ -136,10 +176,14 @@ class _Formulas:
                 # One product is a sum of its literals the other way round: only relations are shorter.
                 return self._words.shortest(found)
             if not found or self._least(found) >= _LONG:
-                found += self._tried(partial(self._choice_at, node))
+                found += self._tried(partial(self._choice_at, node, self._best(found)))
             if compared and (not found or self._least(found) > len(tested)):
-                found += self._tried(partial(self._divided, node, tested))
+                found += self._tried(partial(self._divided, node, tested, self._best(found)))
         return self._words.shortest(found)
+
+    def _best(self, found: list[Expression]) -> int:
+        """Return the operands of the shortest of some formulas; as many as any may have if there are none."""
+        return self._least(found) if found else max(OPERANDS, self._limit)
 
     def _least(self, found: list[Expression]) -> int:
         return min(map(self._words.operands, found))
@@ -214,18 +258,60 @@ class _Formulas:
             terms += spine(operator, self._join("and" if is_negated else "or", inner))
         return terms
 
-    def _divided(self, node: Node, tested: Iterable[int]) -> Iterator[Expression]:
+    def _divided(self, node: Node, tested: Iterable[int], best: int) -> Iterator[Expression]:
         """Yield formulas by cases over each place's values: what is left for a case may be relations alone."""
         for variable in tested:
             outcomes: dict[Node, int] = {}
             for place, outcome in enumerate(self._space.fixed(node, variable)):
                 outcomes[outcome] = outcomes.get(outcome, 0) | 1 << place
             if len(outcomes) <= _MAXIMUM_OUTCOMES:
-                yield from self._cases(variable, outcomes)
+                for found in self._cases(variable, outcomes, best):
+                    best = min(best, self._words.operands(found))
+                    yield found
 
-    def _cases(self, variable: int, outcomes: dict[Node, int]) -> Iterator[Expression]:
-        """Tests of one place, each with what is left for its values."""
-        parts = {outcome: self.shortest(outcome) for outcome in outcomes if outcome > 1}
+    def _are_too_long(
+        self, variable: int, outcomes: Mapping[Node, int], best: int, known: Mapping[Node, Expression | None]
+    ) -> bool:
+        """Return True if cases over a place's values need more operands than the best formula has.
+
+        Args:
+            variable: The place.
+            outcomes: Remainders for some of its values, with these values.
+            best: Operands of the best formula.
+            known: Formulas of some outcomes.
+        """
+        count = {
+            outcome: len(self._support(outcome)) if found is None else self._words.operands(found)
+            for outcome in outcomes
+            if outcome > 1
+            for found in [known.get(outcome)]
+        }
+        tests = {outcome: self._words.size(variable, mask)[0] for outcome, mask in outcomes.items()}
+        least = sum(count.values())
+        if len(outcomes) == 2 and 1 in outcomes:
+            least += tests[1]
+        elif len(count) == 2 == len(outcomes):
+            # One choice may be shorter than two tests.
+            least += min(sum(tests.values()), 1 + min(tests.values()))
+        else:
+            least += sum(tests[outcome] for outcome in outcomes if outcome)
+        return least > best
+
+    def _parts(self, variable: int, outcomes: dict[Node, int], best: int) -> dict[Node, Expression | None] | None:
+        """Return formulas of what is left for a place's values; None where they are not shorter than the best one."""
+        parts: dict[Node, Expression | None] = {}
+        for outcome in outcomes:
+            if self._are_too_long(variable, outcomes, best, parts):
+                return None
+            if outcome > 1:
+                parts[outcome] = self.shortest(outcome)
+        return parts
+
+    def _cases(self, variable: int, outcomes: dict[Node, int], best: int) -> Iterator[Expression]:
+        """Tests of one place, each with what is left for its values, unless they are longer than the best formula."""
+        parts = self._parts(variable, outcomes, best)
+        if parts is None:
+            return
         terms = []
         for outcome, mask in outcomes.items():
             part = parts.get(outcome, TRUE)
@@ -259,13 +345,14 @@ class _Formulas:
         else:
             yield self._expression(tree)
 
-    def _choice_at(self, node: Node) -> Iterator[Expression]:
+    def _choice_at(self, node: Node, best: int) -> Iterator[Expression]:
         """`if ... then ... else ...`, where the first test has two outcomes that both need more tests."""
         outcomes: dict[Node, int] = {}
         for place, child in enumerate(self._space.children(node)):
             outcomes[child] = outcomes.get(child, 0) | 1 << place
-        if len(outcomes) == 2 and min(outcomes) > 1:
-            yield from self._choice(self._space.variable(node), outcomes)
+        variable = self._space.variable(node)
+        if len(outcomes) == 2 and min(outcomes) > 1 and self._parts(variable, outcomes, best) is not None:
+            yield from self._choice(variable, outcomes)
 
     def _choice(self, variable: int, outcomes: dict[Node, int]) -> Iterator[Expression]:
         """`if ... then ... else ...` with the shorter test."""
@@ -278,8 +365,11 @@ class _Formulas:
 
     # Sums
 
-    def _support(self, node: Node) -> set[int]:
-        found, seen, stack = set(), {0, 1}, [node]
+    def _support(self, node: Node) -> frozenset[int]:
+        known = self._supports.get(node)
+        if known is not None:
+            return known
+        found, seen, stack = set[int](), {0, 1}, [node]
         while stack:
             item = stack.pop()
             if item not in seen:
@@ -287,7 +377,8 @@ class _Formulas:
                 self._space.effort.spend()
                 found.add(self._space.variable(item))
                 stack.extend(self._space.children(item))
-        return found
+        self._supports[node] = frozenset(found)
+        return self._supports[node]
 
     def _factors(self, cube: Cube) -> _Factors:
         return frozenset(

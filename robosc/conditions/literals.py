@@ -1,7 +1,8 @@
 """Tests that a place of the state has one of some values, in the model's words, with their lengths."""
 
-from collections.abc import Collection, Iterable, Iterator
+from collections.abc import Collection, Hashable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Literal
 
 from robosc.expressions import (
@@ -78,6 +79,14 @@ class Vocabulary:
         self._components = components
         self.ranks: dict[Subject, int] = {subject: rank for rank, subject in enumerate(domains)}
         self._known: dict[tuple[Subject, Indices], Membership] = {}
+
+    @cached_property
+    def words(self) -> Hashable:
+        """All that decides about tests: two vocabularies that have it in common put them into the same words."""
+        values = ((subject, item.type, item[:]) for subject, item in self.domains.items())
+        # A range may be wide, and is not listed.
+        places = tuple((*place, found if isinstance(found, range) else tuple(found)) for *place, found in values)
+        return places, frozenset(self._components)
 
     def test(self, subject: Subject, indices: Indices) -> Membership:
         """The shortest test whether a place holds one of some values: some, but not all that it can hold."""

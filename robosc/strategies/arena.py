@@ -136,6 +136,8 @@ class ControllerArena:
         self._surrounded: list[tuple[Any, Any, Any]] = []
         reachable = self._reachable()
         self._silent = tuple(self._silent_steps(executable, owed.cancels, encoder, reachable))
+        self._led = tuple(steps.image(first) for first, steps in self._silent)
+        """For each silent step the states that it leads to."""
         self._ends_alike = all(steps.is_deterministic for _, steps in self._silent)
         self.positions = reachable & ~encoding.any_of(first for first, _ in self._silent)
         for tour in owed.tours:
@@ -152,6 +154,7 @@ class ControllerArena:
         """Moves of the surroundings: for each, the events of one message, with data that it can hold."""
         self.requests = tuple(event for event in executable.requests if event in self._steps)
         """Events of requests, in source order."""
+        self._possible = {event: self.positions & self._enabled(event) for event in self.requests}
 
     def _cases_of(self, executable: ExecutableSystem, batch: tuple[str, ...]) -> list[tuple[_Part, ...]]:
         """Return the cases of a batch, without those that others contain."""
@@ -242,9 +245,11 @@ class ControllerArena:
         found = fresh = self.positions & observed
         while fresh != self._manager.false:
             before = self._manager.false
-            for first, steps in self._silent:
+            for (first, steps), led in zip(self._silent, self._led, strict=True):
                 self._monitor.check_stop()
-                before = before | (first & steps.some(fresh))
+                within = fresh & led
+                if within != self._manager.false:
+                    before = before | (first & steps.some(within))
             fresh = before & ~found
             found = found | fresh
         return found
@@ -284,7 +289,7 @@ class ControllerArena:
         self._monitor.check_stop()
         steps = self._steps[event]
         arriving = self.arriving(predicate)
-        found = self.positions & self._enabled(event) & steps.some(arriving)
+        found = self._possible[event] & steps.some(arriving)
         return found if steps.is_deterministic else found & steps.only(arriving)
 
     def together(self, predicate: Any) -> Any:

@@ -301,8 +301,9 @@ class Steps:
     def carrying(self, data: Any) -> Self:
         """The same event with some of its data alone, a predicate over received data; `plant` stays that of all."""
         other = copy(self)
-        # It is made on first use.
+        # They are made on first use.
         other.__dict__.pop("_relation", None)
+        other.__dict__.pop("_predecessors", None)
         other._in_range = self._in_range & data
         other.sources = self._without_hidden(other._in_range)
         return other
@@ -349,7 +350,7 @@ class Steps:
 
     def some(self, predicate: Any) -> Any:
         """Return the states from which the event can lead into a predicate."""
-        return self.backwards()(predicate)
+        return self._predecessors(predicate)
 
     def only(self, predicate: Any) -> Any:
         """Return the states from which the event, if it happens, leads into a predicate for all data."""
@@ -358,6 +359,10 @@ class Steps:
     def image(self, states: Any) -> Any:
         """The states that the event leads to from `states`."""
         return self.forwards()(states)
+
+    @cached_property
+    def _predecessors(self) -> Image:
+        return self.backwards()
 
     @cached_property
     def _relation(self) -> Any:

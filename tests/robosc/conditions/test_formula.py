@@ -8,10 +8,10 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from robosc.conditions.formula import STEPS, to_expression
+from robosc.conditions.formula import STEPS, _searches, to_expression
 from robosc.conditions.literals import Vocabulary, membership, operands
 from robosc.conditions.multivalued import Effort
-from robosc.conditions.rendering import Formulas, Line, diagram_lines, in_words
+from robosc.conditions.rendering import TOTAL_STEPS, Formulas, Line, diagram_lines, in_words
 from robosc.expressions import BooleanType, EnumType, Expression, IntegerType
 from robosc.expressions.evaluate import evaluate as evaluate_expression
 from robosc.supervisor import DecisionDiagram, DecisionNode
@@ -202,6 +202,25 @@ def test_what_would_explode_is_given_up(places: int) -> None:
 def test_a_formula_is_never_longer_than_the_limit(seed: int, limit: int) -> None:
     formula = to_expression(random_diagram(seed, is_ordered=True), DOMAINS, limit=limit)
     assert formula is None or operands(formula) <= limit
+
+
+@pytest.mark.parametrize("seed", range(40))
+def test_earlier_searches_change_nothing(seed: int) -> None:
+    """The same formula after the same steps, whether its search is remembered or not, for every limit."""
+    diagram, dice = random_diagram(seed, is_ordered=True), Random(seed)
+    limits = [dice.randint(1, 40) for _ in range(3)]
+
+    def searched() -> list[tuple[Expression | None, int]]:
+        efforts = [Effort(TOTAL_STEPS) for _ in limits]
+        return [
+            (to_expression(diagram, DOMAINS, limit=limit, effort=effort), effort.left)
+            for limit, effort in zip(limits, efforts, strict=True)
+        ]
+
+    first, remembered = searched(), searched()
+    _searches.cache_clear()
+    limits.reverse()
+    assert first == remembered == searched()[::-1]
 
 
 def test_the_effort_of_all_formulas_together_is_bounded() -> None:

@@ -199,7 +199,7 @@ def compare_counter(
     met["idle, seen"] += bool(fault(CounterStrategy((idle,))))
 
 
-@pytest.mark.parametrize("first", range(0, 480, 80))
+@pytest.mark.parametrize("first", range(0, 800, 80))
 def test_random_robots_agree(first: int, record_property: Callable[[str, object], None]) -> None:
     met: Counter[str] = Counter()
     for seed in range(first, first + 80):

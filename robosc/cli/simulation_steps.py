@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 
 def take_event(run_: "Run | SystemRun", name: str, data: object, target: str) -> None:
-    """Take an event as a person wrote it; the run's history tells what has happened.
+    """Take an event as a person wrote it; the run's history has all that has happened.
 
     Args:
         run_: The run.

@@ -56,7 +56,7 @@ class Point:
 
 @dataclass(frozen=True)
 class Note:
-    """Happening that is told at its place.
+    """Happening that is written at its place.
 
     Attributes:
         time_s: Time at which it happened.
@@ -100,7 +100,7 @@ def driven(folder: Path) -> tuple[Scene, list[Point], list[Note]]:
                 twin.receive("/order", ORDERED)
                 note(f"somebody calls it to the {ORDERED}")
             for component, location, text in (
-                ("Door", "opening", "tells the door to open"),
+                ("Door", "opening", "requests the door to open"),
                 ("Tray", "offered", "offers its tray"),
             ):
                 if state[component]["state"] == location != before[component]["state"]:

@@ -1,7 +1,7 @@
-"""Progress of a strategy at each moment of an event log, as far as its lines tell.
+"""Progress of a strategy at each moment of an event log, as far as it stands in its lines.
 
-They tell when a goal was reached and how often, which one is approached, and which assumptions are owed for too long;
-whether a goal is true at other moments does not stand in a log.
+The lines say when a goal was reached and how often, which one is approached, and which assumptions are owed for too
+long; whether a goal is true at other moments does not stand in a log.
 """
 
 from bisect import bisect_right
@@ -16,7 +16,7 @@ from robosc.supervisor import Supervisor
 
 
 @dataclass(frozen=True, slots=True)
-class _Told:
+class _Logged:
     """Content of the lines up to a moment.
 
     Attributes:
@@ -45,65 +45,65 @@ class LoggedProgress:
         description = describe(supervisor)
         self._aims, self._assumptions = description.aims, description.assumptions
         known = {item.name for item in (*self._aims, *self._assumptions)}
-        # After how many entries something else was told, and what.
+        # The progress that entries have changed, with the numbers of entries up to each change.
         self._counts: list[int] = []
-        self._told: list[_Told] = []
-        told = _Told()
+        self._logged: list[_Logged] = []
+        logged = _Logged()
         for count, (document, time_s) in enumerate(zip(documents, times_s, strict=True), 1):
-            now = _after(told, document, time_s, known)
-            if now is not told:
+            now = _after(logged, document, time_s, known)
+            if now is not logged:
                 self._counts.append(count)
-                self._told.append(now)
-                told = now
+                self._logged.append(now)
+                logged = now
 
     def at(self, count: int, time_s: float) -> Progress | None:
-        """Return the progress after a number of entries; None: nothing is told of goals anywhere in the log.
+        """Return the progress after a number of entries; None: the log has nothing about goals.
 
         Args:
             count: Number of entries that have happened.
             time_s: Time of the moment.
         """
-        if not self._told:
+        if not self._logged:
             return None
         place = bisect_right(self._counts, count) - 1
-        told = _Told() if place < 0 else self._told[place]
+        logged = _Logged() if place < 0 else self._logged[place]
         return Progress(
             aims=tuple(
-                Standing(item.name, item.words, False, told.times.get(item.name, 0), None, item.mission)
+                Standing(item.name, item.words, False, logged.times.get(item.name, 0), None, item.mission)
                 for item in self._aims
             ),
             assumptions=tuple(
-                Standing(item.name, item.words, False, 0, self._owed_s(told, item.name, time_s))
+                Standing(item.name, item.words, False, 0, self._owed_s(logged, item.name, time_s))
                 for item in self._assumptions
             ),
-            overdue=tuple(item.name for item in self._assumptions if item.name in told.owed),
+            overdue=tuple(item.name for item in self._assumptions if item.name in logged.owed),
             is_followed=True,
-            approached=told.approached,
+            approached=logged.approached,
             chosen=None,
         )
 
     @staticmethod
-    def _owed_s(told: _Told, name: str, time_s: float) -> float | None:
-        return max(time_s - told.owed[name], 0.0) if name in told.owed else None
+    def _owed_s(logged: _Logged, name: str, time_s: float) -> float | None:
+        return max(time_s - logged.owed[name], 0.0) if name in logged.owed else None
 
 
-def _after(told: _Told, document: Mapping[str, Any], time_s: float, known: set[str]) -> _Told:
-    """Return what is told after an entry, whatever it holds; the same value if it tells nothing of goals."""
+def _after(logged: _Logged, document: Mapping[str, Any], time_s: float, known: set[str]) -> _Logged:
+    """Return the progress after an entry, whatever it holds; the same value if it has nothing about goals."""
     name: Any = document.get("assumption") if document.get("kind") in ("owed", "met") else document.get("aim")
     is_known = isinstance(name, str) and name in known
     match document.get("kind"):
         case "restart":
-            return _Told() if told != _Told() else told
+            return _Logged() if logged != _Logged() else logged
         case "approach" if name is None or is_known:
-            return replace(told, approached=name)
+            return replace(logged, approached=name)
         case "reached" if is_known:
             count = document.get("count")
             if isinstance(count, int) and count >= 0:
-                return replace(told, times={**told.times, name: count})
+                return replace(logged, times={**logged.times, name: count})
         case "owed" if is_known:
             owed_s = document.get("owed_s")
             if isinstance(owed_s, int | float) and isfinite(owed_s):
-                return replace(told, owed={**told.owed, name: time_s - owed_s})
+                return replace(logged, owed={**logged.owed, name: time_s - owed_s})
         case "met" if is_known:
-            return replace(told, owed={key: since_s for key, since_s in told.owed.items() if key != name})
-    return told
+            return replace(logged, owed={key: since_s for key, since_s in logged.owed.items() if key != name})
+    return logged

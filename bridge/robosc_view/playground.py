@@ -459,7 +459,7 @@ def _repeat_turn(run: CounterRun, step: Step, number: int) -> None:
         step: The step.
         number: Number of the steps before it.
     """
-    # The surroundings may have answered waits, which no history tells.
+    # The surroundings may have answered waits, which stand in no history.
     for _ in range(len(run.came_true) + 1):
         if len(run) >= number + (run.actor(step.event) != "you"):
             break

@@ -106,7 +106,7 @@ class Recording:
         return self._frames[number]
 
     def progress(self, number: int, time_s: float) -> Progress | None:
-        """Return what the log tells of the strategy after a number of entries; None: it tells nothing of one."""
+        """Return the strategy's progress after a number of entries; None: the log has nothing about one."""
         return self._progress.at(number, time_s)
 
     def last(self, number: int) -> Mapping[str, int]:

@@ -280,17 +280,17 @@ def _progress(found: object) -> Progress | None:
     if found is None:
         return None
     try:
-        told = msgspec.convert(found, _Progress)
+        received = msgspec.convert(found, _Progress)
     except (msgspec.ValidationError, RecursionError) as error:
         raise DefinitionError(f"the progress on /state makes no sense: {str(error)[:300]}") from error
     return Progress(
-        aims=tuple(Standing(*msgspec.structs.astuple(item)) for item in told.aims),
-        assumptions=tuple(Standing(*msgspec.structs.astuple(item)) for item in told.assumptions),
-        overdue=told.overdue,
-        is_followed=told.is_followed,
-        approached=told.approached,
-        chosen=told.chosen,
-        missions=tuple(MissionStanding(*msgspec.structs.astuple(item)) for item in told.missions),
+        aims=tuple(Standing(*msgspec.structs.astuple(item)) for item in received.aims),
+        assumptions=tuple(Standing(*msgspec.structs.astuple(item)) for item in received.assumptions),
+        overdue=received.overdue,
+        is_followed=received.is_followed,
+        approached=received.approached,
+        chosen=received.chosen,
+        missions=tuple(MissionStanding(*msgspec.structs.astuple(item)) for item in received.missions),
     )
 
 

@@ -53,7 +53,7 @@ def _is_behind_operand(texts: Sequence[str], kinds: Sequence[int], index: int) -
 def _begins_item(texts: Sequence[str], kinds: Sequence[int], index: int) -> bool:
     """Return True if the free word at a token begins a goal, an assumption, a mission or a preference.
 
-    Of a name that could be such a word itself, as in `not mission goal while ...`, only the sign behind it tells.
+    Of a name that could be such a word itself, as in `not mission goal while ...`, only the sign behind it decides.
     """
     word, following, behind = texts[index : index + 3]
     if word == "prefer" and following == "{":

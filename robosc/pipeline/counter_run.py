@@ -142,7 +142,7 @@ class CounterRun(Run):
     # Turns
 
     def step(self, event: str, data: object = NO_DATA, /, **fields: object) -> Step:
-        """Take a request; then the executor and the surroundings take theirs, which `history` tells.
+        """Take a request; then the executor and the surroundings take theirs, which `history` has.
 
         Args:
             event: The request, such as `move.request`.

@@ -399,7 +399,7 @@ class StrategySynthesis:
 
 
 def _without(solution: Solution, place: int) -> Solution:
-    """Return a solution whose steps do not tell of the assumption in a place."""
+    """Return a solution without the assumption in a place."""
     approaches = (
         tuple(replace(item, waiting=(*item.waiting[:place], *item.waiting[place + 1 :])) for item in steps)
         for steps in solution.approaches

@@ -24,7 +24,7 @@ from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import Deployment
 from robosc_bridge.skills.line import LineDetector
 from robosc_bridge.skills.settings import LineSettings
-from robosc_examples.house import TOLD, House
+from robosc_examples.house import COMMANDS, House
 from robosc_examples.motion import Turn, clamped, steered, turning_speed, wrapped
 from robosc_examples.persons import Scan, find_person
 from robosc_simulated import (
@@ -309,7 +309,7 @@ class SteppedTwin:
                 self._turn = Turn(math.radians(message), self.world.pose[2])
             case "/rotate_right":
                 self._turn = Turn(-math.radians(message), self.world.pose[2])
-            case other if other in TOLD:
+            case other if other in COMMANDS:
                 self.house.receive(other)
             case other:
                 raise AssertionError(f"nobody hears {other}")

@@ -113,7 +113,7 @@ export function startGoals() {
     show(byId("goals-owed-title"), progress.assumptions.length > 0);
   };
 
-  const tell = (progress) => {
+  const announceChanges = (progress) => {
     const now = { approached: progress.approached, overdue: new Set(progress.overdue) };
     if (before !== null) {
       if (now.approached !== before.approached) {
@@ -128,7 +128,7 @@ export function startGoals() {
   };
 
   const choice = ({ aims, is_followed, approached, chosen }) => {
-    // A log tells what is approached, and requests as events of their own.
+    // A log says what is approached, and requests as events of their own.
     if (isReplay()) return approached === null ? "" : `The strategy approaches ${approached}.`;
     if (!is_followed) return "Another policy than the strategy decides.";
     if (approached === null) return isIdle(aims) ? idleWords(aims) : "";
@@ -176,7 +176,7 @@ export function startGoals() {
       const met = goals.filter((goal) => goal.is_met).length;
       say(byId("goals-count"), isKnown ? `${met} of ${goals.length} true` : "");
       say(byId("goals-choice"), choice(progress));
-      tell(progress);
+      announceChanges(progress);
     },
   };
 }

@@ -1,4 +1,4 @@
-"""Door, tray and battery around the courier, without ROS: what they do once they were told to, and when.
+"""Door, tray and battery around the courier, without ROS: what they do on command, and when.
 
 The twin has a body, wheels and a LiDAR; whatever else is around a courier is here. A door opens late, somebody takes
 what is in the tray a while after it is offered, and the battery drains away from the dock and is charged there.
@@ -9,8 +9,8 @@ from dataclasses import dataclass
 
 OPEN_DOOR, CLOSE_DOOR, UNLOCK, LOCK = "/door/open", "/door/close", "/tray/unlock", "/tray/lock"
 OPENED, LID_CLOSED = "/door/opened", "/tray/closed"
-TOLD = (OPEN_DOOR, CLOSE_DOOR, UNLOCK, LOCK)
-"""Topics of what a house is told."""
+COMMANDS = (OPEN_DOOR, CLOSE_DOOR, UNLOCK, LOCK)
+"""Topics of the commands to a house."""
 
 REPORTED = (OPENED, LID_CLOSED)
 """Topics of what a house reports."""
@@ -26,7 +26,7 @@ class Settings:
     """Settings of a house.
 
     Attributes:
-        opens_after_s: Time until a door is open that was told to, in seconds; infinite: it never is.
+        opens_after_s: Time from the command to an open door, in seconds; infinite: it never is.
         takes_s: Time until somebody has taken what is in the tray and closed its lid, in seconds.
         drain_v_s: Voltage that the battery loses in a second away from the dock.
         charge_v_s: Voltage that it gains in a second at the dock.
@@ -39,7 +39,7 @@ class Settings:
 
 
 class House:
-    """A door, a tray and a battery, by a time that is told.
+    """A door, a tray and a battery, by a time that is given.
 
     Args:
         settings: Their settings.
@@ -57,7 +57,7 @@ class House:
         self._due: list[tuple[float, str]] = []
 
     def receive(self, topic: str) -> None:
-        """Take what the courier says on one of `TOLD`; it takes effect with time."""
+        """Take what the courier says on one of `COMMANDS`; it takes effect with time."""
         settings, now_s = self.settings, self._now_s or 0.0
         match topic:
             case "/door/open":

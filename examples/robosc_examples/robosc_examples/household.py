@@ -11,7 +11,7 @@ from nav_msgs.msg import Odometry
 from rclpy.qos import qos_profile_sensor_data
 from std_msgs.msg import Empty
 
-from robosc_examples.house import REPORTED, TOLD, House, Settings
+from robosc_examples.house import COMMANDS, REPORTED, House, Settings
 from robosc_examples.motion import Pose, pose_of
 from robosc_examples.program import HelperNode, run
 
@@ -32,7 +32,7 @@ class Household(HelperNode):
         self._pose = Pose(0.0, 0.0, 0.0)
         self._shown = ("obstacle door back", f"battery {self._house.battery_v:.2f}")
         self._sent_to = {topic: self.create_publisher(Empty, topic, 10) for topic in REPORTED}
-        for topic in TOLD:
+        for topic in COMMANDS:
             self.create_subscription(Empty, topic, lambda _, topic=topic: self._house.receive(topic), 10)
         self.create_subscription(Odometry, "/odom", self._read, qos_profile_sensor_data)
         self.every(PERIOD_S, self._live)

@@ -329,21 +329,33 @@ class ControllerArena:
         fresh = found
         while fresh != self._manager.false:
             self._monitor.check_stop()
-            following = self._manager.false
-            for event in self.requests:
-                following = following | self._steps[event].image(fresh & self._enabled(event))
-            for case in self._cases:
-                inside = fresh
-                for part in case:
-                    stays = inside if part.may_be_left_out else inside & ~part.steps.sources
-                    inside = stays | part.steps.image(inside)
-                following = following | inside
-            fresh = self._arrived_at(following) & ~found
+            fresh = self._arrived_at(self._following(fresh)) & ~found
             found = found | fresh
         return found
 
-    def _arrived_at(self, states: Any) -> Any:
-        """Return the stable states in which silent steps from states end, with the memory as it is observed there."""
+    def unobserved(self, met: Any) -> Any:
+        """Return the stable states that the first position and moves from others lead to, with the memory before.
+
+        Args:
+            met: The positions that can be met.
+        """
+        return self._settled(self.start) | self._settled(self._following(met))
+
+    def _following(self, positions: Any) -> Any:
+        """Return the states that a request or a batch leads to from positions; silent steps follow."""
+        following = self._manager.false
+        for event in self.requests:
+            following = following | self._steps[event].image(positions & self._enabled(event))
+        for case in self._cases:
+            inside = positions
+            for part in case:
+                stays = inside if part.may_be_left_out else inside & ~part.steps.sources
+                inside = stays | part.steps.image(inside)
+            following = following | inside
+        return following
+
+    def _settled(self, states: Any) -> Any:
+        """Return the stable states in which silent steps from states end."""
         found, left = states & self.positions, states & ~self.positions
         seen = left
         while left != self._manager.false:
@@ -354,6 +366,11 @@ class ControllerArena:
             found = found | (after & self.positions)
             left = after & ~self.positions & ~seen
             seen = seen | left
+        return found
+
+    def _arrived_at(self, states: Any) -> Any:
+        """Return the stable states in which silent steps from states end, with the memory as it is observed there."""
+        found = self._settled(states)
         if not self._observed:
             return found
         for place, update in self._observed.items():

@@ -37,6 +37,16 @@ def goal_findings(
                 "Make it a goal as well, assume only what the surroundings decide, or write 'assume allow ...'.",
             )
         )
+    for number in result.never_made:
+        found.append(
+            Diagnostic(
+                Severity.WARNING,
+                "visit-never-made",
+                "no run makes this visit: its mission or detour never comes to it, or its condition is never true then",
+                _place(places, aims[number]),
+                "Compare it with the conditions behind 'while' and 'on', and with the visits before it, or remove it.",
+            )
+        )
     for number in result.unneeded:
         found.append(
             Diagnostic(

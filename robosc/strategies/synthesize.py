@@ -37,6 +37,8 @@ class StrategyResult:
             empty where there is a strategy.
         is_hopeless: True if these goals cannot be reached even if the surroundings do all they can for it.
         preventable: Numbers of assumptions that the robot itself can keep from coming true, though nobody allows it.
+        never_made: Numbers of visits that no run makes, though the mission as a whole can go on for ever: it does not
+            ask for them, or not while their condition can be true; empty where goals are not reached.
         unneeded: Numbers of assumptions without which the goals are reached just as well.
         positions: Number of positions of the game: stable states, each with every memory.
         winning: Number of those from which the goals can be reached.
@@ -47,6 +49,7 @@ class StrategyResult:
     unreached: tuple[int, ...]
     is_hopeless: bool
     preventable: tuple[int, ...]
+    never_made: tuple[int, ...]
     unneeded: tuple[int, ...]
     positions: int
     winning: int
@@ -95,7 +98,7 @@ class StrategySynthesis:
         self.arena = ControllerArena(executable, added, owed, place.encoding, place.monitor)
         ordered = preferred_order(executable.requests, executable.model.preferences)
         self._requests = tuple(event for event in ordered if event in self.arena.requests)
-        self._aims = owed.aims
+        self._aims, self._tours = owed.aims, owed.tours
         self.goals = [self.arena.condition(item.condition) for item in owed.aims]
         self.assumptions = [self.arena.condition(item) for item in owed.assumptions]
 
@@ -110,16 +113,18 @@ class StrategySynthesis:
         unreached = () if is_won else self._unreached()
         preventable = self.preventable(allowed)
         unneeded = self._unneeded(solution) if is_won else ()
+        met = self.arena.met() if is_won else self.false
         if is_won:
             solution = self._uninterrupted(solution)
             # Visits that are not interrupted may need more, though interruptions would do.
             visits = [solution.approaches[number] for number, _ in self._interruptible()]
             unneeded = tuple(item for item in unneeded if not any(self._rely(steps, item) for steps in visits))
         return StrategyResult(
-            strategy=self._strategy(solution, allowed) if is_won and not preventable else None,
+            strategy=self._strategy(solution, allowed, met) if is_won and not preventable else None,
             unreached=unreached,
             is_hopeless=bool(unreached) and not self.can_be_reached(unreached),
             preventable=preventable,
+            never_made=self._never_made(met) if is_won else (),
             unneeded=unneeded,
             positions=self._count(self.arena.positions),
             winning=self._count(solution.winning),
@@ -316,9 +321,34 @@ class StrategySynthesis:
             )
         return replace(solution, approaches=tuple(approaches))
 
-    def _strategy(self, solution: Solution, allowed: Collection[int]) -> Strategy:
+    def _never_made(self, met: Any) -> tuple[int, ...]:
+        """Return the visits that neither side can bring about, though the supervisor allows all that it does.
+
+        Args:
+            met: The positions that can be met.
+        """
+        tours = self._tours
+        if not tours:
+            return ()
+        arrived, visits = self.arena.unobserved(met), []
+        for tour in tours:
+            here = [self.arena.condition(stage.here) for stage in tour.stages]
+            passed = [self.arena.condition(stage.is_passed) for stage in tour.stages]
+            within = arrived if tour.asked is None else arrived & self.arena.condition(tour.asked)
+            # The second round finds what comes from the last stage to the first one.
+            left = self.false
+            for _ in range(2):
+                made = []
+                for is_here, is_passed in zip(here, passed, strict=True):
+                    left = within & (is_here | left) & is_passed
+                    made.append(left != self.false)
+            # An idle detour is a stage as well, and no visit.
+            visits += made if tour.stays else made[1:]
+        first = len(self._aims) - len(visits)
+        return tuple(first + number for number, is_made in enumerate(visits) if not is_made)
+
+    def _strategy(self, solution: Solution, allowed: Collection[int], met: Any) -> Strategy:
         simplifier = Simplifier(self._encoding, self._seconds)
-        met = self.arena.met()
         near = {item: self._left_to_surroundings(self.assumptions[item]) for item in allowed}
         return Strategy(tuple(self._mode(solution, number, simplifier, met, near) for number in range(len(self.goals))))
 

@@ -93,6 +93,7 @@ class Game:
         successors: For each position, the positions that a move of the surroundings leads to.
         choices: For each position, where each request leads to; waiting stays.
         first: The position in which the executor begins, or None if it never gets to one.
+        made: Names of the visits that some run makes.
     """
 
     assumptions: list[Item]
@@ -100,6 +101,7 @@ class Game:
     successors: dict[Position, set[Any]] = field(default_factory=dict)
     choices: dict[Position, dict[str, Any]] = field(default_factory=dict)
     first: Any = None
+    made: set[str] = field(default_factory=set)
     asked: tuple[list[Item], list[Item | _Visit]] | None = None
 
     def asking(self, assumptions: list[Item], goals: list[Item | _Visit]) -> "Game":
@@ -189,6 +191,9 @@ def game_of(executable: ExecutableSystem, added: Iterable[AddedCondition], limit
         end = controller.run(node).end
         if end is None:
             return LOST
+        for item, mark in zip(everything, marks, strict=True):
+            if isinstance(item, _Visit):
+                game.made |= item.mission.made(mark, end[0])
         return end, tuple(item.mark(mark, end[0]) for item, mark in zip(everything, marks, strict=True))
 
     game.first = arrived(controller.start, tuple(item.start for item in everything))

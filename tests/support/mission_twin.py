@@ -62,6 +62,26 @@ class MissionTwin:
             else:
                 return at
 
+    def made(self, mark: Mark, state: Any) -> set[str]:
+        """Return the names of the visits that are made in a stable state, before which it was at a mark."""
+        found = set[str]()
+        at = mark[0]
+        for _ in self.visits if self.asked(state) else ():
+            if not self.visits[at - 1](state):
+                break
+            found.add(f"visit {at} of mission {self.name}")
+            at = at + 1 if at < len(self.visits) else 1
+        for order, (detour, (trigger, visits)) in enumerate(zip(mark[1:], self.detours, strict=True), start=1):
+            at, passed = detour or 1, set[int]()
+            while self.asked(state) and at not in passed and visits[at - 1](state):
+                # An idle detour begins, and one that ends begins again, where it is wanted.
+                if ((detour == 0 and not passed) or (at == 1 and passed)) and not trigger(state):
+                    break
+                passed.add(at)
+                at = at + 1 if at < len(visits) else 1
+            found |= {f"visit {item} of detour {order} of mission {self.name}" for item in passed}
+        return found
+
     def aims(self) -> Iterator[tuple[str, Callable[[Mark, Any], bool]]]:
         """Yield for each visit, then for those of each detour, its name and whether nothing is to be done for it."""
         for number in range(1, len(self.visits) + 1):

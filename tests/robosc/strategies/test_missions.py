@@ -349,6 +349,16 @@ def test_a_visit_that_cannot_be_made_is_found_where_it_stands() -> None:
     assert line(found) == 102
 
 
+def test_a_visit_that_no_run_makes_is_found() -> None:
+    text = courier("mission m while Base.dock { visit Base.kitchen then Base.office }")
+    assert [(item.code, line(item)) for item in findings(model_of(text))] == [
+        ("visit-never-made", 100),
+        ("visit-never-made", 101),
+    ]
+    text = courier("mission m { visit Base.kitchen on Base.dock and Base.office from anywhere visit Base.dock }")
+    assert [(item.code, line(item)) for item in findings(model_of(text))] == [("visit-never-made", 101)]
+
+
 def test_in_a_layer_missions_have_no_effect() -> None:
     model = robot("kitchen", "office", prefer=("charge", "to_office"))
     (found,) = findings(model, Deployment.LAYER)

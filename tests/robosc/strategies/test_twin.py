@@ -87,6 +87,9 @@ def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> N
         compare_counter(game, executable, counter, result.unreached, seed, met)
     if strategy is None:
         return
+    never = {executable.obligations.aims[number].name for number in result.never_made}
+    assert never == {aim.name for aim in executable.obligations.aims if aim.mission is not None} - game.made, seed
+    met["never made"] += bool(never)
     met["with requests"] += any(strategy.modes)
     check = check_strategy(executable, added, strategy)
     assert check.result == "passed", (seed, check)
@@ -217,6 +220,7 @@ def test_random_couriers_agree(first: int, record_property: Callable[[str, objec
         compare(random_courier(seed), seed, "auto", met)
     for name, count in sorted(met.items()):
         record_property(name, count)
+    assert met["never made"] > 3, met
     assert met["with requests"] > 30 and met["lost"] > 20 and met["damaged, missed"] > 30, met
     assert min(met["preferred to an earlier one"], met["not preferred, as it leads nowhere"]) > 30, met
     assert min(met["last resort"], met["helping"]) > 10, met

@@ -126,10 +126,12 @@ LARGE: dict[str, Callable[[int], str]] = {
         + "}"
     ),
     "visits": lambda n: (
-        "robot R { component C { behaviour { initial marked state s { } } } mission m { visit C.s"
-        + " then C.s" * n
-        + "\non C.s from anywhere visit C.s" * n
-        + " } }"
+        "robot R { component C { behaviour { initial marked state s { } } }\n"
+        + "".join(
+            f"mission m{i} {{ visit C.s{' then C.s' * 40}{' on C.s from anywhere visit C.s' * 40} }}\n"
+            for i in range(n // 40)
+        )
+        + "}"
     ),
     "actions": lambda n: (
         "robot R { interface i use T from p\n"

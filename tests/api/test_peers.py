@@ -58,7 +58,7 @@ async def test_each_call_has_its_own_peer_and_is_asked_once() -> None:
         return await handler.unary_unary(None, context)
 
     contexts = [Context(f"ipv4:192.0.2.{number}:1") for number in range(5)]
-    # gRPC has a task for each call; and, which it does not do, calls one after the other in the same task.
+    # The first calls have a task each, as gRPC's do; the others come one after the other in the same task.
     found = await asyncio.gather(*map(call, contexts))
     found += [await call(context) for context in contexts]
     assert found == 2 * [f"ipv4:192.0.2.{number}:1" for number in range(5)]

@@ -335,13 +335,11 @@ class StrategySynthesis:
             here = [self.arena.condition(stage.here) for stage in tour.stages]
             passed = [self.arena.condition(stage.is_passed) for stage in tour.stages]
             within = arrived if tour.asked is None else arrived & self.arena.condition(tour.asked)
-            # The second round finds what comes from the last stage to the first one.
-            left = self.false
-            for _ in range(2):
-                made = []
-                for is_here, is_passed in zip(here, passed, strict=True):
-                    left = within & (is_here | left) & is_passed
-                    made.append(left != self.false)
+            # A tour begins at its first stage: what is passed in a second round was passed before.
+            left, made = self.false, []
+            for is_here, is_passed in zip(here, passed, strict=True):
+                left = within & (is_here | left) & is_passed
+                made.append(left != self.false)
             # An idle detour is a stage as well, and no visit.
             visits += made if tour.stays else made[1:]
         first = len(self._aims) - len(visits)

@@ -36,8 +36,8 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 from urllib.parse import unquote
 
-from robosc_api.layers import Layer, behaviour_of, when_call_ends, with_behaviour
-from robosc_api.peers import peer_of
+from robosc_api.calls import call_under_way, peer_of
+from robosc_api.layers import Layer, behaviour_of, with_behaviour
 
 _log = logging.getLogger(__name__)
 
@@ -390,7 +390,7 @@ class CallsByConnection(Layer):
         def noted(request: Any, context: Any) -> Any:
             peer = peer_of(context)
             arrivals.begun(peer)
-            when_call_ends(lambda _: arrivals.ended(peer, is_check=is_check))
+            call_under_way().at_end.append(lambda: arrivals.ended(peer, is_check=is_check))
             return behaviour(request, context)
 
         return with_behaviour(inner, noted)

@@ -22,7 +22,7 @@ from robosc_api.connection_watch import (
     address_of,
     can_watch,
 )
-from robosc_api.layers import Layer, Layers, behaviour_of, with_behaviour
+from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.request_timeouts import RequestTimeouts
 from support.floods import MOST_BYTES, endless_headers, resets
 from support.small_server import SERVICE, call, small_server
@@ -208,10 +208,10 @@ async def watched_server(arrivals: Arrivals, *outer: Layer) -> AsyncIterator[tup
     def listen(server: grpc.aio.Server) -> None:
         ports.append(server.add_insecure_port("127.0.0.1:0"))
 
-    layers = Layers(*outer, RequestTimeouts(PATIENCE_S), arrivals)
+    layers = (*outer, RequestTimeouts(PATIENCE_S), arrivals)
     options = [("grpc.max_receive_message_length", LARGEST_BYTES), ("grpc.http2.bdp_probe", 0)]
     async with (
-        small_server(interceptors=[layers], unary=answer, setup=listen, options=options),
+        small_server(layers=layers, unary=answer, listen=listen, options=options),
         grpc.aio.insecure_channel(f"127.0.0.1:{ports[0]}") as channel,
     ):
         yield channel, ports[0]

@@ -4,32 +4,20 @@ from robosc.automata.goal_memory import MEMORY
 from robosc.supervisor import Strategy
 from robosc.targets.code.c.conditions import CConditions
 from robosc.targets.code.c.layout import width
-from robosc.targets.code.c.naming import CNamer
+from robosc.targets.code.c.observation import IS_SEEN, observation, remembered_places
 from robosc.targets.code.c.statements import unused
 from robosc.targets.code.c.text import comment
 from robosc.targets.code.c.unit import Reading, Unit
-from robosc.targets.code.expressions import FALSE_CODE, Code, Sort, integer, literal, operation, variable
+from robosc.targets.code.expressions import FALSE_CODE, integer, variable
 from robosc.targets.code.statements import Assign, Statement
-from robosc.targets.code.strategy import choosing, observing, seen
-
-_WORD = 32
-_IS_SEEN = """\
-/* Whether something is seen in a stable state: bit `number`. */
-static bool is_seen(const uint32_t *seen, int number)
-{
-    return (seen[(unsigned)number / 32U] >> ((unsigned)number % 32U) & 1U) != 0;
-}"""
+from robosc.targets.code.strategy import choosing
 
 
 def forgotten(unit: Unit) -> list[Statement]:
     """The assignments by which nothing is remembered of goals and missions."""
     scope, layout = Reading(unit), unit.layout
-    places = (scope.variable_place(MEMORY, place.name) for place in layout.executable.obligations.places)
+    places = (scope.variable_place(MEMORY, name) for name in remembered_places(layout))
     return [*(Assign(place, FALSE_CODE) for place in places), Assign(variable(f"s->{layout.mode}"), integer(0))]
-
-
-def _bit(number: int) -> Code:
-    return literal(f"UINT32_C({1 << number % _WORD:#x})", Sort.INTEGER)
 
 
 def strategy_functions(unit: Unit, conditions: CConditions, strategy: Strategy) -> list[list[str]]:
@@ -40,18 +28,9 @@ def strategy_functions(unit: Unit, conditions: CConditions, strategy: Strategy) 
         conditions: Writer of its conditions.
         strategy: The strategy.
     """
-    executable, scope, mode = unit.layout.executable, Reading(unit), f"s->{unit.layout.mode}"
+    executable, mode = unit.layout.executable, f"s->{unit.layout.mode}"
     count = len(strategy.modes)
-    taken = observing(executable, scope, CNamer(frozenset({"s", "seen"})))
-    judged = [
-        Assign(variable(f"seen[{number // _WORD}]"), operation("if", code, _bit(number), integer(0)), "|")
-        for number, code in enumerate(seen(executable, scope))
-    ]
-    head = "static void observe_for_strategy(state_t *s, uint32_t *seen)"
-    found = [
-        _IS_SEEN.splitlines(),
-        ["/* Take in a stable state; `seen` is all zeros. */", *unit.definition(head, [*unused("s"), *taken, *judged])],
-    ]
+    found = [IS_SEEN, *observation(unit)]
     for number, aim in enumerate(executable.obligations.aims):
         body = [*unused("s"), *choosing(executable, strategy, number, conditions, integer(-1))]
         words = comment(f"the request that approaches {aim.name}, or -1 to wait")

@@ -1,6 +1,6 @@
 /* Progress of the strategy. What is seen in a stable state, a bit each: for each aim, then each assumption, whether it
    is met; for each visit whether its mission or detour is at it; for each mission whether every visit of its own is
-   true. Before the first stable state, all of it counts as seen, so that what is not met then becomes unmet. */
+   true. */
 
 enum {
     ITEM_COUNT = ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT,
@@ -136,11 +136,28 @@ static void note_met(robot_t *r, int word, uint32_t met)
     }
 }
 
+/* Begin the account in the first stable state: what is met there was not reached. */
+static void begin_progress(robot_t *r, const uint32_t *seen)
+{
+    uint64_t due_us = 0;
+    for (int number = 0; number < ITEM_COUNT; number++) {
+        r->items[number].since_us = r->now_us;
+    }
+    memcpy(r->seen, seen, sizeof r->seen);
+    r->has_observed = true;
+    due_us = progress_deadline(r);
+    r->deadline_us = due_us < r->deadline_us ? due_us : r->deadline_us;
+}
+
 /* Take in a stable state. The loops go over what changes alone: the cycle time of the controller. */
 static void observe_progress(robot_t *r)
 {
     uint32_t seen[SEEN_WORDS] = {0};
-    observe_for_strategy(&r->state, seen);
+    observe_for_strategy(&r->state, r->seen, seen);
+    if (!r->has_observed) {
+        begin_progress(r, seen);
+        return;
+    }
     for (int word = 0; word < ITEM_WORDS; word++) {
         const uint32_t aims = first_bits(ROBOT_AIM_COUNT, word);
         const uint32_t items = first_bits(ITEM_COUNT, word);
@@ -164,14 +181,13 @@ static void observe_progress(robot_t *r)
         }
     }
 #if ROBOT_MISSION_COUNT > 0
-    if (r->has_observed && memcmp(seen, r->seen, sizeof seen) != 0) {
+    if (memcmp(seen, r->seen, sizeof seen) != 0) {
         for (int mission = 0; mission < ROBOT_MISSION_COUNT; mission++) {
             move_mission(r, seen, mission);
         }
     }
 #endif
     memcpy(r->seen, seen, sizeof seen);
-    r->has_observed = true;
 }
 
 /* Report each assumption that is owed for too long by now, once. */
@@ -190,7 +206,7 @@ static void expire_progress(robot_t *r)
 static void forget_progress(robot_t *r)
 {
     memset(r->items, 0, sizeof r->items);
-    memset(r->seen, 0xff, sizeof r->seen);
+    memcpy(r->seen, NOTHING_OWED, sizeof r->seen);
     memset(r->reported, 0, sizeof r->reported);
     r->has_observed = false;
     r->approached = NOTHING_DECIDED;

@@ -236,6 +236,57 @@ def test_a_long_mission_in_c(tmp_path: Path) -> None:
     compare(C99Target(supervisor, tmp_path), scenario, expected)
 
 
+_ERRANDS = """robot Errands {
+    datatype enum Charge from integer to { value < 2 -> low default -> enough }
+    component Base {
+        incoming message go with identifier: "/go", type: none
+        incoming message back with identifier: "/back", type: none
+        outgoing message arrived with identifier: "/arrived", type: none
+        behaviour {
+            variable trips: integer(0..3)
+            initial marked state here { on request to go goto leaving }
+            state leaving { on response from arrived do trips := if trips < 3 then trips + 1 else 0 goto there }
+            marked state there { on request to back goto returning }
+            state returning { on response from arrived goto here }
+        }
+    }
+    component Battery {
+        outgoing message battery with identifier: "/battery", type: Charge
+        outgoing message plugged with identifier: "/plugged", type: boolean
+        behaviour {
+            variable charge: Charge = enough
+            variable is_plugged: boolean
+            on response from battery do charge := value
+            on response from plugged do is_plugged := value
+            initial marked state watched { }
+        }
+    }
+    goal once Base.there
+    goal once Base.trips = 2 and Battery.charge = low
+    goal always eventually Base.here or Base.trips = 1
+    goal Battery.is_plugged leads to Base.there
+    goal Base.trips > 1 or Battery.charge = low leads to Base.here
+    assume always eventually Battery.charge = enough
+    assume always eventually Battery.charge = low
+    assume Base.leaving leads to Base.there
+    assume Base.returning leads to Base.here
+}"""
+
+
+@needs_gcc
+def test_goals_of_all_forms_in_c(tmp_path: Path) -> None:
+    """Conditions on one location, one enum, a truth value, a number, and several of them."""
+    supervisor = strategic(model_of(_ERRANDS))
+    scenario = random_scenario(supervisor, 7, 250)
+    expected = observe(supervisor, scenario)
+    lines = [line for item in expected for line in item.log]
+    reached = Counter(line["aim"] for line in lines if line["kind"] == "reached")
+    assert set(reached) >= {f"goal {number}" for number in range(1, 6)}, reached
+    # A goal that was reached once stays so until a restart.
+    assert reached["goal 1"] <= 1 + sum(line["kind"] == "restart" for line in lines) < reached["goal 5"]
+    compare(C99Target(supervisor, tmp_path), scenario, expected)
+
+
 TWO_WHEELS = """robot TwoWheels {
     interface twist use Vector3 from geometry_msgs
     datatype object Speed { x: double }

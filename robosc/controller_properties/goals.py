@@ -10,10 +10,11 @@ model checking: branching time logic strikes back", Science of Computer Programm
 It shares nothing with the synthesis of strategies but the automata and what is remembered of goals.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
 
-from robosc.automata.compile import NO_DATA, State, compile_expression, subjects_read
+from robosc.automata.compile import NO_DATA, Function, State, compile_expression, subjects_read
 from robosc.automata.executable import ExecutableSystem
 from robosc.automata.goal_memory import MEMORY
 from robosc.automata.semantics import TooManyChoicesError
@@ -30,6 +31,9 @@ DEFAULT_LIMIT = 20_000
 """Positions beyond which a check is given up."""
 
 Memory = tuple[bool, ...]
+
+_Look = tuple[Value | None, ...]
+"""All that conditions read of a state."""
 
 Position = tuple[Node, Memory, int]
 """A stable state, what is remembered of goals, and the goal that is approached."""
@@ -66,19 +70,65 @@ class StrategyCheck:
     missed: MissedGoal | None = None
 
 
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """Conditions that read the same of the state and the memory.
+
+    Attributes:
+        numbers: Their numbers among all.
+        functions: Functions that evaluate them on a state with its memory.
+        looks: Numbers of the parts of a look that they read.
+        held: Numbers of the places of the memory that they read.
+        known: Their truth values for what was read before.
+    """
+
+    numbers: tuple[int, ...]
+    functions: tuple[Function, ...]
+    looks: tuple[int, ...]
+    held: tuple[int, ...]
+    known: dict[tuple[Value | None, ...], tuple[bool, ...]] = field(default_factory=dict)
+
+    def of(self, look: _Look, state: State, memory: Memory) -> tuple[bool, ...]:
+        """Return for each condition True if it is true; the arguments are those of `_Judgements.of`."""
+        key = (*[look[item] for item in self.looks], *[memory[item] for item in self.held])
+        found = self.known.get(key)
+        if found is None:
+            whole = _whole(state, memory)
+            found = self.known[key] = tuple(holds(whole, NO_DATA) is True for holds in self.functions)
+        return found
+
+
 class _Judgements:
     """Truth values of some conditions over a state and the memory, worked out once for all states that look alike.
+
+    Each long mission or detour has as many places as visits, and the update of each of them reads all of these. So what
+    reads the same is worked out together, once for each stage that it can be at, and not for all combinations of them.
 
     Args:
         conditions: The conditions.
         places: Place of each subject in a state with its memory.
+        read: Parts of a state that a look consists of.
     """
 
-    def __init__(self, conditions: Iterable[Expression], places: Mapping[Subject, int]) -> None:
-        self._functions = [compile_expression(item, places) for item in conditions]
+    def __init__(
+        self, conditions: Sequence[Expression], places: Mapping[Subject, int], read: Sequence[Expression]
+    ) -> None:
+        number_of = {part: number for number, part in enumerate(read)}
+        first = min((place for subject, place in places.items() if _is_remembered(subject)), default=0)
+        groups: defaultdict[tuple[tuple[int, ...], tuple[int, ...]], list[int]] = defaultdict(list)
+        for number, condition in enumerate(conditions):
+            looks = {number_of[part] for part in _read_of_state(condition)}
+            held = {places[subject] - first for subject in subjects_read(condition) if _is_remembered(subject)}
+            groups[tuple(sorted(looks)), tuple(sorted(held))].append(number)
+        functions = [compile_expression(item, places) for item in conditions]
+        self._groups = tuple(
+            _Group(tuple(numbers), tuple(functions[number] for number in numbers), looks, held)
+            for (looks, held), numbers in groups.items()
+        )
+        self._count = len(conditions)
         self._known: dict[tuple[Value | None, ...], tuple[bool, ...]] = {}
 
-    def of(self, look: tuple[Value | None, ...], state: State, memory: Memory) -> tuple[bool, ...]:
+    def of(self, look: _Look, state: State, memory: Memory) -> tuple[bool, ...]:
         """Return for each condition True if it is true.
 
         Args:
@@ -89,8 +139,11 @@ class _Judgements:
         key = (*look, *memory)
         found = self._known.get(key)
         if found is None:
-            whole = _whole(state, memory)
-            found = self._known[key] = tuple(holds(whole, NO_DATA) is True for holds in self._functions)
+            values = [False] * self._count
+            for group in self._groups:
+                for number, value in zip(group.numbers, group.of(look, state, memory), strict=True):
+                    values[number] = value
+            found = self._known[key] = tuple(values)
         return found
 
 
@@ -110,17 +163,17 @@ class StrategyRun:
             tuple(item.condition for item in owed.aims),
             owed.assumptions,
         )
-        self._updates, self._goals, self._assumptions = [_Judgements(items, places) for items in conditions]
-        read = dict.fromkeys(part for items in conditions for item in items for part in _read_of_state(item))
+        read = tuple(dict.fromkeys(part for items in conditions for item in items for part in _read_of_state(item)))
+        self._updates, self._goals, self._assumptions = [_Judgements(items, places, read) for items in conditions]
         self._read = tuple(compile_expression(part, places) for part in read)
-        self._looks: dict[State, tuple[Value | None, ...]] = {}
+        self._looks: dict[State, _Look] = {}
         self._modes = tuple(
             tuple((item.event, state_predicate(system, item.condition)) for item in mode) for mode in strategy.modes
         )
         self.memory: Memory = (False,) * len(owed.places)
         """Memory before the first stable state."""
 
-    def look(self, state: State) -> tuple[Value | None, ...]:
+    def look(self, state: State) -> _Look:
         """Return all that memory, goals and assumptions read of a state: where it is the same, so are they."""
         found = self._looks.get(state)
         if found is None:
@@ -158,11 +211,15 @@ def _whole(state: State, memory: Memory) -> State:
 def _read_of_state(condition: Expression) -> Iterator[Expression]:
     """Yield parts of a condition that read the state alone: with the memory they decide its value."""
     for part in simple_parts(condition):
-        found = (part,) if all(subject.automaton != MEMORY for subject in subjects_read(part)) else leaves(part)
+        found = leaves(part) if any(map(_is_remembered, subjects_read(part))) else (part,)
         for item in found:
             read = subjects_read(item)
-            if read and all(subject.automaton != MEMORY for subject in read):
+            if read and not any(map(_is_remembered, read)):
                 yield item
+
+
+def _is_remembered(subject: Subject) -> bool:
+    return subject.automaton == MEMORY and subject.variable is not None
 
 
 def check_strategy(

@@ -19,6 +19,7 @@ from robosc.strategies.nearest import Nearest, nearest_to
 from robosc.strategies.synthesize import StrategyResult, StrategySynthesis
 from robosc.supervisor import AddedCondition
 from robosc.synthesis import EngineOptions, SynthesisProgress, SynthesisStatus, synthesize
+from robosc.synthesis.changes import changed_subjects
 from robosc.synthesis.conflict import minimal_conflict
 from robosc.synthesis.workspace import workspace
 
@@ -157,7 +158,9 @@ class _Trials:
     def _synthesis_of[T](
         self, executable: ExecutableSystem, added: Sequence[AddedCondition], asked: Callable[[StrategySynthesis], T]
     ) -> T:
-        with workspace(executable.remembering_automata, self.engine, self.should_stop, self.on_progress) as place:
+        system = executable.remembering_automata
+        followed = changed_subjects(system)
+        with workspace(system, self.engine, self.should_stop, self.on_progress, followed=followed) as place:
             return asked(StrategySynthesis(executable, added, place))
 
     def shown(self) -> tuple[CounterStrategy | None, Nearest | None]:

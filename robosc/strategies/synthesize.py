@@ -18,6 +18,7 @@ from robosc.strategies.counter_strategy import CounterStage, CounterStrategy, op
 from robosc.strategies.gr1 import Approach, Solution, approach_uninterrupted, solve
 from robosc.strategies.preferences import preferred_order
 from robosc.supervisor import AddedCondition, Choice, DecisionDiagram, Strategy
+from robosc.synthesis.changes import changed_subjects
 from robosc.synthesis.diagrams import extract
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.monitor import ProgressMonitor
@@ -81,7 +82,9 @@ def synthesize_strategy(
     """
     owed = executable.obligations
     conditions = (*(item.condition for item in owed.aims), *(item.judged for item in owed.places))
-    with workspace(executable.remembering_automata, engine, should_stop, on_progress, conditions) as place:
+    system = executable.remembering_automata
+    followed = changed_subjects(system)
+    with workspace(system, engine, should_stop, on_progress, conditions, followed) as place:
         allowed = [number for number, item in enumerate(executable.model.assumptions) if item.is_allowed]
         return StrategySynthesis(executable, added, place).result(allowed)
 

@@ -6,5 +6,19 @@ integers with many values are linear forms by cases. Only the library of decisio
 """
 
 from robosc.verification.symbolic.check import DEFAULT_WORK, verify_symbolically
+from robosc.verification.symbolic.closed_loop import Message, Occurrence
+from robosc.verification.symbolic.strategies import (
+    StrategyFault,
+    StrategyVerification,
+    verify_strategy_symbolically,
+)
 
-__all__ = ["DEFAULT_WORK", "verify_symbolically"]
+__all__ = [
+    "DEFAULT_WORK",
+    "Message",
+    "Occurrence",
+    "StrategyFault",
+    "StrategyVerification",
+    "verify_strategy_symbolically",
+    "verify_symbolically",
+]

@@ -1,4 +1,4 @@
-"""Check, on decision diagrams, of supervisors that are too large for a search state by state.
+"""Check, on decision diagrams, of supervisors and strategies that are too large for a search state by state.
 
 It is written from the automata alone, with other methods than synthesis. Each event is one relation between the state
 before and the state after it, in a variable order of its own. Small expressions are evaluated for every value, and

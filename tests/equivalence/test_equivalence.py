@@ -31,6 +31,7 @@ from support.generated import load_module, loaded_file
 from support.goal_porter import porter_supervisor
 from support.missions import strategic
 from support.models import model_of
+from support.page_courier import messages, page_courier_supervisor
 from support.random_controllers import random_controller, random_robot
 from support.random_couriers import strategic_courier
 from support.random_goals import strategic_controller
@@ -143,8 +144,10 @@ def _strategic(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
 
 
 def _couriers(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
-    """Yield a robot with a detour of two visits, and random ones with missions, each with a run under its strategy."""
+    """Yield robots with detours, and random ones with missions, each with a run under its strategy."""
     yield long_detour_supervisor(), random_scenario(long_detour_supervisor(), first, 200)
+    answered = [item for message in messages(first, 100) for item in (message, Action("tick"))]
+    yield page_courier_supervisor(), Scenario(tuple(answered), {"assumption_timeout_s": 0.5})
     for seed in range(first, first + 60):
         supervisor = strategic_courier(seed)
         if supervisor is not None:
@@ -171,7 +174,7 @@ def test_strategies_in_python(
 @needs_gcc
 def test_strategies_in_c(tmp_path: Path) -> None:
     requests, logged = 0, Counter[str]()
-    for number, (supervisor, scenario) in enumerate((*islice(_strategic(1_500), 4), *islice(_couriers(60), 6))):
+    for number, (supervisor, scenario) in enumerate((*islice(_strategic(1_500), 4), *islice(_couriers(60), 7))):
         expected = observe(supervisor, scenario)
         # Some with sanitizers, which take the compiler three times as long.
         options = () if number % 4 == 0 else ("-O0",)

@@ -404,7 +404,8 @@ class Reference:
 def settings_words(layout: Layout, settings: Settings) -> list[object]:
     """The command that makes generated code begin with settings, which are spelled out."""
     numbers = {name: number for number, name in enumerate(layout.communications)}
-    words: list[object] = ["n", POLICIES.index(settings.policy or "fair"), len(settings.priority)]
+    own = "fair" if layout.supervisor.strategy is None else "strategy"
+    words: list[object] = ["n", POLICIES.index(settings.policy or own), len(settings.priority)]
     words += [numbers[name] for name in settings.priority]
     words += [settings.seed, int(settings.every == "event")]
     words += [("default", "keep", "fault").index(settings.on_unknown)]

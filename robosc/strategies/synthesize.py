@@ -12,10 +12,9 @@ from typing import Any
 
 from robosc.automata import ExecutableSystem
 from robosc.automata.goal_memory import holds
-from robosc.expressions import Expression
 from robosc.strategies.arena import ControllerArena
 from robosc.strategies.counter_strategy import CounterStage, CounterStrategy, oppose
-from robosc.strategies.gr1 import Approach, Solution, approach_uninterrupted, solve
+from robosc.strategies.gr1 import Approach, Solution, approach_in_earnest, solve
 from robosc.strategies.preferences import preferred_order
 from robosc.supervisor import AddedCondition, Choice, DecisionDiagram, Strategy
 from robosc.synthesis.diagrams import extract
@@ -114,13 +113,18 @@ class StrategySynthesis:
         preventable = self.preventable(allowed)
         unneeded = self._unneeded(solution) if is_won else ()
         met = self.arena.met() if is_won else self.false
+        near = {item: self._left_to_surroundings(self.assumptions[item]) for item in allowed} if is_won else {}
         if is_won:
-            solution = self._uninterrupted(solution)
+            earnest = self._in_earnest(solution.winning, near)
+            solution = replace(
+                solution,
+                approaches=tuple(earnest.get(item, steps) for item, steps in enumerate(solution.approaches)),
+            )
             # Visits that are not interrupted may need more, though interruptions would do.
-            visits = [solution.approaches[number] for number, _ in self._interruptible()]
+            visits = [steps for number, steps in earnest.items() if self._aims[number].interruption is not None]
             unneeded = tuple(item for item in unneeded if not any(self._rely(steps, item) for steps in visits))
         return StrategyResult(
-            strategy=self._strategy(solution, allowed, met) if is_won and not preventable else None,
+            strategy=self._strategy(solution, near, met) if is_won and not preventable else None,
             unreached=unreached,
             is_hopeless=bool(unreached) and not self.can_be_reached(unreached),
             preventable=preventable,
@@ -303,23 +307,27 @@ class StrategySynthesis:
     def _count(self, predicate: Any) -> int:
         return count_models(self._manager, predicate, self._encoding.state_names)
 
-    def _interruptible(self) -> Iterator[tuple[int, Expression]]:
-        """Yield the numbers of the visits that can be interrupted, with the condition that they are."""
-        for number, item in enumerate(self._aims):
-            if item.interruption is not None:
-                yield number, item.interruption
+    def _in_earnest(self, winning: Any, near: Mapping[int, Any]) -> dict[int, tuple[Approach, ...]]:
+        """Return steps, by goal, that do without interruptions and without idle waiting, as far as they can.
 
-    def _uninterrupted(self, solution: Solution) -> Solution:
-        """Return a solution whose steps towards visits do without interruptions, as far as they can."""
-        approaches = list(solution.approaches)
-        for number, interruption in self._interruptible():
-            approaches[number] = approach_uninterrupted(
-                *(self.arena, self.assumptions, self.goals[number], self.arena.condition(interruption)),
-                solution.winning,
+        Args:
+            winning: The positions from which the goals can be reached.
+            near: For each assumption that the robot may keep from coming true, the positions from which the
+                surroundings alone can make it true.
+        """
+        interruptions = [item.interruption for item in self._aims]
+        return {
+            number: approach_in_earnest(
+                *(self.arena, self.assumptions, self.goals[number]),
+                None if interruption is None else self.arena.condition(interruption),
+                winning,
                 false=self.false,
+                near=near,
                 check_stop=self._monitor.check_stop,
             )
-        return replace(solution, approaches=tuple(approaches))
+            for number, interruption in enumerate(interruptions)
+            if near or interruption is not None
+        }
 
     def _never_made(self, met: Any) -> tuple[int, ...]:
         """Return the visits that neither side can bring about, though the supervisor allows all that it does.
@@ -345,9 +353,8 @@ class StrategySynthesis:
         first = len(self._aims) - len(visits)
         return tuple(first + number for number, is_made in enumerate(visits) if not is_made)
 
-    def _strategy(self, solution: Solution, allowed: Collection[int], met: Any) -> Strategy:
+    def _strategy(self, solution: Solution, near: Mapping[int, Any], met: Any) -> Strategy:
         simplifier = Simplifier(self._encoding, self._seconds)
-        near = {item: self._left_to_surroundings(self.assumptions[item]) for item in allowed}
         return Strategy(tuple(self._mode(solution, number, simplifier, met, near) for number in range(len(self.goals))))
 
     def _left_to_surroundings(self, assumption: Any) -> Any:
@@ -370,22 +377,23 @@ class StrategySynthesis:
             place: Number of the assumption.
             near: Positions from which the surroundings alone can make it true.
         """
-        staying, progress = approach.waiting[place], approach.progress
-        interruption = self._aims[number].interruption
-        if interruption is not None:
-            progress = progress & ~self.arena.condition(interruption)
-        found, before = staying & (near | progress), None
-        while found != before:
-            before = found
-            closer = staying & self.arena.responses(found) & ~found
-            if closer != self._manager.false:
-                found = found | closer
-                continue
-            for event in self._requests:
-                helped = staying & ~found & self.arena.choice(event, before)
-                if helped != self._manager.false:
-                    yield event, helped
-                    found = found | helped
+        everywhere, interruption = approach.waiting[place], self._aims[number].interruption
+        calm = everywhere if interruption is None else everywhere & ~self.arena.condition(interruption)
+        found = calm & approach.progress
+        # Interruptions are waited for only where nothing else helps.
+        for staying in (calm,) if interruption is None else (calm, everywhere):
+            found, before = found | (staying & near), None
+            while found != before:
+                before = found
+                closer = staying & self.arena.responses(found) & ~found
+                if closer != self._manager.false:
+                    found = found | closer
+                    continue
+                for event in self._requests:
+                    helped = staying & ~found & self.arena.choice(event, before)
+                    if helped != self._manager.false:
+                        yield event, helped
+                        found = found | helped
 
     def _mode(
         self, solution: Solution, number: int, simplifier: Simplifier, met: Any, near: Mapping[int, Any]

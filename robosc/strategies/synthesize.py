@@ -36,6 +36,10 @@ class StrategyResult:
             empty where there is a strategy.
         is_hopeless: True if these goals cannot be reached even if the surroundings do all they can for it.
         preventable: Numbers of assumptions that the robot itself can keep from coming true, though nobody allows it.
+        impossible: Numbers of assumptions that cannot come true together again and again, or not while the goals do,
+            whatever both sides do; a set of which none can be left out.
+        is_impossible_alone: True if they cannot even without the goals.
+        idle: Numbers of goals that are true wherever the controller has its turn, so that nothing is done for them.
         never_made: Numbers of visits that no run makes, though the mission as a whole can go on for ever: it does not
             ask for them, or not while their condition can be true; empty where goals are not reached.
         unneeded: Numbers of assumptions without which the goals are reached just as well.
@@ -48,6 +52,9 @@ class StrategyResult:
     unreached: tuple[int, ...]
     is_hopeless: bool
     preventable: tuple[int, ...]
+    impossible: tuple[int, ...]
+    is_impossible_alone: bool
+    idle: tuple[int, ...]
     never_made: tuple[int, ...]
     unneeded: tuple[int, ...]
     positions: int
@@ -109,7 +116,8 @@ class StrategySynthesis:
         """
         solution = self._solution(range(len(self.assumptions)), range(len(self.goals)))
         is_won = self.arena.can_begin(solution.winning)
-        unreached = () if is_won else self._unreached()
+        unreached, impossible, is_alone = self._in_name_alone() if is_won else (self._unreached(), (), False)
+        is_won = is_won and not unreached and not impossible
         preventable = self.preventable(allowed)
         unneeded = self._unneeded(solution) if is_won else ()
         met = self.arena.met() if is_won else self.false
@@ -128,6 +136,9 @@ class StrategySynthesis:
             unreached=unreached,
             is_hopeless=bool(unreached) and not self.can_be_reached(unreached),
             preventable=preventable,
+            impossible=impossible,
+            is_impossible_alone=is_alone,
+            idle=self._idle(met) if is_won else (),
             never_made=self._never_made(met) if is_won else (),
             unneeded=unneeded,
             positions=self._count(self.arena.positions),
@@ -212,16 +223,47 @@ class StrategySynthesis:
     def _unreached(self) -> tuple[int, ...]:
         """Return a smallest set, by leaving out, of goals that cannot be reached together; later ones go first."""
         every = range(len(self.assumptions))
-        kept = list(range(len(self.goals)))
-        for item in reversed(range(len(self.goals))):
-            fewer = [number for number in kept if number != item]
-            if fewer and not self.is_won(every, fewer):
-                kept = fewer
-        return tuple(kept)
+        return _fewest(range(len(self.goals)), lambda fewer: not self.is_won(every, fewer))
 
-    def can_be_reached(self, goals: Sequence[int]) -> bool:
+    def _in_name_alone(self) -> tuple[tuple[int, ...], tuple[int, ...], bool]:
+        """Return what keeps goals from being reached otherwise than in name, because some assumption has to fail.
+
+        Returns:
+            Goals that cannot be reached together, even if both sides do all they can for it; assumptions that cannot
+            come true together; and whether these cannot even without the goals. At most one set is not empty.
+        """
+        goals, assumptions = range(len(self.goals)), range(len(self.assumptions))
+        if not assumptions or self.can_come_true(assumptions, goals):
+            return (), (), False
+        is_alone = not self.can_come_true(assumptions, ())
+        if not is_alone and not self.can_be_reached(goals):
+            return _fewest(goals, lambda fewer: not self.can_be_reached(fewer)), (), False
+        others = () if is_alone else goals
+        return (), _fewest(assumptions, lambda fewer: not self.can_come_true(fewer, others)), is_alone
+
+    def _idle(self, met: Any) -> tuple[int, ...]:
+        """Return the goals that are true in every position that can be met.
+
+        Args:
+            met: The positions that can be met.
+        """
+        met = met & self.arena.positions
+        goals = (number for number, item in enumerate(self._aims) if item.mission is None)
+        return tuple(number for number in goals if met & ~self.goals[number] == self.false)
+
+    def can_be_reached(self, goals: Iterable[int]) -> bool:
         """Return True if both sides together can make goals true again and again."""
-        return self.arena.can_begin(self._possible([self.goals[item] for item in goals]))
+        return self.can_come_true((), goals)
+
+    def can_come_true(self, assumptions: Iterable[int], goals: Iterable[int]) -> bool:
+        """Return True if both sides together can make assumptions and goals true again and again.
+
+        Args:
+            assumptions: Numbers of the assumptions.
+            goals: Numbers of the goals.
+        """
+        wanted = [*(self.assumptions[item] for item in assumptions), *(self.goals[item] for item in goals)]
+        return self.arena.can_begin(self._possible(wanted))
 
     def _possible(self, wanted: Sequence[Any]) -> Any:
         """Return the positions from which both sides together can make conditions true again and again."""
@@ -432,6 +474,21 @@ class StrategySynthesis:
                 choices.append(Choice(event, condition))
                 care = care & ~chosen[event]
         return tuple(choices)
+
+
+def _fewest(items: Iterable[int], is_enough: Callable[[list[int]], bool]) -> tuple[int, ...]:
+    """Return items that are enough, of which none can be left out; later ones are left out first.
+
+    Args:
+        items: Items that are enough together.
+        is_enough: Function that decides whether some are.
+    """
+    kept = list(items)
+    for item in reversed(list(kept)):
+        fewer = [number for number in kept if number != item]
+        if fewer and is_enough(fewer):
+            kept = fewer
+    return tuple(kept)
 
 
 def _without(solution: Solution, place: int) -> Solution:

@@ -115,15 +115,16 @@ class Game:
         place = next((place for place, kept in enumerate((*self.assumptions, *self.goals)) if kept is item), None)
         return item.holds(False if place is None else marks[place], state)
 
-    def can_meet_again_and_again(self, goals: Iterable[int]) -> bool:
-        """Return True if both sides together can make goals true again and again."""
+    def can_meet_again_and_again(self, goals: Iterable[int], assumptions: Iterable[int] = ()) -> bool:
+        """Return True if both sides together can make goals and assumptions true again and again."""
+        items = [*(self.goals[item] for item in goals), *(self.assumptions[item] for item in assumptions)]
         following = {
             position: {*self.successors[position], *self.choices[position].values(), position} - {LOST}
             for position in self.choices
         }
         # Each position can be waited in: a turn at which a goal is true is a turn in its component.
         return any(
-            all(any(self.holds(position, self.goals[item]) for position in component) for item in goals)
+            all(any(self.holds(position, item) for position in component) for item in items)
             for component in components(list(following), following.__getitem__)
         )
 

@@ -294,7 +294,7 @@ class _EarnestSearch(_Search):
             onwards: Positions that requests may lead into, those of the first part before those of the next one.
             within: Positions in which moves begin that are to lead near an assumption, and which they do not leave.
             near: For some assumptions, by number, positions from which the surroundings alone can make them true. The
-                controller waits for these only where moves can lead there, or to progress, while it goes on waiting.
+                controller waits for these only where moves can lead there while it goes on waiting.
         """
         progress = reached
         for item in onwards[-1:]:
@@ -311,7 +311,7 @@ class _EarnestSearch(_Search):
         return None if positions == nearer else Approach(positions, nearer, progress, waiting, onwards)
 
     def _waiting_helped(self, progress: Any, failing: Any, near: Any, within: Any) -> Any:
-        """Return the largest set to wait in, as `_waiting` does, in which moves can lead nearer, or to progress.
+        """Return the largest set to wait in, as `_waiting` does, in which moves can lead nearer before any progress.
 
         Args:
             progress: Positions in which the turn can make progress.
@@ -322,7 +322,7 @@ class _EarnestSearch(_Search):
         bound, staying = None, self.winning
         while staying != bound:
             bound = self._waiting(progress, failing, staying)
-            inside = bound & within
-            led = _leading(self.arena, inside & (near | progress), inside, self.check_stop)
-            staying = led | (bound & ~within)
+            inside = bound & within & ~progress
+            led = _leading(self.arena, inside & near, inside, self.check_stop)
+            staying = led | (bound & ~inside)
         return staying

@@ -421,10 +421,13 @@ class StrategySynthesis:
         """
         everywhere, interruption = approach.waiting[place], self._aims[number].interruption
         calm = everywhere if interruption is None else everywhere & ~self.arena.condition(interruption)
-        found = calm & approach.progress
-        # Interruptions are waited for only where nothing else helps.
-        for staying in (calm,) if interruption is None else (calm, everywhere):
-            found, before = found | (staying & near), None
+        # Luck, and then interruptions, are waited for only where nothing else helps.
+        ways = [(calm & ~approach.progress, near), (calm, near | approach.progress)]
+        if interruption is not None:
+            ways.append((everywhere, near))
+        found = self._manager.false
+        for staying, wanted in ways:
+            found, before = found | (staying & wanted), None
             while found != before:
                 before = found
                 closer = staying & self.arena.responses(found) & ~found

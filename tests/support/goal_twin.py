@@ -415,7 +415,7 @@ def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position,
 
     Of a visit no turn may lead to where it is interrupted, and no assumption counts that only comes true there, as long
     as there are such positions. Before that, an assumption is waited for only where moves that stay there can lead to
-    where the surroundings alone can make it true, or to progress. The robot may keep all of them from coming true.
+    where the surroundings alone can make it true. The robot may keep all of them from coming true.
 
     Args:
         game: The game.
@@ -456,8 +456,8 @@ def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position,
                         and (position in progress or (position in failed and turns(position) & staying))
                     }
                     if is_earnest:
-                        inside = kept & allowed
-                        led = inside & (alone[number] | progress)
+                        inside = (kept & allowed) - progress
+                        led = inside & alone[number]
                         while wider := {at for at in inside if (turns(at) | game.successors[at]) & led} - led:
                             led |= wider
                         kept -= inside - led

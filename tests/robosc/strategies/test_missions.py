@@ -247,6 +247,40 @@ def test_what_may_fail_is_tried_again_though_more_has_to_follow(aim: str) -> Non
     assert sent(bench, 1) == ["survey"]
 
 
+def test_luck_is_not_waited_for_where_the_robot_can_help() -> None:
+    """An empty battery excuses it for as long as it is not at its dock, and somebody may carry it away."""
+    text = """robot Sweeper {
+        component Base {
+            incoming message home with identifier: "/home", type: none
+            outgoing message at_dock with identifier: "/at_dock", type: none
+            incoming message present with identifier: "/present", type: none
+            outgoing message carried with identifier: "/carried", type: none
+            behaviour {
+                initial state away { on request to home goto homing on response from carried goto held }
+                marked state held { on request to home goto homing }
+                state homing { on response from at_dock goto docked }
+                state docked { on request to present goto ready }
+                marked state ready { }
+            }
+        }
+        component Battery {
+            outgoing message charge with identifier: "/charge", type: boolean
+            behaviour {
+                variable full: boolean
+                on response from charge do full := value and (full or Base.docked)
+                initial marked state measured { }
+            }
+        }
+        goal always eventually Base.ready or Base.held
+        assume Base.homing leads to Base.docked
+        assume allow always eventually Battery.full
+    }"""
+    bench = bench_of(model_of(text))
+    assert sent(bench, 3) == ["home"]
+    bench.receive("/at_dock")
+    assert sent(bench, 3) == ["present"]
+
+
 def test_of_requests_that_lead_nearer_the_preferred_one_is_chosen() -> None:
     ways = """robot Ways {
         component Base {

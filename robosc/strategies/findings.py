@@ -37,6 +37,18 @@ def goal_findings(
                 "Make it a goal as well, assume only what the surroundings decide, or write 'assume allow ...'.",
             )
         )
+    if result.impossible:
+        found.append(_impossible(places, result))
+    for number in result.idle:
+        found.append(
+            Diagnostic(
+                Severity.WARNING,
+                "idle-goal",
+                "nothing is ever done for this goal: it is true whenever the controller decides",
+                _place(places, aims[number]),
+                "Compare it with what can happen, such as its numbers with the ranges of variables, or remove it.",
+            )
+        )
     for number in result.never_made:
         found.append(
             Diagnostic(
@@ -85,6 +97,21 @@ def layer_goal_findings(model: Model, places: Places, deployment: Deployment) ->
 def goals_and_missions(model: Model) -> str:
     """Return a word for what a model's strategy is to reach: goals, missions or both."""
     return " and ".join(word for word, items in (("goals", model.goals), ("missions", model.missions)) if items)
+
+
+def _impossible(places: Places, result: StrategyResult) -> Diagnostic:
+    """Return the finding about assumptions that cannot come true."""
+    first, *others = (places.assumptions[number] for number in result.impossible)
+    what = "these assumptions cannot come true together" if others else "this assumption cannot come true"
+    when = "whatever happens" if result.is_impossible_alone else "while the goals do"
+    return Diagnostic(
+        Severity.ERROR,
+        "impossible-assumption",
+        f"{what} again and again, {when}: every goal would be reached in name alone",
+        first,
+        "Correct the condition, or remove what does not come true.",
+        _related([("this assumption belongs to them", place) for place in others]),
+    )
 
 
 def _unreached(aims: Sequence[Aim], places: Places, result: StrategyResult, blame: GoalBlame | None) -> Diagnostic:

@@ -8,6 +8,7 @@ Computer Science 200(1-2), 1998, pp. 135-183.
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 from robosc.automata import ExecutableSystem
@@ -114,15 +115,16 @@ class Game:
         place = next((place for place, kept in enumerate((*self.assumptions, *self.goals)) if kept is item), None)
         return item.holds(False if place is None else marks[place], state)
 
-    def can_meet_again_and_again(self, goals: Iterable[int]) -> bool:
-        """Return True if both sides together can make goals true again and again."""
+    def can_meet_again_and_again(self, goals: Iterable[int], assumptions: Iterable[int] = ()) -> bool:
+        """Return True if both sides together can make goals and assumptions true again and again."""
+        items = [*(self.goals[item] for item in goals), *(self.assumptions[item] for item in assumptions)]
         following = {
             position: {*self.successors[position], *self.choices[position].values(), position} - {LOST}
             for position in self.choices
         }
         # Each position can be waited in: a turn at which a goal is true is a turn in its component.
         return any(
-            all(any(self.holds(position, self.goals[item]) for position in component) for item in goals)
+            all(any(self.holds(position, item) for position in component) for item in items)
             for component in components(list(following), following.__getitem__)
         )
 
@@ -412,7 +414,8 @@ def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position,
     N. Piterman, A. Pnueli and Y. Sa'ar, "Synthesis of reactive(1) designs", VMCAI 2006, LNCS 3855, pp. 364-380.
 
     Of a visit no turn may lead to where it is interrupted, and no assumption counts that only comes true there, as long
-    as there are such positions.
+    as there are such positions. Before that, an assumption is waited for only where moves that stay there can lead to
+    where the surroundings alone can make it true. The robot may keep all of them from coming true.
 
     Args:
         game: The game.
@@ -435,13 +438,15 @@ def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position,
         while wider := {at for at in calm if (turns(at) | game.successors[at]) & hope} - hope:
             hope |= wider
         hopeful.append(failed & hope)
+    alone = [game.alone(owed) for owed in game.assumptions]
+    ways = [(failing, won)] if is_calm is None else [(hopeful, calm), (failing, won)]
     while True:
-        for waited, allowed in ((failing, won),) if is_calm is None else ((hopeful, calm), (failing, won)):
+        for is_earnest, (waited, allowed) in product((True, False) if alone else (False,), ways):
             onwards = found.keys() & allowed
             progress = {position for position in won if position in reached or turns(position) & onwards}
             near = set[Position]()
             # The empty assumption is one that never fails.
-            for failed in waited or [set[Position]()]:
+            for number, failed in enumerate(waited or [set[Position]()]):
                 staying = set(won)
                 while True:
                     kept = {
@@ -450,6 +455,12 @@ def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position,
                         if game.successors[position] <= staying
                         and (position in progress or (position in failed and turns(position) & staying))
                     }
+                    if is_earnest:
+                        inside = (kept & allowed) - progress
+                        led = inside & alone[number]
+                        while wider := {at for at in inside if (turns(at) | game.successors[at]) & led} - led:
+                            led |= wider
+                        kept -= inside - led
                     if kept == staying:
                         break
                     staying = kept

@@ -186,6 +186,101 @@ def test_what_the_surroundings_may_fail_at_is_tried_again() -> None:
     assert sent(bench, 2) == ["release", "grip"]
 
 
+FLIGHT = """robot Drone {
+    interface trigger use Trigger from std_srvs
+    component Battery {
+        outgoing message voltage with identifier: "/voltage", type: boolean
+        behaviour {
+            variable low: boolean
+            on response from voltage do low := value
+            initial marked state measured { }
+        }
+    }
+    component Flight {
+        service arm with identifier: "/arm", request: none, response: none links trigger
+        service take_off with identifier: "/take_off", request: none, response: none links trigger
+        incoming message survey with identifier: "/survey", type: none
+        incoming message land with identifier: "/land", type: none
+        behaviour {
+            initial marked state grounded { on request to arm goto arming }
+            state arming { on response from arm goto armed on error from arm goto grounded }
+            state armed { on request to take_off goto climbing }
+            state climbing { on response from take_off goto flying on error from take_off goto armed }
+            state flying { on request to survey goto surveying }
+            state surveying { on request to land goto grounded }
+        }
+    }
+    requirement take_off needs !Battery.low
+    assume always eventually !Battery.low
+    assume allow Flight.arming leads to Flight.armed
+    assume allow Flight.climbing leads to Flight.flying
+    §
+}"""
+
+
+@pytest.mark.parametrize(
+    "aim",
+    [
+        "goal always eventually Flight.surveying",
+        "goal once Flight.surveying",
+        "mission m { visit Flight.surveying then Flight.grounded }",
+        "mission m { visit Flight.surveying on Battery.low from anywhere visit Flight.surveying }",
+    ],
+)
+def test_what_may_fail_is_tried_again_though_more_has_to_follow(aim: str) -> None:
+    """Success leads to a state farther from the goal than waiting for it would be."""
+    bench = bench_of(model_of(FLIGHT.replace("§", aim)))
+
+    def calls(service: str) -> list[int]:
+        return [number for kind, name, number, *_ in bench.tick(3) if kind == "call" and name == service]
+
+    for service in ("arm", "take_off"):
+        for _ in range(3):
+            [call] = calls(service)
+            bench.executor.on_call_failed(call, "it failed")
+        bench.receive("/voltage", data=True)
+        waiting = calls(service)
+        bench.receive("/voltage", data=False)
+        [call] = waiting or calls(service)
+        assert bool(waiting) is (service == "arm")
+        bench.executor.on_reply(call, None)
+    assert sent(bench, 1) == ["survey"]
+
+
+def test_luck_is_not_waited_for_where_the_robot_can_help() -> None:
+    """An empty battery excuses it for as long as it is not at its dock, and somebody may carry it away."""
+    text = """robot Sweeper {
+        component Base {
+            incoming message home with identifier: "/home", type: none
+            outgoing message at_dock with identifier: "/at_dock", type: none
+            incoming message present with identifier: "/present", type: none
+            outgoing message carried with identifier: "/carried", type: none
+            behaviour {
+                initial state away { on request to home goto homing on response from carried goto held }
+                marked state held { on request to home goto homing }
+                state homing { on response from at_dock goto docked }
+                state docked { on request to present goto ready }
+                marked state ready { }
+            }
+        }
+        component Battery {
+            outgoing message charge with identifier: "/charge", type: boolean
+            behaviour {
+                variable full: boolean
+                on response from charge do full := value and (full or Base.docked)
+                initial marked state measured { }
+            }
+        }
+        goal always eventually Base.ready or Base.held
+        assume Base.homing leads to Base.docked
+        assume allow always eventually Battery.full
+    }"""
+    bench = bench_of(model_of(text))
+    assert sent(bench, 3) == ["home"]
+    bench.receive("/at_dock")
+    assert sent(bench, 3) == ["present"]
+
+
 def test_of_requests_that_lead_nearer_the_preferred_one_is_chosen() -> None:
     ways = """robot Ways {
         component Base {

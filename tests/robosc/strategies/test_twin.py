@@ -75,10 +75,12 @@ def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> N
         result = synthesis.result(allowed=every)
         strategy = result.strategy
         preventable = synthesis.result().preventable
-        counter = synthesis.counter(result.unreached) if result.unreached else None
+        is_denied = bool(result.unreached) and not synthesis.is_won(every, result.unreached)
+        counter = synthesis.counter(result.unreached) if is_denied else None
     is_won = game.first != LOST and game.first in won
-    assert (strategy is not None) == is_won, seed
-    if game.first != LOST:
+    in_name = is_won and is_in_name_alone(game, result, seed, met)
+    assert (strategy is not None) == (is_won and not in_name), seed
+    if game.first != LOST and not in_name:
         compare_reasons(game, owed.aims, result, result.unreached, seed, met)
         prevented = [number for number, item in enumerate(game.assumptions) if is_prevented(game, item)]
         assert list(preventable) == prevented, seed
@@ -86,13 +88,20 @@ def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> N
     met["models"] += 1
     met["positions"] += len(game.choices)
     met["won" if is_won else "lost"] += 1
-    if counter is not None and game.first != LOST:
+    if counter is not None and game.first != LOST and not in_name:
         compare_counter(game, executable, counter, result.unreached, seed, met)
     if strategy is None:
         return
     never = {executable.obligations.aims[number].name for number in result.never_made}
     assert never == {aim.name for aim in executable.obligations.aims if aim.mission is not None} - game.made, seed
     met["never made"] += bool(never)
+    idle = [
+        number
+        for number, aim in enumerate(owed.aims)
+        if aim.mission is None and all(game.holds(position, game.goals[number]) for position in game.choices)
+    ]
+    assert list(result.idle) == idle, seed
+    met["idle goals"] += bool(idle)
     met["with requests"] += any(strategy.modes)
     check = check_strategy(executable, added, strategy)
     assert check.result == "passed", (seed, check)
@@ -108,6 +117,26 @@ def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> N
         found = check_strategy(executable, added, damaged)
         assert found.result == ("failed" if is_missed else "passed"), seed
         met["damaged, missed" if is_missed else "damaged, still reached"] += 1
+
+
+def is_in_name_alone(game: Game, result: StrategyResult, seed: int, met: Counter[str]) -> bool:
+    """Return True if not all goals and assumptions can come true; check what is said of them then."""
+    goals, assumptions = range(len(game.goals)), range(len(game.assumptions))
+    if not assumptions or game.can_meet_again_and_again(goals, assumptions):
+        assert not result.impossible and not result.unreached, seed
+        return False
+    is_alone = not game.can_meet_again_and_again((), assumptions)
+    assert bool(result.impossible) != bool(result.unreached), seed
+    assert result.is_impossible_alone == is_alone, seed
+    others = () if is_alone else goals
+    for item in (None, *result.unreached, *result.impossible):
+        items = {*result.unreached, *result.impossible} - {item}
+        asked = (items, ()) if result.unreached else (others, items)
+        assert not items or game.can_meet_again_and_again(*asked) is (item is not None), seed
+    kept = "goals" if result.unreached else "assumptions"
+    assert not result.unreached or result.is_hopeless, seed
+    met[f"impossible {kept}"] += 1
+    return True
 
 
 def is_prevented(game: Game, assumption: Item) -> bool:

@@ -6,7 +6,7 @@ W. Zielonka, "Infinite games on finitely coloured graphs with applications to au
 Computer Science 200(1-2), 1998, pp. 135-183.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -404,8 +404,23 @@ def components(vertices: list[Any], after: Callable[[Any], set[Any]]) -> Iterato
             yield component
 
 
-def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position, int], set[Position]]:
-    """Return the distance of each winning position from a goal, and those from which only interruptions help.
+@dataclass(frozen=True)
+class Distances:
+    """Distances of winning positions from a goal.
+
+    Attributes:
+        far: Distance of each position.
+        last_resort: Positions from which only interruptions help.
+        waited: For each distance, from 1 on, and each assumption, where a turn makes progress or waits for it.
+    """
+
+    far: dict[Position, int]
+    last_resort: set[Position]
+    waited: list[list[set[Position]]]
+
+
+def distances(game: Game, won: set[Position], goal: int) -> Distances:
+    """Return the distance of each winning position from a goal.
 
     A position has distance k + 1 where, for some assumption, the surroundings cannot prevent that each turn gets to
     distance k or less, or to the goal, or stays where that assumption fails. This is the definition, round by round:
@@ -423,6 +438,7 @@ def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position,
     calm = won if is_calm is None else set(filter(is_calm, won))
     found: dict[Position, int] = {}
     last_resort = set[Position]()
+    sets: list[list[set[Position]]] = []
 
     def turns(position: Position) -> set[Any]:
         return {position, *game.choices[position].values()}
@@ -440,6 +456,7 @@ def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position,
             onwards = found.keys() & allowed
             progress = {position for position in won if position in reached or turns(position) & onwards}
             near = set[Position]()
+            stayed: list[set[Position]] = []
             # The empty assumption is one that never fails.
             for failed in waited or [set[Position]()]:
                 staying = set(won)
@@ -454,10 +471,12 @@ def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position,
                         break
                     staying = kept
                 near |= staying
+                stayed.append(staying)
             if not near <= found.keys():
                 break
         else:
-            return found, last_resort
+            return Distances(found, last_resort, sets)
+        sets.append(stayed)
         fresh = near - found.keys()
         if is_calm is not None and waited is failing:
             last_resort |= fresh
@@ -472,26 +491,90 @@ def _is_calm(game: Game, goal: int) -> Callable[[Position], bool] | None:
     return None if is_interrupted is None else lambda position: not is_interrupted(position[1][number], position[0][0])
 
 
-def leading(
-    game: Game, far: dict[Position, int], last_resort: set[Position], position: Position, goal: int
-) -> set[str]:
+def leading(game: Game, known: Distances, position: Position, goal: int) -> set[str]:
     """Return the requests that a strategy may choose in a position, before it looks at preferences.
+
+    Where only interruptions help, what leads nearest is chosen, of what does not interrupt the visit, if there is any.
 
     Args:
         game: The game.
-        far: Distance of each position.
-        last_resort: Positions from which only interruptions help: there what leads nearest is chosen, of what does not
-            interrupt the visit, if there is any.
+        known: Distances from the goal.
         position: The position.
         goal: Number of the goal or visit.
     """
-    is_calm = _is_calm(game, goal)
+    is_calm, far = _is_calm(game, goal), known.far
     near = {name: end for name, end in game.choices[position].items() if far.get(end, 10**9) < far[position]}
     if is_calm is None:
         return set(near)
     calm = {name: end for name, end in near.items() if is_calm(end)}
-    if position not in last_resort:
+    if position not in known.last_resort:
         return set(calm)
     near = calm or near
     least = min((far[end] for end in near.values()), default=0)
     return {name for name, end in near.items() if far[end] == least}
+
+
+def taken_along(
+    game: Game, known: Sequence[Distances], allowed: Collection[int], own: Decide, position: Position, goal: int
+) -> str | None:
+    """Return the request for another goal that a strategy issues while it waits in a position.
+
+    Args:
+        game: The game.
+        known: Distances from each goal.
+        allowed: Numbers of the assumptions that the robot may keep from coming true.
+        own: Decisions of each mode for its own goal.
+        position: The position, in which the mode requests nothing for its own goal.
+        goal: Number of the goal that it waits for.
+    """
+
+    def distance(at: Any, number: int) -> int:
+        return 0 if game.holds(at, game.goals[number]) else known[number].far[at]
+
+    def is_calm(at: Any, number: int) -> bool:
+        calm = _is_calm(game, number)
+        return calm is None or calm(at)
+
+    waited = known[goal].waited[known[goal].far[position] - 1]
+    order = [*allowed, *(item for item in range(len(game.assumptions)) if item not in allowed)]
+    place = next(item for item in order if position in waited[item])
+    within = waited[place] & game.alone(game.assumptions[place]) if place in allowed else waited[place]
+    count = len(game.goals)
+    others = [(goal + step) % count for step in range(1, count)]
+    for number, other in enumerate(others):
+        if distance(position, other) == 0:
+            continue
+        event, _ = own(position, other)
+        target: Any = game.choices[position].get(event or "")
+        if event is None or not {position, target} <= within or not (is_calm(target, goal) and is_calm(target, other)):
+            continue
+        is_nearer = known[other].far[target] < known[other].far[position]
+        if is_nearer and all(distance(target, item) <= distance(position, item) for item in others[:number]):
+            return event
+    return None
+
+
+def endless_requests(game: Game, decide: Decide) -> Any:
+    """Return a position and a mode from which requests go on for ever without a move of the surroundings, or None.
+
+    Only requests count that one mode issues one after the other: goals that are all reached by requests alone are
+    reached again and again.
+    """
+    after: dict[Any, Any] = {}
+    for position in game.choices:
+        for mode in range(len(game.goals)):
+            event, number = decide(position, mode)
+            target = game.choices[position].get(event or "")
+            if number == mode and target not in (None, LOST):
+                after[position, mode] = (target, mode)
+    done = set[Any]()
+    for first in after:
+        path = dict[Any, None]()
+        at = first
+        while at in after and at not in done:
+            if at in path:
+                return at
+            path[at] = None
+            at = after[at]
+        done |= path.keys()
+    return None

@@ -91,8 +91,9 @@ def test_the_summary_tells_for_each_goal_what_is_requested_where(supervisor: Sup
       leave.request  where Base.inside
       nothing        otherwise
     for goal 3, once Door.ajar or Base.inside
-      open.request  where not Door.opening
-      nothing       otherwise
+      open.request   where not Door.opening
+      enter.request  meanwhile for others, where Caller.waiting
+      nothing        otherwise
   it assumes of the surroundings
     assumption 1, allow always eventually not Door.opening
 """
@@ -103,6 +104,7 @@ def test_the_summary_tells_for_each_goal_what_is_requested_where(supervisor: Sup
         "name": "goal 2",
         "goal": "always eventually Base.outside and not Door.opening",
         "choices": [{"event": "leave.request", "condition": "Base.inside"}],
+        "meanwhile": [],
     }
     assert found["assumptions"] == ["allow always eventually not Door.opening"]
     assert found["certificate"]["goals"] == "passed"

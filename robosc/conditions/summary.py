@@ -188,6 +188,8 @@ def strategy_lines(supervisor: Supervisor) -> list[str]:
     short = short_diagrams(diagram for _, diagram, formula in every if formula is None)
     what = goals_and_visits(supervisor)
     lines = [f"the strategy approaches its {what} in turn; it requests the first that applies"]
+    if not any(goal.choices or goal.meanwhile for goal in goals):
+        lines = [f"the strategy never requests anything: its {what} come true without that"]
     for goal in goals:
         lines += [f"  {row}" for row in _wrapped(f"for {goal.name}, {goal.text}")]
         rows: list[tuple[str, list[str]]] = []

@@ -25,7 +25,14 @@ from robosc.model.layers import layer_findings, without_controller_findings
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
-from robosc.strategies import blame_goals, goal_findings, goals_and_missions, layer_goal_findings, synthesize_strategy
+from robosc.strategies import (
+    blame_goals,
+    goal_findings,
+    goals_and_missions,
+    layer_goal_findings,
+    put_off_findings,
+    synthesize_strategy,
+)
 from robosc.supervisor import CheckResult, Supervisor
 from robosc.synthesis import (
     EngineOptions,
@@ -233,6 +240,8 @@ def make_supervisor(
         )
         if check.missed is not None:
             raise InternalError(f"the strategy misses a goal after {', '.join(check.missed.trace)}")
+        late = put_off_findings(problem.system.obligations.aims, places, found, check.put_off)
+        diagnostics = sorted_diagnostics((*diagnostics, *late))
         outcome: CheckResult = "passed" if check.result == "passed" else "not checked"
         certificate = msgspec.structs.replace(certificate, goals=outcome)
     supervisor = Supervisor.supervising(problem.system, result.added, certificate, strategy)

@@ -62,6 +62,8 @@ class _Visit:
     mission: MissionTwin
     is_done: Callable[[Mark, Any], bool]
     is_interrupted: Callable[[Mark, Any], bool] | None
+    is_own: bool
+    """True for a visit of the mission itself, False for one of a detour."""
 
     @property
     def start(self) -> Mark:
@@ -180,9 +182,9 @@ def game_of(executable: ExecutableSystem, added: Iterable[AddedCondition], limit
     model = executable.model
     twins = [mission_twin(mission, test) for mission in model.missions]
     visits = [
-        _Visit(twin, is_done, is_interrupted)
+        _Visit(twin, is_done, is_interrupted, number < len(twin.visits))
         for twin in twins
-        for (_, is_done), is_interrupted in zip(twin.aims(), twin.interruptions(), strict=True)
+        for number, ((_, is_done), is_interrupted) in enumerate(zip(twin.aims(), twin.interruptions(), strict=True))
     ]
     game = Game(items(model.assumptions, "assumption"), [*items(model.goals, "goal"), *visits])
     everything = [*game.assumptions, *game.goals]
@@ -578,3 +580,92 @@ def endless_requests(game: Game, decide: Decide) -> Any:
             at = after[at]
         done |= path.keys()
     return None
+
+
+def put_off(game: Game, names: Sequence[str], decide: Decide) -> set[int]:
+    """Return the visits that a strategy interrupts instead of making them, and then may leave unmade for ever.
+
+    A run counts in which the surroundings keep to the assumptions, neither interrupt the visit anywhere nor make a
+    condition true that leads to an interruption.
+
+    Args:
+        game: The game.
+        names: Names of its goals and visits.
+        decide: Decisions of the strategy.
+    """
+    found = set[int]()
+    for goal, item in enumerate(game.goals):
+        is_calm = _is_calm(game, goal)
+        if is_calm is None or isinstance(item, Item):
+            continue
+        own, place = item, len(game.assumptions) + goal
+
+        def is_made(before: Any, after: Any, own: _Visit = own, place: int = place, name: str = names[goal]) -> bool:
+            return name in own.mission.made(before[1][place], after[0][0])
+
+        def is_brought_about(before: Any, after: Any, own: _Visit = own, is_calm: Any = is_calm) -> bool:
+            # Visits of a detour wait only while the mission is not asked for.
+            causes = list(own.mission.causes())[: None if own.is_own else 1]
+            calmed = is_calm(before) and not is_calm(after)
+            return calmed or any(cause(after[0][0]) and not cause(before[0][0]) for cause in causes)
+
+        vertices, chosen = _under(game, decide)
+        turns: dict[Any, Any] = {}
+        after: dict[Any, set[Any]] = {}
+        begun = set[Any]()
+        for vertex in vertices:
+            position, mode = vertex
+            moved, number = chosen[vertex]
+            after[vertex] = {
+                (target, mode)
+                for target in game.successors[position]
+                if not is_made(position, target) and not is_brought_about(position, target)
+            }
+            if not is_made(position, moved):
+                turns[vertex] = (moved, number)
+                after[vertex].add(turns[vertex])
+                if number == goal and is_calm(position) and not is_calm(moved):
+                    begun.add(turns[vertex])
+        if _is_fair_run(game, after, turns, begun):
+            found.add(goal)
+    return found
+
+
+def _under(game: Game, decide: Decide) -> tuple[list[Any], dict[Any, Any]]:
+    """Return the positions under a strategy, each with a mode, and where each turn leads: a position and a mode."""
+    chosen: dict[Any, Any] = {}
+    queue: list[Any] = [(game.first, 0)]
+    for vertex in queue:
+        if vertex not in chosen:
+            position, mode = vertex
+            event, after = decide(position, mode)
+            chosen[vertex] = (position if event is None else game.choices[position][event], after)
+            queue += [chosen[vertex], *((target, mode) for target in game.successors[position])]
+    return list(chosen), chosen
+
+
+def _is_fair_run(game: Game, after: Mapping[Any, set[Any]], turns: Mapping[Any, Any], start: Collection[Any]) -> bool:
+    """Return True if a run goes on for ever in a graph on which each assumption comes true at turns again and again.
+
+    The definition by a greatest fixed point: E. A. Emerson and C.-L. Lei, "Modalities for model checking: branching
+    time logic strikes back", Science of Computer Programming 8(3), 1987, pp. 275-306.
+    """
+    kept = set(after)
+    while True:
+        before = set(kept)
+        for owed in (None, *game.assumptions):
+            near = {
+                vertex
+                for vertex, turn in turns.items()
+                if vertex in kept and turn in kept and (owed is None or game.holds(vertex[0], owed))
+            }
+            while wider := {vertex for vertex in kept - near if after[vertex] & near}:
+                near |= wider
+            kept &= near
+        if kept == before:
+            break
+    reached, queue = set(start), list(start)
+    for vertex in queue:
+        queue += after[vertex] - reached
+        reached |= after[vertex]
+    return bool(reached & kept)

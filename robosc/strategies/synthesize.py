@@ -15,6 +15,7 @@ from robosc.automata.goal_memory import holds
 from robosc.strategies.arena import ControllerArena
 from robosc.strategies.counter_strategy import CounterStage, CounterStrategy, oppose
 from robosc.strategies.gr1 import Approach, Solution, approach_in_earnest, solve
+from robosc.strategies.meanwhile import Meanwhile, ModeGame, Requests
 from robosc.strategies.preferences import preferred_order
 from robosc.supervisor import AddedCondition, Choice, DecisionDiagram, Strategy
 from robosc.synthesis.changes import changed_subjects
@@ -400,7 +401,16 @@ class StrategySynthesis:
 
     def _strategy(self, solution: Solution, near: Mapping[int, Any], met: Any) -> Strategy:
         simplifier = Simplifier(self._encoding, self._seconds)
-        return Strategy(tuple(self._mode(solution, number, simplifier, met, near) for number in range(len(self.goals))))
+        modes = [self._mode(solution, number, near) for number in range(len(self.goals))]
+        # Assumptions that the strategy helps with come first where several can be waited for.
+        places = (*near, *(item for item in range(len(self.assumptions)) if item not in near))
+        meanwhile = Meanwhile(self.arena, self._requests, modes, places, near, self.false)
+        own = [self._choices(mode.chosen, solution.winning & met & ~mode.goal, simplifier) for mode in modes]
+        found = []
+        for number, (choices, left) in enumerate(own):
+            others, _ = self._choices(meanwhile.of(number, left), left, simplifier, is_meanwhile=True)
+            found.append((*choices, *others))
+        return Strategy(tuple(found))
 
     def _left_to_surroundings(self, assumption: Any) -> Any:
         """Return the positions from which the surroundings alone can make an assumption true."""
@@ -443,43 +453,60 @@ class StrategySynthesis:
                         yield event, helped
                         found = found | helped
 
-    def _mode(
-        self, solution: Solution, number: int, simplifier: Simplifier, met: Any, near: Mapping[int, Any]
-    ) -> tuple[Choice, ...]:
-        """Return the requests that approach a goal, in order, each with the condition for choosing it.
+    def _mode(self, solution: Solution, number: int, near: Mapping[int, Any]) -> ModeGame:
+        """Return the mode that approaches a goal.
 
         Args:
             solution: The solution.
             number: Number of the goal.
-            simplifier: Simplifier of the conditions.
-            met: Positions that can be met.
             near: For each assumption that the robot may keep from coming true, the positions from which the
                 surroundings alone can make it true.
         """
-        chosen: dict[str, Any] = {}
+        chosen: Requests = {}
+        nearer: Requests = {}
         decided = self.goals[number]
         for approach in solution.approaches[number]:
             here = approach.positions & ~approach.nearer
-            for target, event in product(approach.onwards, self._requests):
+            # The first half of several parts is that without interruptions.
+            calm = max(1, len(approach.onwards) // 2)
+            for (place, target), event in product(enumerate(approach.onwards), self._requests):
                 found = here & ~decided & self.arena.choice(event, target)
                 if found != self._manager.false:
                     chosen[event] = chosen.get(event, self._manager.false) | found
                     decided = decided | found
+                    if place < calm:
+                        nearer[event] = nearer.get(event, self._manager.false) | found
             for place, positions in near.items():
                 for event, helped in self._helping(approach, number, place, positions):
                     found = here & ~decided & helped
                     chosen[event] = chosen.get(event, self._manager.false) | found
                     decided = decided | found
-        care = solution.winning & met & ~self.goals[number]
+                # An assumption that is waited for is waited for until it comes, or progress is made.
+                here = here & ~approach.waiting[place]
+        interruption = self._aims[number].interruption
+        interrupted = self.false if interruption is None else self.arena.condition(interruption)
+        return ModeGame(self.goals[number], interrupted, solution.approaches[number], chosen, nearer)
+
+    def _choices(
+        self, chosen: Requests, care: Any, simplifier: Simplifier, *, is_meanwhile: bool = False
+    ) -> tuple[tuple[Choice, ...], Any]:
+        """Return requests, in order, each with the condition for choosing it, and the positions left.
+
+        Args:
+            chosen: For each request the positions in which it is chosen.
+            care: Positions that count.
+            simplifier: Simplifier of the conditions.
+            is_meanwhile: True for requests that a mode takes along for others.
+        """
         choices: list[Choice] = []
         for event in self._requests:
             if event in chosen and chosen[event] & care != self._manager.false:
                 condition = simplifier.condition(chosen[event], care)
                 if condition is None:
                     condition = extract(self._encoding, self._manager.true)
-                choices.append(Choice(event, condition))
+                choices.append(Choice(event, condition, is_meanwhile))
                 care = care & ~chosen[event]
-        return tuple(choices)
+        return tuple(choices), care
 
 
 def _fewest(items: Iterable[int], is_enough: Callable[[list[int]], bool]) -> tuple[int, ...]:

@@ -36,6 +36,7 @@ from support.random_controllers import random_controller, random_robot
 from support.random_couriers import strategic_courier
 from support.random_goals import strategic_controller
 from support.random_supervisors import CERTIFICATE, random_supervisor
+from support.random_waiting import strategic_waiting
 from support.rounds import long_detour_supervisor
 
 ROBOTS = sorted(WORLDS)
@@ -154,10 +155,23 @@ def _couriers(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
             yield supervisor, random_scenario(supervisor, seed, 80)
 
 
+def _waiting(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
+    """Yield random robots that do something for other goals while they wait, each with a run under its strategy."""
+    for seed in range(first, first + 60):
+        supervisor = strategic_waiting(seed)
+        modes = () if supervisor is None or supervisor.strategy is None else supervisor.strategy.modes
+        if supervisor is not None and any(item.is_meanwhile for mode in modes for item in mode):
+            yield supervisor, random_scenario(supervisor, seed, 80)
+
+
 # Assumptions of the couriers that were reported as owed are rarely met again.
 @pytest.mark.parametrize(
     ("robots", "least", "kinds"),
-    [(_strategic, 50, ("reached", "approach", "owed", "met")), (_couriers, 300, ("reached", "approach", "owed"))],
+    [
+        (_strategic, 50, ("reached", "approach", "owed", "met")),
+        (_couriers, 300, ("reached", "approach", "owed")),
+        (_waiting, 300, ("reached", "approach", "owed")),
+    ],
 )
 def test_strategies_in_python(
     robots: Callable[[int], Iterator[tuple[Supervisor, Scenario]]], least: int, kinds: tuple[str, ...]
@@ -174,7 +188,9 @@ def test_strategies_in_python(
 @needs_gcc
 def test_strategies_in_c(tmp_path: Path) -> None:
     requests, logged = 0, Counter[str]()
-    for number, (supervisor, scenario) in enumerate((*islice(_strategic(1_500), 4), *islice(_couriers(60), 7))):
+    for number, (supervisor, scenario) in enumerate(
+        (*islice(_strategic(1_500), 4), *islice(_couriers(60), 7), *islice(_waiting(0), 3))
+    ):
         expected = observe(supervisor, scenario)
         # Some with sanitizers, which take the compiler three times as long.
         options = () if number % 4 == 0 else ("-O0",)

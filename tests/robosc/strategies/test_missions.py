@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 import robosc
-from robosc.automata import ExecutableSystem
+from robosc.automata import ExecutableSystem, to_automata
 from robosc.cli.simulate import mission_json
 from robosc.cli.simulation_steps import state_lines, step_lines
 from robosc.conditions.summary import strategy_lines, summary_json
@@ -16,9 +16,10 @@ from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model, Preference
 from robosc.source import Location
-from robosc.strategies import goal_findings, layer_goal_findings
+from robosc.strategies import goal_findings, layer_goal_findings, put_off_findings
 from robosc.strategies.preferences import preferred_order
 from robosc.supervisor import Supervisor
+from robosc.synthesis import synthesize
 from support.execution import Bench
 from support.missions import courier, strategic, strategy_result
 from support.models import model_of
@@ -141,6 +142,7 @@ def test_a_detour_is_begun_where_the_way_to_a_visit_leads_through_it() -> None:
     }"""
     bench = bench_of(model_of(text))
     assert sent(bench, 8) == ["forth", "light", "forth", "back", "light", "back", "forth", "light"]
+    assert findings(model_of(text)) == ()
     # Without the requirement no detour is needed.
     bench = bench_of(model_of(text.replace("requirement light needs Base.hall", "")))
     assert sent(bench, 3) == ["light", "forth", "forth"]
@@ -417,8 +419,13 @@ def findings(model: Model, deployment: Deployment = Deployment.CONTROLLER) -> tu
     )
     if deployment is Deployment.LAYER:
         return layer_goal_findings(model, places, deployment)
-    aims = ExecutableSystem(model, deployment).obligations.aims
-    return goal_findings(aims, places, strategy_result(model))
+    executable = ExecutableSystem(model, deployment)
+    aims, result = executable.obligations.aims, strategy_result(model)
+    if result.strategy is None:
+        return goal_findings(aims, places, result)
+    added = synthesize(to_automata(model, deployment)).added
+    late = check_strategy(executable, added, result.strategy).put_off
+    return (*goal_findings(aims, places, result), *put_off_findings(aims, places, result, late))
 
 
 def line(found: Diagnostic) -> int:
@@ -454,6 +461,53 @@ def test_a_visit_that_no_run_makes_is_found() -> None:
     assert [(item.code, line(item)) for item in findings(model_of(text))] == [("visit-never-made", 101)]
 
 
+_ROOMS = """robot Rooms {
+    component Base {
+        incoming message to_hall with identifier: "/hall", type: none
+        incoming message to_kitchen with identifier: "/kitchen", type: none
+        incoming message to_dock with identifier: "/dock", type: none
+        behaviour {
+            initial marked state dock { on request to to_hall goto hall }
+            marked state hall { on request to to_kitchen goto kitchen on request to to_dock goto dock }
+            marked state kitchen { on request to to_hall goto hall }
+        }
+    }
+    component Operator {
+        outgoing message begin with identifier: "/begin", type: none
+        outgoing message rest with identifier: "/rest", type: none
+        behaviour {
+            initial marked state resting { on response from begin goto working }
+            marked state working { on response from rest goto resting }
+        }
+    }
+    §
+}"""
+
+
+@pytest.mark.parametrize(
+    ("mission", "lines"),
+    [
+        ("{ visit Base.kitchen on Base.hall from anywhere visit Base.dock }", [100]),
+        # The first visit is made by the request that begins the detour.
+        ("{ visit Base.hall then Base.kitchen on Base.hall from anywhere visit Base.dock }", [101]),
+        # The surroundings could bring the detour about as well.
+        ("{ visit Base.kitchen on Base.hall or Operator.working from anywhere visit Base.dock }", [100]),
+        # The detour itself leads on.
+        ("{ visit Base.kitchen on Base.hall from anywhere visit Base.kitchen }", []),
+        ("{ visit Base.kitchen then Base.dock on Base.hall from anywhere visit Base.kitchen then Base.dock }", []),
+        ("{ visit Base.kitchen on Operator.working and Base.kitchen from anywhere visit Base.dock }", []),
+        # While the operator works, to leave the dock is to begin the detour.
+        ("{ visit Base.kitchen on Operator.working from anywhere visit Base.dock }", [100]),
+        # The robot leaves where the mission is asked for, and need not come back.
+        ("while Base.dock or Operator.working { visit Base.kitchen }", [100]),
+        ("while Operator.working { visit Base.kitchen }", []),
+    ],
+)
+def test_a_visit_that_the_robot_itself_puts_off_is_found(mission: str, lines: list[int]) -> None:
+    model = model_of(_ROOMS.replace("§", f"mission m {mission}"))
+    assert [(item.code, line(item)) for item in findings(model)] == [("visit-put-off", number) for number in lines]
+
+
 def test_in_a_layer_missions_have_no_effect() -> None:
     model = robot("kitchen", "office", prefer=("charge", "to_office"))
     (found,) = findings(model, Deployment.LAYER)
@@ -463,3 +517,18 @@ def test_in_a_layer_missions_have_no_effect() -> None:
         ("this preference has no effect, either", 60)
     ]
     assert findings(msgspec.structs.replace(model, missions=()), Deployment.LAYER) == ()
+
+
+@pytest.mark.parametrize(
+    ("count", "last"),
+    [
+        (6, "this goal has no effect, either"),
+        (7, "this goal has no effect, either (1 more is not shown)"),
+        (9, "this goal has no effect, either (3 more are not shown)"),
+    ],
+)
+def test_a_finding_says_how_many_places_it_does_not_show(count: int, last: str) -> None:
+    model = model_of(courier(*["goal always eventually Base.dock"] * count))
+    (found,) = findings(model, Deployment.LAYER)
+    assert [item.message for item in found.related] == ["this goal has no effect, either"] * 4 + [last]
+    assert [item.location.line for item in found.related] == [11, 12, 13, 14, 15]

@@ -252,7 +252,9 @@ class Run(ManualRun):
         self._system.observe()
         self._reached = self._system.reached()
         number = self._system.choose()
-        self._chosen = None if number is None else self._requests.events[number]
+        # Events that come one by one can lead where no message does, and no strategy is made for that.
+        if number is not None and self._system.enabled(self._requests.events[number]):
+            self._chosen = self._requests.events[number]
         pairs = zip(self._reached, before or [False] * len(self._reached), strict=True)
         moves = zip(self._model.missions, places, self._system.missions(), strict=True)
         return (

@@ -44,6 +44,8 @@ class GoalBlame:
             without requirements. False if the search was given up, and none are listed.
         helpful: Assumptions with which the goals can be reached, none of which the robot itself can keep from coming
             true or can be left out; empty if none are known.
+        is_undone: True if it would be enough that a request can make the goals true, which the surroundings can undo
+            before the controller's next turn.
         counter: Counter-strategy of the surroundings, or None if it would be too large.
         nearest: The nearest to the goals that can be reached, where they cannot be reached even if the surroundings do
             all they can for it; else None.
@@ -53,6 +55,7 @@ class GoalBlame:
     invariants: tuple[int, ...]
     is_known: bool
     helpful: tuple[Assumption, ...]
+    is_undone: bool
     counter: CounterStrategy | None
     nearest: Nearest | None
 
@@ -118,7 +121,7 @@ def blame_goals(
     budget = _Budget(should_stop)
     trials = _Trials(executable, added, result, engine, budget.should_stop, on_progress)
     shown = budget.result_of(trials.shown)
-    counter, nearest = (None, None) if shown is None else shown
+    counter, nearest, is_undone = (None, None, False) if shown is None else shown
     size = max(least_effort, effort * budget.steps)
     budget.limit = budget.steps + size
     items = budget.result_of(trials.excluding)
@@ -130,6 +133,7 @@ def blame_goals(
         invariants=tuple(item - count for item in items or () if item >= count),
         is_known=items is not None,
         helpful=helpful,
+        is_undone=is_undone,
         counter=counter,
         nearest=nearest,
     )
@@ -163,21 +167,22 @@ class _Trials:
         with workspace(system, self.engine, self.should_stop, self.on_progress, followed=followed) as place:
             return asked(StrategySynthesis(executable, added, place))
 
-    def shown(self) -> tuple[CounterStrategy | None, Nearest | None]:
-        """Return the counter-strategy, and the nearest that can be reached."""
+    def shown(self) -> tuple[CounterStrategy | None, Nearest | None, bool]:
+        """Return the counter-strategy, the nearest that can be reached, and whether the surroundings only undo it."""
         unreached = self.result.unreached
 
-        def asked(synthesis: StrategySynthesis) -> tuple[CounterStrategy | None, Nearest | None]:
+        def asked(synthesis: StrategySynthesis) -> tuple[CounterStrategy | None, Nearest | None, bool]:
             nearest = None
             if self.result.is_hopeless:
                 nearest = nearest_to(synthesis, unreached, self.executable, self.added, self.should_stop)
             # Goals that are reached in name alone need nothing to be done against them.
             if synthesis.is_won(range(len(synthesis.assumptions)), unreached):
-                return None, nearest
+                return None, nearest, False
+            is_undone = not self.result.is_hopeless and synthesis.is_won_at_once(unreached)
             try:
-                return synthesis.counter(unreached), nearest
+                return synthesis.counter(unreached), nearest, is_undone
             except UnsupportedModelError:
-                return None, nearest
+                return None, nearest, is_undone
 
         return self._synthesis_of(self.executable, self.added, asked)
 

@@ -171,6 +171,11 @@ def _unreached(aims: Sequence[Aim], places: Places, result: StrategyResult, blam
         if blame.helpful:
             written = " and ".join(f"'assume {assumption_text(item)}'" for item in blame.helpful)
             advice = f"Write {written}, if that is what the surroundings do, or change the {_word(first)}."
+        elif blame.is_undone:
+            advice = (
+                "Name a state that only the robot leaves: a request makes this true, but the surroundings can undo it "
+                "before the controller's next turn."
+            )
     return Diagnostic(Severity.ERROR, "unreachable-goal", message, _place(places, first), advice, related)
 
 

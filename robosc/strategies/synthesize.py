@@ -255,6 +255,15 @@ class StrategySynthesis:
         goals = (number for number, item in enumerate(self._aims) if item.mission is None)
         return tuple(number for number in goals if met & ~self.goals[number] == self.false)
 
+    def is_won_at_once(self, goals: Sequence[int]) -> bool:
+        """Return True if goals could be reached if it counted that a request can make them true for a moment.
+
+        Args:
+            goals: Numbers of the goals.
+        """
+        wanted = [self.goals[item] | self.arena.turn(self.goals[item]) for item in goals]
+        return self.arena.can_begin(self._solved(self.assumptions, wanted, self.arena.can_begin).winning)
+
     def can_be_reached(self, goals: Iterable[int]) -> bool:
         """Return True if both sides together can make goals true again and again."""
         return self.can_come_true((), goals)

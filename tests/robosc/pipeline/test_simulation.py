@@ -327,3 +327,46 @@ def test_what_was_taken_back_is_not_remembered_of_goals() -> None:
     run.restart()
     assert run.step("arrived.response").chosen == "call.request"
     assert run.reached == (False,)
+
+
+LEVELS = """robot Levels {
+    datatype enum Low from integer to { value < 20 -> low default -> fine }
+    datatype enum Third from integer to { value < 33 -> below default -> above }
+    component Battery {
+        outgoing message low with identifier: "/battery", type: Low
+        outgoing message third with identifier: "/battery", type: Third
+        behaviour {
+            variable low: Low
+            variable third: Third
+            on response from low do low := value
+            on response from third do third := value
+            initial marked state read { }
+        }
+    }
+    component Base {
+        incoming message leave with identifier: "/leave", type: none
+        behaviour {
+            initial marked state docked { on request to leave goto out }
+            marked state out { }
+        }
+    }
+    requirement leave needs Battery.low = fine
+    goal always eventually Base.out or Battery.third = below
+}"""
+
+
+def test_what_no_message_leads_to_gets_no_request_that_is_not_allowed() -> None:
+    """A battery that is low and above a third of its charge: only events that come one by one lead there."""
+    supervisor = robosc.synthesize(robosc.load(text=LEVELS)).supervisor
+    assert supervisor is not None
+    run = robosc.simulate(supervisor)
+    chosen = [run.chosen]
+    run.step("low.response", "low")
+    chosen.append(run.chosen)
+    assert run.enabled == ()
+    run.undo()
+    chosen.append(run.chosen)
+    assert chosen == ["leave.request", None, "leave.request"]
+    for seed in range(20):
+        run.restart()
+        run.walk(20, seed, strategy=True)

@@ -275,6 +275,34 @@ def test_an_assumption_that_the_robot_can_break_is_not_suggested() -> None:
     ]
 
 
+SHELF = """robot Shelf {
+    component Arm {
+        incoming message place with type: none
+        outgoing message taken with type: none
+        behaviour {
+            initial state empty { on request to place goto placed }
+            marked state placed { on response from taken goto empty }
+        }
+    }
+    goal always eventually Arm.placed
+}"""
+
+
+def test_what_the_surroundings_only_undo_is_said() -> None:
+    """The arm places a thing, and somebody takes it before the controller's next turn."""
+
+    def fix(text: str) -> str:
+        (found,) = (item for item in make_supervisor(bundle_of(text)).diagnostics if item.severity is Severity.ERROR)
+        return found.fix
+
+    assert fix(SHELF).startswith("Name a state that only the robot leaves: a request makes this true")
+    # Here nothing is placed without the surroundings.
+    given = SHELF.replace("place goto placed", "place goto moving").replace(
+        "marked state placed", "state moving { on response from taken goto placed } marked state placed"
+    )
+    assert not fix(given).startswith("Name a state")
+
+
 def test_a_search_that_is_given_up_says_so() -> None:
     blame = blame_of("goal always eventually Base.inside", effort=0, least_effort=10)
     assert (blame.requirements, blame.is_known, blame.helpful) == ((), False, ())

@@ -26,7 +26,14 @@ from robosc.model.layers import layer_findings, without_controller_findings
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
-from robosc.strategies import blame_goals, goal_findings, goals_and_missions, layer_goal_findings, synthesize_strategy
+from robosc.strategies import (
+    blame_goals,
+    goal_findings,
+    goals_and_missions,
+    layer_goal_findings,
+    put_off_findings,
+    synthesize_strategy,
+)
 from robosc.supervisor import CheckResult, Supervisor
 from robosc.synthesis import (
     EngineOptions,
@@ -236,6 +243,8 @@ def make_supervisor(
         )
         if checked.missed is not None:
             raise InternalError(f"the strategy misses a goal after {', '.join(checked.missed.trace)}")
+        late = put_off_findings(problem.system.obligations.aims, places, found, checked.put_off)
+        diagnostics = sorted_diagnostics((*diagnostics, *late))
         outcome: CheckResult = "passed" if checked.outcome is CheckOutcome.PASSED else "not checked"
         method = f"{certificate.method}; {checked.method}"
         certificate = msgspec.structs.replace(certificate, goals=outcome, method=method)

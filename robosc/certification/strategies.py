@@ -36,11 +36,14 @@ class GoalCheck:
         outcome: The outcome.
         method: Description of what was done, in a few words.
         missed: A run that misses a goal, or None.
+        put_off: Numbers of visits that the robot itself may put off for ever; empty where sets of positions were
+            checked.
     """
 
     outcome: CheckOutcome
     method: str
     missed: MissedGoal | None = None
+    put_off: tuple[int, ...] = ()
 
 
 def verify_strategy(
@@ -72,7 +75,7 @@ def verify_strategy(
     few = limits.positions // FEW
     found = check_strategy(executable, added, strategy, limit=few, controller=controller, should_stop=should_stop)
     if found.result != "not checked":
-        return GoalCheck(CheckOutcome(found.result), BY_POSITION, found.missed)
+        return GoalCheck(CheckOutcome(found.result), BY_POSITION, found.missed, found.put_off)
     reason = f"more than {few} positions" if found.positions >= few else "data with many values"
     missed = None
     # Most strategies are small: who only looks at positions one by one need not load what works on sets of them.
@@ -95,7 +98,7 @@ def verify_strategy(
         executable, added, strategy, limit=limits.positions, controller=controller, should_stop=should_stop
     )
     if found.result != "not checked":
-        return GoalCheck(CheckOutcome(found.result), BY_POSITION, found.missed)
+        return GoalCheck(CheckOutcome(found.result), BY_POSITION, found.missed, found.put_off)
     if found.positions >= limits.positions:
         reason = f"more than {limits.positions} positions"
     given_up = f"the symbolic search takes more than {limits.work} nodes"

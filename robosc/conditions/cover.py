@@ -37,6 +37,7 @@ class Words:
         self._vocabulary = vocabulary
         self._tests: dict[tuple[int, int], tuple[Expression, Size]] = {}
         self._measures: dict[int, tuple[Expression, _Measure]] = {}
+        self._sizes: dict[int, tuple[Expression, Size]] = {}
         self._ranks = vocabulary.ranks
         self.ranks = [self._ranks[subject] for subject in space.subjects]
         """For each place where it stands in the model's text."""
@@ -51,8 +52,14 @@ class Words:
             keys.sort(key=lambda key: key[:2])
         else:
             # Texts take long to write: they are only where nothing else decides.
-            keys.sort(key=lambda key: (*key[:2], size(key[2])))
+            keys.sort(key=lambda key: (*key[:2], self._size(key[2])))
         return [key[2] for key in keys]
+
+    def _size(self, condition: Expression) -> Size:
+        known = self._sizes.get(id(condition))
+        if known is None:
+            known = self._sizes[id(condition)] = condition, size(condition)
+        return known[1]
 
     def operands(self, condition: Expression) -> int:
         """Return the number of operands of a condition; parts that were measured before are not looked at again."""

@@ -48,8 +48,10 @@ class Effort:
     """
 
     def __init__(self, steps: int, whole: "Effort | None" = None) -> None:
-        self.left = steps
-        self._whole = whole
+        # All parts of one effort share a count, so that a step takes as long however deep they are nested.
+        self._taken: list[int] = [0] if whole is None else whole._taken
+        self._own_end = self._taken[0] + steps
+        self._end: int = self._own_end if whole is None else min(self._own_end, whole._end)
 
     def spend(self, steps: int = 1) -> None:
         """Take some steps.
@@ -57,23 +59,19 @@ class Effort:
         Raises:
             EffortExceededError: There are not so many left.
         """
-        is_over = False
-        effort: Effort | None = self
-        while effort is not None:
-            effort.left -= steps
-            is_over = is_over or effort.left < 0
-            effort = effort._whole
-        if is_over:
+        self._taken[0] += steps
+        if self._taken[0] > self._end:
             raise EffortExceededError
+
+    @property
+    def left(self) -> int:
+        """Steps that are left, as far as the whole has as many."""
+        return self._own_end - self._taken[0]
 
     @property
     def available(self) -> int:
         """Steps that can be taken before there are no more."""
-        least, effort = self.left, self._whole
-        while effort is not None:
-            least = min(least, effort.left)
-            effort = effort._whole
-        return least
+        return self._end - self._taken[0]
 
     def part(self, steps: int) -> "Effort":
         """A part of it for work of its own."""

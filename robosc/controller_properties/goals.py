@@ -10,10 +10,12 @@ model checking: branching time logic strikes back", Science of Computer Programm
 It shares nothing with the synthesis of strategies but the automata and what is remembered of goals.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, field
+from operator import ge
 
-from robosc.automata.compile import NO_DATA, State, compile_expression, subjects_read
+from robosc.automata.compile import NO_DATA, Function, State, compile_expression, subjects_read
 from robosc.automata.executable import ExecutableSystem
 from robosc.automata.goal_memory import MEMORY
 from robosc.automata.semantics import TooManyChoicesError
@@ -30,6 +32,9 @@ DEFAULT_LIMIT = 20_000
 """Positions beyond which a check is given up."""
 
 Memory = tuple[bool, ...]
+
+_Look = tuple[Value | None, ...]
+"""All that conditions read of a state."""
 
 Position = tuple[Node, Memory, int]
 """A stable state, what is remembered of goals, and the goal that is approached."""
@@ -59,26 +64,76 @@ class StrategyCheck:
         result: `passed`, `failed` or `not checked`.
         positions: Number of positions that were visited.
         missed: A run that misses a goal, or None.
+        put_off: Numbers of visits that the robot may leave unmade for ever by its own doing: to get to such a visit it
+            begins a detour of the mission or ends what `while` asks for, and comes back without making it, or not at
+            all, though the surroundings interrupt nothing.
     """
 
     result: PropertyResult
     positions: int
     missed: MissedGoal | None = None
+    put_off: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True, slots=True)
+class _Group:
+    """Conditions that read the same of the state and the memory.
+
+    Attributes:
+        numbers: Their numbers among all.
+        functions: Functions that evaluate them on a state with its memory.
+        looks: Numbers of the parts of a look that they read.
+        held: Numbers of the places of the memory that they read.
+        known: Their truth values for what was read before.
+    """
+
+    numbers: tuple[int, ...]
+    functions: tuple[Function, ...]
+    looks: tuple[int, ...]
+    held: tuple[int, ...]
+    known: dict[tuple[Value | None, ...], tuple[bool, ...]] = field(default_factory=dict)
+
+    def of(self, look: _Look, state: State, memory: Memory) -> tuple[bool, ...]:
+        """Return for each condition True if it is true; the arguments are those of `_Judgements.of`."""
+        key = (*[look[item] for item in self.looks], *[memory[item] for item in self.held])
+        found = self.known.get(key)
+        if found is None:
+            whole = _whole(state, memory)
+            found = self.known[key] = tuple(holds(whole, NO_DATA) is True for holds in self.functions)
+        return found
 
 
 class _Judgements:
     """Truth values of some conditions over a state and the memory, worked out once for all states that look alike.
 
+    Each long mission or detour has as many places as visits, and the update of each of them reads all of these. So what
+    reads the same is worked out together, once for each stage that it can be at, and not for all combinations of them.
+
     Args:
         conditions: The conditions.
         places: Place of each subject in a state with its memory.
+        read: Parts of a state that a look consists of.
     """
 
-    def __init__(self, conditions: Iterable[Expression], places: Mapping[Subject, int]) -> None:
-        self._functions = [compile_expression(item, places) for item in conditions]
+    def __init__(
+        self, conditions: Sequence[Expression], places: Mapping[Subject, int], read: Sequence[Expression]
+    ) -> None:
+        number_of = {part: number for number, part in enumerate(read)}
+        first = min((place for subject, place in places.items() if _is_remembered(subject)), default=0)
+        groups: defaultdict[tuple[tuple[int, ...], tuple[int, ...]], list[int]] = defaultdict(list)
+        for number, condition in enumerate(conditions):
+            looks = {number_of[part] for part in _read_of_state(condition)}
+            held = {places[subject] - first for subject in subjects_read(condition) if _is_remembered(subject)}
+            groups[tuple(sorted(looks)), tuple(sorted(held))].append(number)
+        functions = [compile_expression(item, places) for item in conditions]
+        self._groups = tuple(
+            _Group(tuple(numbers), tuple(functions[number] for number in numbers), looks, held)
+            for (looks, held), numbers in groups.items()
+        )
+        self._count = len(conditions)
         self._known: dict[tuple[Value | None, ...], tuple[bool, ...]] = {}
 
-    def of(self, look: tuple[Value | None, ...], state: State, memory: Memory) -> tuple[bool, ...]:
+    def of(self, look: _Look, state: State, memory: Memory) -> tuple[bool, ...]:
         """Return for each condition True if it is true.
 
         Args:
@@ -89,8 +144,11 @@ class _Judgements:
         key = (*look, *memory)
         found = self._known.get(key)
         if found is None:
-            whole = _whole(state, memory)
-            found = self._known[key] = tuple(holds(whole, NO_DATA) is True for holds in self._functions)
+            values = [False] * self._count
+            for group in self._groups:
+                for number, value in zip(group.numbers, group.of(look, state, memory), strict=True):
+                    values[number] = value
+            found = self._known[key] = tuple(values)
         return found
 
 
@@ -110,22 +168,31 @@ class StrategyRun:
             tuple(item.condition for item in owed.aims),
             owed.assumptions,
         )
-        self._updates, self._goals, self._assumptions = [_Judgements(items, places) for items in conditions]
-        read = dict.fromkeys(part for items in conditions for item in items for part in _read_of_state(item))
-        self._read = tuple(compile_expression(part, places) for part in read)
-        self._looks: dict[State, tuple[Value | None, ...]] = {}
+        self._places = places
+        waiting = tuple(found for aim in owed.aims for found in (aim.interruption, *aim.occasions, aim.made) if found)
+        every = (*conditions, waiting)
+        self._parts = tuple(dict.fromkeys(part for items in every for item in items for part in _read_of_state(item)))
+        self._updates, self._goals, self._assumptions = [
+            _Judgements(items, places, self._parts) for items in conditions
+        ]
+        self._read = tuple(compile_expression(part, places) for part in self._parts)
+        self._looks: dict[State, _Look] = {}
         self._modes = tuple(
             tuple((item.event, state_predicate(system, item.condition)) for item in mode) for mode in strategy.modes
         )
         self.memory: Memory = (False,) * len(owed.places)
         """Memory before the first stable state."""
 
-    def look(self, state: State) -> tuple[Value | None, ...]:
+    def look(self, state: State) -> _Look:
         """Return all that memory, goals and assumptions read of a state: where it is the same, so are they."""
         found = self._looks.get(state)
         if found is None:
             found = self._looks[state] = tuple(part(state, NO_DATA) for part in self._read)
         return found
+
+    def judgements(self, conditions: Iterable[Expression]) -> _Judgements:
+        """Return judgements of conditions that come with goals and visits."""
+        return _Judgements(tuple(conditions), self._places, self._parts)
 
     def observed(self, state: State, memory: Memory) -> Memory:
         """Return the memory after a stable state."""
@@ -158,11 +225,15 @@ def _whole(state: State, memory: Memory) -> State:
 def _read_of_state(condition: Expression) -> Iterator[Expression]:
     """Yield parts of a condition that read the state alone: with the memory they decide its value."""
     for part in simple_parts(condition):
-        found = (part,) if all(subject.automaton != MEMORY for subject in subjects_read(part)) else leaves(part)
+        found = leaves(part) if any(map(_is_remembered, subjects_read(part))) else (part,)
         for item in found:
             read = subjects_read(item)
-            if read and all(subject.automaton != MEMORY for subject in read):
+            if read and not any(map(_is_remembered, read)):
                 yield item
+
+
+def _is_remembered(subject: Subject) -> bool:
+    return subject.automaton == MEMORY and subject.variable is not None
 
 
 def check_strategy(
@@ -195,7 +266,9 @@ def check_strategy(
     except TooManyChoicesError:
         return StrategyCheck("not checked", len(search.turns))
     missed = search.missed()
-    return StrategyCheck("passed" if missed is None else "failed", len(search.turns), missed)
+    if missed is not None:
+        return StrategyCheck("failed", len(search.turns), missed)
+    return StrategyCheck("passed", len(search.turns), put_off=tuple(search.put_off(executable)))
 
 
 class _Search:
@@ -338,3 +411,71 @@ class _Search:
             if all(map(any, zip(*owed, strict=True))):
                 return MissedGoal(positions[0][2], self._trace(found[0]), positions[0][0][0])
         return None
+
+    def put_off(self, executable: ExecutableSystem) -> Iterator[int]:
+        """Yield the visits that the robot may leave unmade for ever by its own doing.
+
+        Args:
+            executable: Executable system of the robot.
+        """
+        judged: dict[tuple[Expression, ...], list[tuple[bool, ...]]] = {}
+        for number, aim in enumerate(executable.obligations.aims):
+            turned = [place for place, (turn, _) in enumerate(self.turns) if self.positions[turn][2] == number]
+            if aim.interruption is None or aim.made is None or not turned:
+                continue
+            # Visits of one mission wait for the same.
+            causes = (aim.interruption, *aim.occasions)
+            if causes not in judged:
+                judgements = self._run.judgements(causes)
+                judged[causes] = [
+                    judgements.of(self._run.look(state), state, memory) for (state, _), memory, _ in self.positions
+                ]
+            caused = judged[causes]
+            is_made = self._made(aim.made)
+            begun = [
+                turn
+                for place in turned
+                for turn, _ in [self.turns[place]]
+                if caused[turn][0] and not caused[place][0] and not is_made(place, turn)
+            ]
+            if begun and self._goes_on(begun, caused, is_made):
+                yield number
+
+    def _made(self, condition: Expression) -> Callable[[int, int], bool]:
+        """Return the function that says if a visit is made on the way from one position to another one."""
+        judgements = self._run.judgements((condition,))
+
+        def is_made(before: int, after: int) -> bool:
+            state = self.positions[after][0][0]
+            return judgements.of(self._run.look(state), state, self.positions[before][1])[0]
+
+        return is_made
+
+    def _goes_on(
+        self, begun: Iterable[int], caused: Sequence[tuple[bool, ...]], is_made: Callable[[int, int], bool]
+    ) -> bool:
+        """Return True if a run goes on for ever from some positions without making a visit.
+
+        The surroundings keep to every assumption, and make none of the causes come true for which the visit waits.
+
+        Args:
+            begun: Numbers of the positions.
+            caused: For each position the causes that are true there.
+            is_made: Function that says if the visit is made on the way from one position to another one.
+        """
+        graph: dict[int, list[int]] = {}
+        queue = list(dict.fromkeys(begun))
+        for place in queue:
+            if place not in graph:
+                before = caused[place]
+                moves = [item for item in self.moves[place] if all(map(ge, before, caused[item]))]
+                graph[place] = [item for item in (*moves, self.turns[place][0]) if not is_made(place, item)]
+                queue += graph[place]
+        numbers = components(graph)
+        owed: dict[int, set[tuple[bool, ...]]] = {}
+        for place, targets in graph.items():
+            turn = self.turns[place][0]
+            if turn in targets and numbers[turn] == numbers[place]:
+                (state, _), memory, _ = self.positions[place]
+                owed.setdefault(numbers[place], set()).add(self._run.assumptions(state, memory))
+        return any(all(map(any, zip(*met, strict=True))) for met in owed.values())

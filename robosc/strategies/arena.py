@@ -9,23 +9,24 @@ The events of one batch carry what one message can hold (`robosc.controller_prop
 too many cases, their data is taken to be independent, so the surroundings can do no less than they really can.
 """
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from robosc.automata import ExecutableSystem, System
-from robosc.automata.goal_memory import MEMORY, Cancel, Obligations
-from robosc.automata.state import Subject
+from robosc.automata.goal_memory import Cancel, Obligations
 from robosc.controller_properties.messages import PossibleData, choices_together
 from robosc.expressions import Expression
 from robosc.model.structure import EventKind
+from robosc.strategies.memory import ObservedMemory
+from robosc.strategies.pairs import MAXIMUM_NODES, Pairs
 from robosc.supervisor import AddedCondition
 from robosc.synthesis.diagrams import predicate_of
-from robosc.synthesis.encoding import Encoding
+from robosc.synthesis.encoding import Encoding, next_name
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import FixedPoint, Problem, safe_states
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.nodes import implies
+from robosc.synthesis.nodes import implies, renamed
 from robosc.synthesis.transitions import Steps, transition_of
 
 MAXIMUM_CASES = 256
@@ -126,22 +127,18 @@ class ControllerArena:
             if event.name in conditions:
                 steps = steps.under(steps.condition & conditions[event.name])
             self._steps[event.name] = steps
-        self._observed = {
-            encoding.subjects[Subject(MEMORY, place.name)].names[0]: encoder.holds(place.update)
-            for place in owed.places
-        }
-        # Variables of the memory after it was observed.
-        self._observing = {place: encoding.choice(2).names[0] for place in self._observed}
+        self._memory = ObservedMemory(encoding, owed)
         self._arrived: list[tuple[Any, Any]] = []
         self._surrounded: list[tuple[Any, Any, Any]] = []
+        self._followed: dict[Any, Any] = {}
         reachable = self._reachable()
         self._silent = tuple(self._silent_steps(executable, owed.cancels, encoder, reachable))
         self._led = tuple(steps.image(first) for first, steps in self._silent)
         """For each silent step the states that it leads to."""
         self._ends_alike = all(steps.is_deterministic for _, steps in self._silent)
-        self.positions = reachable & ~encoding.any_of(first for first, _ in self._silent)
-        for tour in owed.tours:
-            self.positions = self.positions & self._at_most_one([encoder.holds(place.read) for place in tour.places])
+        self._stable = reachable & ~encoding.any_of(first for first, _ in self._silent)
+        """Stable states, with any memory."""
+        self.positions = self._stable & self._memory.can_be
         self.observed = self.positions
         for place in owed.places:
             before, after = encoder.holds(place.read), encoder.holds(place.update)
@@ -154,7 +151,45 @@ class ControllerArena:
         """Moves of the surroundings: for each, the events of one message, with data that it can hold."""
         self.requests = tuple(event for event in executable.requests if event in self._steps)
         """Events of requests, in source order."""
-        self._possible = {event: self.positions & self._enabled(event) for event in self.requests}
+        self._possible = {event: self._stable & self._enabled(event) for event in self.requests}
+        # Moves of which there are no pairs are looked at event by event.
+        self._next = self._next_variables()
+        self._turns: dict[str, Pairs] = {}
+        self._turn, self._batches = Pairs(self._manager, self._next), Pairs(self._manager, self._next)
+        self._other_cases, self._ending_batches = self._cases, self.positions
+        if self._next and self._ends_alike:
+            self._pair()
+
+    def _next_variables(self) -> dict[str, str]:
+        """Return the variables that events change with their next-state variables; none if one has none."""
+        changed = {name for steps in self._steps.values() for name in steps.changed}
+        found = {name: next_name(name) for name in self._encoding.state_names if name in changed}
+        return found if found.keys() and set(self._encoding.order).issuperset(found.values()) else {}
+
+    def _pair(self) -> None:
+        """Look at moves as pairs, as far as these have small diagrams."""
+        pairs = self._manager.true
+        for name, new in reversed(self._next.items()):
+            before, after = self._manager.var(name), self._manager.var(new)
+            pairs = pairs & self._manager.ite(before, after, ~after)
+        ending = self._ending(self._stable & pairs)
+        if ending.dag_size > MAXIMUM_NODES:
+            return
+        for event in self.requests:
+            steps, turn = self._steps[event], Pairs(self._manager, self._next)
+            # Data may decide what a request leads to: then all data has to lead to the same, which pairs do not show.
+            if steps.is_deterministic and turn.add(self._possible[event] & steps.some(ending)):
+                self._turns[event] = turn
+                self._turn.join(turn)
+        unending = ~self._ending(self._stable)
+        other_cases = []
+        for case in self._cases:
+            if self._batches.add(self._stable & self._leading(case, ending)):
+                # Silent steps that never end lead nowhere.
+                self._ending_batches = self._ending_batches & ~self._leading(case, unending)
+            else:
+                other_cases.append(case)
+        self._other_cases = tuple(other_cases)
 
     def _cases_of(self, executable: ExecutableSystem, batch: tuple[str, ...]) -> list[tuple[_Part, ...]]:
         """Return the cases of a batch, without those that others contain."""
@@ -189,13 +224,7 @@ class ControllerArena:
         """Return the states that the controlled system can reach, with any memory."""
         problem = Problem(tuple(self._steps.values()), safe_states(self._encoding, ()))
         states = FixedPoint(self._encoding, self._monitor).reachable_states(problem, self._manager.true)
-        return self._manager.exist(self._observed, states) if self._observed else states
-
-    def _at_most_one(self, predicates: Sequence[Any]) -> Any:
-        none, one = self._manager.true, self._manager.false
-        for item in predicates:
-            none, one = none & ~item, (one & ~item) | (none & item)
-        return none | one
+        return self._memory.forgetting(states, self._memory.updates)
 
     def _enabled(self, event: str) -> Any:
         steps = self._steps[event]
@@ -241,8 +270,11 @@ class ControllerArena:
         return found
 
     def _newly_arriving(self, predicate: Any) -> Any:
-        observed = self._manager.let(self._observed, predicate) if self._observed else predicate
-        found = fresh = self.positions & observed
+        return self._ending(self.positions & self._memory.before(predicate))
+
+    def _ending(self, stable: Any) -> Any:
+        """Return the states from which silent steps end in some stable states."""
+        found = fresh = stable
         while fresh != self._manager.false:
             before = self._manager.false
             for (first, steps), led in zip(self._silent, self._led, strict=True):
@@ -254,8 +286,35 @@ class ControllerArena:
             found = found | fresh
         return found
 
+    def _following(self, predicate: Any) -> Any:
+        """Return the stable states that, once observed, are in a predicate, in next-state variables."""
+        found = self._followed.pop(predicate, None)
+        if found is None:
+            found = renamed(self._manager, self._next, self._memory.before(predicate))
+        self._followed[predicate] = found
+        if len(self._followed) > _REMEMBERED:
+            del self._followed[next(iter(self._followed))]
+        return found
+
+    def _leading(self, case: Sequence[_Part], states: Any) -> Any:
+        """Return the states from which a batch can lead into some states, before silent steps."""
+        for part in reversed(case):
+            self._monitor.check_stop()
+            before = part.steps.some(states)
+            # An event that cannot happen here changes nothing.
+            states = before | (states if part.may_be_left_out else states & ~part.steps.sources)
+        return states
+
     def surroundings(self, predicate: Any) -> Any:
         """Return the positions from which every batch leads into a predicate."""
+        self._monitor.check_stop()
+        found = self._ending_batches
+        if self._batches:
+            found = found & ~self._batches.into(~self._following(predicate))
+        return found & self._otherwise_surrounded(predicate) if self._other_cases else found
+
+    def _otherwise_surrounded(self, predicate: Any) -> Any:
+        """Return the positions from which those batches lead into a predicate that there are no pairs of."""
         arriving = self.arriving(predicate)
         found, bad = self.positions, ~arriving
         for number in reversed(range(len(self._surrounded))):
@@ -265,31 +324,31 @@ class ControllerArena:
                 self._surrounded.append(self._surrounded.pop(number))
                 found, bad = inside, arrived & ~arriving
                 break
-        for case in self._cases:
-            outside = bad
-            for part in reversed(case):
-                self._monitor.check_stop()
-                before = part.steps.some(outside)
-                # An event that cannot happen here changes nothing.
-                outside = before | (outside if part.may_be_left_out else outside & ~part.steps.sources)
-            found = found & ~outside
+        for case in self._other_cases:
+            found = found & ~self._leading(case, bad)
         self._surrounded.append((predicate, arriving, found))
         del self._surrounded[:-_REMEMBERED]
         return found
 
     def turn(self, predicate: Any) -> Any:
         """Return the positions in which the controller can wait in a predicate, or issue a request that leads there."""
+        self._monitor.check_stop()
         found = predicate & self.positions
+        if self._turn:
+            found = found | (self.positions & self._turn.into(self._following(predicate)))
         for event in self.requests:
-            found = found | self.choice(event, predicate)
+            if event not in self._turns:
+                found = found | self.choice(event, predicate)
         return found
 
     def choice(self, event: str, predicate: Any) -> Any:
         """Return the positions in which a request is enabled and leads into a predicate."""
         self._monitor.check_stop()
+        if event in self._turns:
+            return self.positions & self._turns[event].into(self._following(predicate))
         steps = self._steps[event]
         arriving = self.arriving(predicate)
-        found = self._possible[event] & steps.some(arriving)
+        found = self.positions & self._possible[event] & steps.some(arriving)
         return found if steps.is_deterministic else found & steps.only(arriving)
 
     def together(self, predicate: Any) -> Any:
@@ -298,22 +357,19 @@ class ControllerArena:
 
     def responses(self, predicate: Any) -> Any:
         """Return the positions from which a move of the surroundings can lead into a predicate."""
-        arriving = self.arriving(predicate)
+        self._monitor.check_stop()
         found = self._manager.false
-        for case in self._cases:
-            inside = arriving
-            for part in reversed(case):
-                self._monitor.check_stop()
-                after = part.steps.some(inside)
-                inside = after | (inside if part.may_be_left_out else inside & ~part.steps.sources)
-            found = found | (self.positions & inside)
-        return found
+        if self._batches:
+            found = self._batches.into(self._following(predicate))
+        if self._other_cases:
+            arriving = self.arriving(predicate)
+            for case in self._other_cases:
+                found = found | self._leading(case, arriving)
+        return self.positions & found
 
     def whatever_was(self, condition: Any) -> Any:
         """Return the states in which a condition is true once they are observed, whatever was remembered before."""
-        if not self._observed:
-            return condition
-        return ~self._manager.exist(self._observed, ~self._manager.let(self._observed, condition))
+        return ~self._memory.forgetting(~self._memory.before(condition), self._memory.updates)
 
     def behaviours(self, predicate: Any) -> Any:
         """Return the states from which the behaviours alone, without requirements, have an event into a predicate."""
@@ -324,12 +380,23 @@ class ControllerArena:
         return found
 
     def met(self) -> Any:
-        """Return the positions that moves of both sides can lead to, each with the memory that it can have there."""
-        found = self._arrived_at(self.start)
-        fresh = found
+        """Return the positions that moves of both sides can lead to, each with the memory that it can have there.
+
+        Of each mission and each detour, the memory is exact; where their stages are very many together, combinations of
+        them may be among the positions that no run has.
+        """
+        found = self.positions
+        for forgotten in self._memory.apart():
+            found = found & self._met_without(forgotten)
+        return found
+
+    def _met_without(self, forgotten: Collection[str]) -> Any:
+        """Return the stable states that are met, as they are observed, with any value of some of the memory."""
+        start = self._memory.forgetting(self._settled(self.start), forgotten)
+        found = fresh = self._memory.after(start, forgotten)
         while fresh != self._manager.false:
             self._monitor.check_stop()
-            fresh = self._arrived_at(self._following(fresh)) & ~found
+            fresh = self._memory.after(self._ends(fresh), forgotten) & ~found
             found = found | fresh
         return found
 
@@ -339,45 +406,37 @@ class ControllerArena:
         Args:
             met: The positions that can be met.
         """
-        return self._settled(self.start) | self._settled(self._following(met))
+        return self._settled(self.start) | self._ends(met)
 
-    def _following(self, positions: Any) -> Any:
-        """Return the states that a request or a batch leads to from positions; silent steps follow."""
-        following = self._manager.false
+    def _ends(self, positions: Any) -> Any:
+        """Return the stable states in which moves from positions end, with the memory before."""
+        following = found = self._manager.false
         for event in self.requests:
-            following = following | self._steps[event].image(positions & self._enabled(event))
-        for case in self._cases:
+            if event not in self._turns:
+                following = following | self._steps[event].image(positions & self._enabled(event))
+        for case in self._other_cases:
             inside = positions
             for part in case:
                 stays = inside if part.may_be_left_out else inside & ~part.steps.sources
                 inside = stays | part.steps.image(inside)
             following = following | inside
-        return following
+        for pairs in (self._turn, self._batches):
+            found = found | pairs.ends(positions)
+        return found | self._settled(following)
 
     def _settled(self, states: Any) -> Any:
         """Return the stable states in which silent steps from states end."""
-        found, left = states & self.positions, states & ~self.positions
+        found, left = states & self._stable, states & ~self._stable
         seen = left
         while left != self._manager.false:
             self._monitor.check_stop()
             after = self._manager.false
             for first, steps in self._silent:
                 after = after | steps.image(left & first)
-            found = found | (after & self.positions)
-            left = after & ~self.positions & ~seen
+            found = found | (after & self._stable)
+            left = after & ~self._stable & ~seen
             seen = seen | left
         return found
-
-    def _arrived_at(self, states: Any) -> Any:
-        """Return the stable states in which silent steps from states end, with the memory as it is observed there."""
-        found = self._settled(states)
-        if not self._observed:
-            return found
-        for place, update in self._observed.items():
-            now = self._manager.var(self._observing[place])
-            found = found & ((now & update) | (~now & ~update))
-        found = self._manager.exist(self._observed, found)
-        return self._manager.let({now: self._manager.var(place) for place, now in self._observing.items()}, found)
 
     def can_begin(self, predicate: Any) -> bool:
         """Return True if the first position of the executor is in a predicate, wherever the system begins."""

@@ -19,6 +19,7 @@ from robosc.strategies.nearest import Nearest, nearest_to
 from robosc.strategies.synthesize import StrategyResult, StrategySynthesis
 from robosc.supervisor import AddedCondition
 from robosc.synthesis import EngineOptions, SynthesisProgress, SynthesisStatus, synthesize
+from robosc.synthesis.changes import changed_subjects
 from robosc.synthesis.conflict import minimal_conflict
 from robosc.synthesis.workspace import workspace
 
@@ -157,7 +158,9 @@ class _Trials:
     def _synthesis_of[T](
         self, executable: ExecutableSystem, added: Sequence[AddedCondition], asked: Callable[[StrategySynthesis], T]
     ) -> T:
-        with workspace(executable.remembering_automata, self.engine, self.should_stop, self.on_progress) as place:
+        system = executable.remembering_automata
+        followed = changed_subjects(system)
+        with workspace(system, self.engine, self.should_stop, self.on_progress, followed=followed) as place:
             return asked(StrategySynthesis(executable, added, place))
 
     def shown(self) -> tuple[CounterStrategy | None, Nearest | None]:
@@ -168,6 +171,9 @@ class _Trials:
             nearest = None
             if self.result.is_hopeless:
                 nearest = nearest_to(synthesis, unreached, self.executable, self.added, self.should_stop)
+            # Goals that are reached in name alone need nothing to be done against them.
+            if synthesis.is_won(range(len(synthesis.assumptions)), unreached):
+                return None, nearest
             try:
                 return synthesis.counter(unreached), nearest
             except UnsupportedModelError:
@@ -240,7 +246,8 @@ class _Trials:
             for goals in (range(len(synthesis.goals)), self.result.unreached):
 
                 def is_enough(kept: frozenset[int], goals: Sequence[int] = goals) -> bool:
-                    return synthesis.is_won((*range(count), *sorted(kept)), goals)
+                    assumed = (*range(count), *sorted(kept))
+                    return synthesis.is_won(assumed, goals) and synthesis.can_come_true(assumed, goals)
 
                 if is_enough(frozenset(fitting)):
                     return tuple(candidates[item - count] for item in without_needless(fitting, is_enough))

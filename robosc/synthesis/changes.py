@@ -32,6 +32,17 @@ def computed_subjects(system: System) -> frozenset[Subject]:
     return frozenset(subject for automaton in system.automata for subject in _computed(automaton))
 
 
+def changed_subjects(system: System) -> frozenset[Subject]:
+    """The places of a state that some event changes."""
+    found = set()
+    for automaton in system.automata:
+        for edge in automaton.edges:
+            if edge.source != edge.target:
+                found.add(Subject(automaton.name))
+            found |= {Subject(automaton.name, update.variable) for update in edge.updates}
+    return frozenset(found)
+
+
 def _computed(automaton: Automaton) -> Iterable[Subject]:
     by_event = defaultdict[str, list[Edge]](list)
     for edge in automaton.edges:

@@ -9,7 +9,7 @@ side by side: see `blocks`.
 """
 
 from collections import defaultdict
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -69,6 +69,7 @@ class Encoding:
         manager: Manager,
         pause: Callable[[], None] = lambda: None,
         conditions: Iterable[Expression] = (),
+        followed: Collection[Subject] = (),
     ) -> None:
         self.system = system
         self.manager = manager
@@ -83,7 +84,7 @@ class Encoding:
         self.order: list[str] = []
         self._choices = 0
         self._valid_states: Any = None
-        self._declare(found.data)
+        self._declare(found.data, computed_subjects(system) | set(followed))
         state_names = {name for bits in self.subjects.values() for name in bits.names}
         self.state_names = tuple(name for name in self.order if name in state_names)
         # Twice the bits of a state, for the next one; choices are few.
@@ -102,11 +103,12 @@ class Encoding:
         known = f"i{number}.known" if item.may_be_unknown else None
         return self._bits(f"i{number}", domain(item.type), item.type, known)
 
-    def _declare(self, computed_with: Mapping[Datum, Subject]) -> None:
+    def _declare(self, computed_with: Mapping[Datum, Subject], followed: Collection[Subject]) -> None:
         """Put all variables in order.
 
         Args:
             computed_with: For some data the first place of the block that they belong to.
+            followed: Places that have next-state variables.
         """
         targets = input_targets(self.system)
         beside: defaultdict[Subject | None, list[Bits]] = defaultdict(list)
@@ -116,9 +118,8 @@ class Encoding:
             home = computed_with.get((item.event, item.path))
             among = self.subjects if home is None else block_of[home]
             beside[next((subject for subject in among if subject in written), home)].append(bits)
-        computed = computed_subjects(self.system)
         for block in self.blocks:
-            self._add(*_interleaved([(self.subjects[item], item in computed, beside[item]) for item in block]))
+            self._add(*_interleaved([(self.subjects[item], item in followed, beside[item]) for item in block]))
         for bits in beside[None]:
             self._add(*_names(bits))
 

@@ -277,7 +277,8 @@ class Steps:
         self.names = _names(encoding, transition)
         """The current-state variables that it reads or changes."""
         self._state_names = encoding.state_names
-        self._changed = tuple(transition.functions)
+        self.changed = tuple(transition.functions)
+        """The current-state variables that it changes."""
         self.arrival = encoding.all_of(
             self._manager.var(name) if value else ~self._manager.var(name) for name, value in self._constants.items()
         )
@@ -343,7 +344,7 @@ class Steps:
             manager=self._manager,
             inside=source,
             relation=self._relation,
-            hidden=self._changed,
+            hidden=self.changed,
             names={next_name(name): name for name in self._composed},
             outside=self.arrival,
         )

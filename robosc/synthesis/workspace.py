@@ -1,9 +1,10 @@
 """Basis of all work on predicates: an engine, a system encoded in it, and the monitor of the waiting caller."""
 
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 
+from robosc.automata.state import Subject
 from robosc.automata.structure import System
 from robosc.expressions import Expression
 from robosc.synthesis.encoding import Encoding
@@ -50,6 +51,7 @@ def workspace(
     should_stop: Callable[[], bool],
     on_progress: Callable[[SynthesisProgress], None],
     conditions: Iterable[Expression] = (),
+    followed: Collection[Subject] = (),
 ) -> Iterator[Workspace]:
     """A workspace of its own for a system.
 
@@ -59,6 +61,7 @@ def workspace(
         should_stop: Asked again and again; once true, the work ends.
         on_progress: Called with the progress of the work.
         conditions: Conditions on the system's states that the work is about, besides its own.
+        followed: Places that get next-state variables, besides those that images need.
 
     Raises:
         NodeLimitError: Diagrams became larger than the options allow.
@@ -70,5 +73,5 @@ def workspace(
     manager = make_manager(name)
     monitor = ProgressMonitor(should_stop, on_progress, node_check(manager, options.maximum_nodes))
     with limited(manager, options.maximum_nodes):
-        encoding = Encoding(system, manager, monitor.check_stop, conditions)
+        encoding = Encoding(system, manager, monitor.check_stop, conditions, followed)
         yield Workspace(name, encoding, monitor, options.is_reordering, options.condition_seconds)

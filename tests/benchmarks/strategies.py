@@ -14,7 +14,8 @@ from figures import text_table
 
 ROOT = Path(__file__).parents[2]
 
-ROBOTS = ("courier",)
+ROBOTS = ("courier", "1 x 50", "2 x 50", "3 x 10", "3 x 25", "3 x 50")
+"""Example robots, and robots with so many detours of so many visits."""
 
 RUNS = 3
 """Runs of a robot, each in a process of its own; the fastest one counts."""
@@ -30,10 +31,16 @@ def measured(robot: str) -> dict[str, float]:
     from robosc.model.structure import Deployment
     from robosc.strategies import gr1, synthesize_strategy
     from robosc.synthesis import synthesize
+    from support.long_detours import robot_with_detours
+    from support.models import bundle_of
 
-    path = ROOT / "examples" / robot / f"{robot}.rscd"
+    detours, _, visits = robot.partition(" x ")
+    if visits:
+        bundle = bundle_of(robot_with_detours(int(detours), int(visits)))
+    else:
+        bundle = load_bundle(ROOT / "examples" / robot / f"{robot}.rscd")
     times_s = [time.process_time()]
-    problem = prepare(load_bundle(path), Deployment.CONTROLLER)
+    problem = prepare(bundle, Deployment.CONTROLLER)
     assert isinstance(problem, SynthesisProblem)
     times_s.append(time.process_time())
     found = synthesize(problem.system.automata)
@@ -51,7 +58,7 @@ def measured(robot: str) -> dict[str, float]:
     with patch("robosc.strategies.synthesize.solve", timed):
         assert synthesize_strategy(problem.system, found.added).strategy is not None
     times_s.append(time.process_time())
-    made = make_supervisor(load_bundle(path))
+    made = make_supervisor(bundle)
     assert made.supervisor is not None
     times_s.append(time.process_time())
     check_s, supervisor_s, strategy_s, all_s = (after_s - before_s for before_s, after_s in itertools.pairwise(times_s))

@@ -225,7 +225,7 @@ def test_earlier_searches_change_nothing(seed: int) -> None:
 
 def test_the_effort_of_all_formulas_together_is_bounded() -> None:
     formulas = Formulas(DOMAINS)
-    formulas.effort.left = 10
+    formulas.effort = Effort(10)
     diagram = random_diagram(7, is_ordered=True)
     assert len(diagram.nodes) > 3
     assert formulas.formula(diagram) is None

@@ -19,6 +19,7 @@ from support.models import bundle_of
 from support.random_controllers import random_robot
 from support.random_couriers import strategic_courier
 from support.random_goals import strategic_controller
+from support.random_waiting import strategic_waiting
 
 
 def walk(supervisor: Supervisor, dice: Random, met: Counter[str]) -> None:
@@ -79,6 +80,18 @@ def test_the_executor_issues_what_the_strategy_of_a_courier_chooses() -> None:
             walk(supervisor, Random(seed), met)
             met["robots"] += 1
     assert met["robots"] > 60 and met["requests"] > 400 and met["waits"] > 400, met
+
+
+def test_the_executor_issues_what_the_strategy_chooses_while_it_waits() -> None:
+    met: Counter[str] = Counter()
+    for seed in range(80):
+        supervisor = strategic_waiting(seed)
+        if supervisor is not None:
+            assert supervisor.strategy
+            met["meanwhile"] += any(item.is_meanwhile for mode in supervisor.strategy.modes for item in mode)
+            walk(supervisor, Random(seed), met)
+            met["robots"] += 1
+    assert min(met["robots"], met["meanwhile"]) > 30 and min(met["requests"], met["waits"]) > 400, met
 
 
 BLOCKED = """robot Blocked {

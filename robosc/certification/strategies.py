@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 BY_POSITION = "goals position by position"
 
 FEW = 10
-"""Part of all positions up to which they are looked at one by one before sets of them are tried."""
+"""Part of all positions up to which they are looked at one by one before sets of them are tried, without missions."""
 
 MAXIMUM_CASES = 256
 """Cases of the data of one message beyond which the data of its events counts as independent."""
@@ -72,7 +72,8 @@ def verify_strategy(
     Raises:
         SynthesisCancelled: `should_stop` became true.
     """
-    few = limits.positions // FEW
+    # Visits that are put off are found position by position alone.
+    few = limits.positions if executable.model.missions else limits.positions // FEW
     found = check_strategy(executable, added, strategy, limit=few, controller=controller, should_stop=should_stop)
     if found.result != "not checked":
         return GoalCheck(CheckOutcome(found.result), BY_POSITION, found.missed, found.put_off)
@@ -94,9 +95,10 @@ def verify_strategy(
             missed = MissedGoal(check.fault.goal, check.fault.trace, check.fault.state[:width])
         if check.outcome is not CheckOutcome.NOT_CHECKED and (missed is None or is_exact):
             return GoalCheck(check.outcome, f"goals by symbolic search ({reason})", missed)
-    found = check_strategy(
-        executable, added, strategy, limit=limits.positions, controller=controller, should_stop=should_stop
-    )
+    if few < limits.positions:
+        found = check_strategy(
+            executable, added, strategy, limit=limits.positions, controller=controller, should_stop=should_stop
+        )
     if found.result != "not checked":
         return GoalCheck(CheckOutcome(found.result), BY_POSITION, found.missed, found.put_off)
     if found.positions >= limits.positions:

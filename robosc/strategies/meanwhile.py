@@ -13,7 +13,7 @@ Tuples of numbers have no infinite descent in this order, so that between two mo
 many requests are taken along.
 """
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -48,8 +48,8 @@ class Meanwhile:
 
     Args:
         arena: The game.
-        requests: Events of requests, in the order in which they are tried.
         modes: All modes.
+        waiting: For each mode the positions in which it requests nothing by itself.
         places: Numbers of the assumptions, in the order in which they are waited for: of several that can be waited for
             in a position, the first counts.
         near: For some assumptions, the positions that are not to be left while they are waited for.
@@ -59,53 +59,60 @@ class Meanwhile:
     def __init__(
         self,
         arena: ControllerArena,
-        requests: Sequence[str],
         modes: Sequence[ModeGame],
+        waiting: Sequence[Any],
         places: Sequence[int],
         near: Mapping[int, Any],
         false: Any,
     ) -> None:
         self._arena = arena
-        self._requests = requests
         self._modes = modes
         self._places = places
         self._near = near
         self._false = false
+        wanted: Requests = {}
+        for mode in modes:
+            for event, nearer in mode.nearer.items():
+                wanted[event] = wanted.get(event, false) | nearer
+        self._staying = [
+            {event: self._stays(mode, event, here & nearer) for event, nearer in wanted.items()}
+            for mode, here in zip(modes, waiting, strict=True)
+        ]
+        """For each mode the positions in which it can take a request along without any loss."""
+        self._harmless = dict.fromkeys(wanted, false)
+        """For each request the positions in which some mode can."""
+        for staying in self._staying:
+            for event, here in staying.items():
+                self._harmless[event] = self._harmless[event] | here
+        self._keeping: dict[tuple[int, str], Any] = {}
 
-    def of(self, number: int, waiting: Any) -> Requests:
+    def of(self, number: int) -> Requests:
         """Return what a mode requests for others.
 
         Args:
             number: Number of the mode.
-            waiting: Positions in which it requests nothing by itself.
         """
         found: Requests = {}
-        earlier: list[ModeGame] = []
-        for other in (*self._modes[number + 1 :], *self._modes[:number]):
-            for event in self._requests:
-                here = waiting & other.nearer.get(event, self._false)
-                for kept in self._kept(event, self._modes[number], earlier, here):
-                    here = kept
-                    if here == self._false:
-                        break
+        left = dict(self._staying[number])
+        count = len(self._modes)
+        for place in (item % count for item in range(number + 1, number + count)):
+            mode = self._modes[place]
+            for event, nearer in mode.nearer.items():
+                here = left[event] & nearer
                 if here != self._false:
                     found[event] = found.get(event, self._false) | here
-                    waiting = waiting & ~here
-            earlier.append(other)
+                    left = {item: within & ~here for item, within in left.items()}
+            # Goals whose turn comes later must not lead farther from this one.
+            for event, within in left.items():
+                if within != self._false:
+                    left[event] = within & self._keeps(place, event)
         return found
 
-    def _kept(self, event: str, mode: ModeGame, earlier: Iterable[ModeGame], here: Any) -> Iterator[Any]:
-        """Yield ever fewer of some positions: at last those in which a request for a later mode may be taken along."""
-        if here != self._false:
-            here = self._staying(event, mode, here)
-            yield here
-        for item in earlier:
-            here = self._no_farther(event, item, here)
-            yield here
-
-    def _staying(self, event: str, mode: ModeGame, here: Any) -> Any:
-        """Return those of some positions in which a request leads to where the mode waits for the same as before."""
+    def _stays(self, mode: ModeGame, event: str, here: Any) -> Any:
+        """Return those of some positions in which a request leads to where a mode waits for the same as before."""
         found = self._false
+        if here == self._false:
+            return found
         for step in mode.steps:
             fresh = here & step.positions & ~step.nearer
             for place in self._places:
@@ -117,14 +124,17 @@ class Meanwhile:
                 fresh = fresh & ~step.waiting[place]
         return found
 
-    def _no_farther(self, event: str, mode: ModeGame, here: Any) -> Any:
-        """Return those of some positions in which a request does not lead farther from the goal of a mode."""
-        found = self._false
-        at_goal = here & mode.goal
-        if at_goal != self._false:
-            found = at_goal & self._arena.choice(event, mode.goal)
-        for step in mode.steps:
-            fresh = here & step.positions & ~step.nearer & ~mode.goal
-            if fresh != self._false:
-                found = found | (fresh & self._arena.choice(event, step.positions | mode.goal))
-        return found
+    def _keeps(self, number: int, event: str) -> Any:
+        """Return the positions in which a request does not lead farther from the goal of a mode."""
+        if (number, event) not in self._keeping:
+            mode, here = self._modes[number], self._harmless[event]
+            found = self._false
+            at_goal = here & mode.goal
+            if at_goal != self._false:
+                found = at_goal & self._arena.choice(event, mode.goal)
+            for step in mode.steps:
+                fresh = here & step.positions & ~step.nearer & ~mode.goal
+                if fresh != self._false:
+                    found = found | (fresh & self._arena.choice(event, step.positions | mode.goal))
+            self._keeping[number, event] = found
+        return self._keeping[number, event]

@@ -404,11 +404,11 @@ class StrategySynthesis:
         modes = [self._mode(solution, number, near) for number in range(len(self.goals))]
         # Assumptions that the strategy helps with come first where several can be waited for.
         places = (*near, *(item for item in range(len(self.assumptions)) if item not in near))
-        meanwhile = Meanwhile(self.arena, self._requests, modes, places, near, self.false)
         own = [self._choices(mode.chosen, solution.winning & met & ~mode.goal, simplifier) for mode in modes]
+        meanwhile = Meanwhile(self.arena, modes, [left for _, left in own], places, near, self.false)
         found = []
         for number, (choices, left) in enumerate(own):
-            others, _ = self._choices(meanwhile.of(number, left), left, simplifier, is_meanwhile=True)
+            others, _ = self._choices(meanwhile.of(number), left, simplifier, is_meanwhile=True)
             found.append((*choices, *others))
         return Strategy(tuple(found))
 

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import AsyncIterable, Callable
 from typing import Any
 
-from robosc_api.layers import when_call_ends
+from robosc_api.calls import call_under_way
 from robosc_api.security import caller_of
 from robosc_server.tasks.task import Reason, RefusedError
 
@@ -48,7 +48,7 @@ class ResultSender:
         """
         # The last message, and the one before it until gRPC accepts the last.
         unread: list[Callable[[], None]] = []
-        when_call_ends(lambda _: _call_each(unread))
+        call_under_way().at_end.append(lambda: _call_each(unread))
         async for message in messages:
             unread.append(self._count(context, (message,)))
             await context.write(message)
@@ -69,7 +69,7 @@ class ResultSender:
         forget = self._count(context, messages)
         if forget is not _do_nothing:
             # The call must have ended for gRPC, too: a handler that has ended has only handed its messages over.
-            when_call_ends(lambda _: forget())
+            call_under_way().at_end.append(forget)
 
     def _count(self, context: Any, messages: tuple[bytes, ...]) -> Callable[[], None]:
         """Count messages, and return the function to call once when they are read, or never will be.

@@ -8,6 +8,7 @@ from typing import Any
 import grpc
 import pytest
 
+from robosc_api.calls import begin_call
 from robosc_server.result_sender import SMALL_BYTES, ResultSender
 from robosc_server.tasks.task import Reason, RefusedError
 from support.small_server import SERVICE, small_server
@@ -45,6 +46,7 @@ class Call:
         is_reserved = asyncio.Event()
 
         async def handle() -> None:
+            begin_call()
             sender.reserve(self, (bytes(size),))
             is_reserved.set()
             await self._ended.wait()
@@ -58,6 +60,7 @@ class Call:
         """Begin to send so many messages."""
 
         async def handle() -> None:
+            begin_call()
             await sender.send_stream(self, chunks(count))
             await self._ended.wait()
 
@@ -186,7 +189,7 @@ async def test_a_result_that_is_not_read_stays_counted_though_its_handler_has_en
     def listen(server: grpc.aio.Server) -> None:
         ports.append(server.add_insecure_port("127.0.0.1:0"))
 
-    async with small_server(unary=whole, setup=listen) as _:
+    async with small_server(unary=whole, listen=listen) as _:
         options = [("grpc.http2.lookahead_bytes", 65535), ("grpc.http2.bdp_probe", 0)]
         async with grpc.aio.insecure_channel(f"127.0.0.1:{ports[0]}", options) as channel:
             method: Any = channel.unary_stream(f"/{SERVICE}/Unary")

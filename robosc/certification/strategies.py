@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 BY_POSITION = "goals position by position"
 
 FEW = 10
-"""Part of all positions up to which they are looked at one by one before sets of them are tried."""
+"""Part of all positions up to which they are looked at one by one before sets of them are tried, without missions."""
 
 MAXIMUM_CASES = 256
 """Cases of the data of one message beyond which the data of its events counts as independent."""
@@ -72,35 +72,39 @@ def verify_strategy(
     Raises:
         SynthesisCancelled: `should_stop` became true.
     """
-    few = limits.positions // FEW
+    # Visits that are put off are found position by position alone.
+    few = limits.positions if executable.model.missions else limits.positions // FEW
     found = check_strategy(executable, added, strategy, limit=few, controller=controller, should_stop=should_stop)
     if found.result != "not checked":
         return GoalCheck(CheckOutcome(found.result), BY_POSITION, found.missed, found.put_off)
     reason = f"more than {few} positions" if found.positions >= few else "data with many values"
+    missed = None
     # Most strategies are small: who only looks at positions one by one need not load what works on sets of them.
-    check, is_exact = verify_on_sets(
-        executable,
-        added,
-        strategy,
-        limit=limits.work,
-        engine=engine,
-        should_stop=should_stop,
-        on_progress=on_progress,
-    )
-    fault = check.fault
-    if check.outcome is not CheckOutcome.NOT_CHECKED and (fault is None or is_exact):
-        width = len(subjects(executable.executed_automata))
-        missed = None if fault is None else MissedGoal(fault.goal, fault.trace, fault.state[:width])
-        return GoalCheck(check.outcome, f"goals by symbolic search ({reason})", missed)
-    found = check_strategy(
-        executable, added, strategy, limit=limits.positions, controller=controller, should_stop=should_stop
-    )
+    if limits.work:
+        check, is_exact = verify_on_sets(
+            executable,
+            added,
+            strategy,
+            limit=limits.work,
+            engine=engine,
+            should_stop=should_stop,
+            on_progress=on_progress,
+        )
+        if check.fault is not None:
+            width = len(subjects(executable.executed_automata))
+            missed = MissedGoal(check.fault.goal, check.fault.trace, check.fault.state[:width])
+        if check.outcome is not CheckOutcome.NOT_CHECKED and (missed is None or is_exact):
+            return GoalCheck(check.outcome, f"goals by symbolic search ({reason})", missed)
+    if few < limits.positions:
+        found = check_strategy(
+            executable, added, strategy, limit=limits.positions, controller=controller, should_stop=should_stop
+        )
     if found.result != "not checked":
         return GoalCheck(CheckOutcome(found.result), BY_POSITION, found.missed, found.put_off)
     if found.positions >= limits.positions:
         reason = f"more than {limits.positions} positions"
     given_up = f"the symbolic search takes more than {limits.work} nodes"
-    if fault is not None:
+    if missed is not None:
         given_up = f"the data of a message has more than {MAXIMUM_CASES} cases"
     return GoalCheck(CheckOutcome.NOT_CHECKED, f"goals not checked: {reason}, and {given_up}")
 

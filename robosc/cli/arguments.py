@@ -184,7 +184,8 @@ def add_verify_limit_argument(parser: argparse.ArgumentParser, name: str, defaul
         metavar="N",
         help="verify up to N states one by one, recompute the supervisor up to N/4 states of the system without it, "
         "search symbolically beyond, with 25 N nodes of work, also the positions under a strategy that are more than "
-        "N/100, and where that is too much up to N/10 of them; what takes more is 'not checked' (default: %(default)s)",
+        "N/100 (N/10 with missions), and where that is too much up to N/10 of them; what takes more is 'not checked' "
+        "(default: %(default)s)",
     )
 
 

@@ -26,6 +26,7 @@ from support.mutants import change, strategy_mutants
 from support.random_couriers import strategic_courier
 from support.random_goals import strategic_controller
 from support.rooms import rooms
+from support.rounds import long_detour_supervisor
 from support.strategy_runs import fault_of
 
 WORK = 10**7
@@ -171,6 +172,19 @@ def test_positions_are_looked_at_one_by_one_where_sets_are_too_much_work() -> No
     assert damaged is not None
     found = verify_strategy(*given[:2], damaged, limits)
     assert (found.outcome, found.method) == (CheckOutcome.FAILED, "goals position by position")
+
+
+def test_missions_are_looked_at_position_by_position_as_long_as_that_can_be() -> None:
+    """No other search finds visits that are put off."""
+    supervisor = long_detour_supervisor()
+    assert supervisor.strategy is not None
+    given = (supervisor.executable, supervisor.added, supervisor.strategy)
+    count = check_strategy(*given).positions
+    limits = replace(ON_SETS, positions=count)
+    assert verify_strategy(*given, limits).method == "goals position by position"
+    few = verify_strategy(*given, replace(limits, positions=count - 1))
+    assert (few.outcome, few.missed) == (CheckOutcome.PASSED, None)
+    assert few.method == f"goals by symbolic search (more than {count - 1} positions)"
 
 
 def test_a_check_is_stopped() -> None:

@@ -107,6 +107,7 @@ def test_a_strategy_is_checked_and_it_is_said_where_it_is_not(
     assert lines[-1].endswith(", goals")
     status, document = _json(capsys, right, model, "--limit", "20")
     assert (status, document["status"], document["checks"]["goals"]) == (1, "not checked", "not checked")
+    assert "; goals not checked: " in document["method"]
     # A strategy that requests nothing keeps callers waiting.
     supervisor = decode(Path(right).read_bytes())
     assert supervisor.strategy is not None
@@ -341,3 +342,5 @@ def test_synthesis_checks_a_strategy_up_to_the_given_limit(capsys: pytest.Captur
         assert main(["synth", str(tmp_path / "porter.rscd"), "--verify-limit", limit, "--json"]) == 0
         certificate = json.loads(capsys.readouterr().out)["summary"]["certificate"]
         assert (certificate["nonblocking"], certificate["goals"]) == ("passed", outcome)
+        how = "; goals not checked: " if outcome == "not checked" else "; goals by symbolic search (more than 10 "
+        assert how in certificate["method"]

@@ -18,6 +18,7 @@ from support.equivalence.ros2_target import Ros2Surroundings, ros2_target
 from support.equivalence.scenario import Action, Scenario
 from support.equivalence.strategic import ERRANDS, porter_run
 from support.equivalence.targets import compare
+from support.equivalence.worlds import live_by_messages
 from support.generated import example_supervisor
 from support.goal_porter import porter_supervisor
 from support.process import Process
@@ -121,6 +122,16 @@ def test_the_porter(policy: str | None, kind: tuple[Made, Ended], tmp_path: Path
     # Under another policy the door is opened though nobody calls.
     assert any(item.issued for item in seen[:4]) is (policy == "fair")
     compare(kind[0](porter_supervisor(), tmp_path, tmp_path_factory), scenario, seen)
+
+
+def test_a_courier_with_missions(kind: tuple[Made, Ended], tmp_path: Path, tmp_path_factory: Factory) -> None:
+    supervisor = example_supervisor("courier/courier")
+    scenario = live_by_messages("courier")
+    seen = observe(supervisor, scenario)
+    made = Counter(line["aim"] for item in seen for line in item.log if line["kind"] == "reached")
+    assert made.keys() == {aim.name for aim in supervisor.executable.obligations.aims}
+    assert made["visit 1 of detour 1 of mission rounds"] == 3
+    compare(kind[0](supervisor, tmp_path, tmp_path_factory), scenario, seen)
 
 
 def test_wrong_policies_are_refused(kind: tuple[Made, Ended], tmp_path: Path, tmp_path_factory: Factory) -> None:

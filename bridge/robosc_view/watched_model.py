@@ -195,7 +195,7 @@ def denied_model(outcome: SynthesisOutcome, text: str | None) -> SynthesizedMode
         errors = [item.message for item in outcome.diagnostics if item.severity is Severity.ERROR]
         raise NoSupervisorError(outcome.reason or (errors or ["the surroundings have no counter-strategy"])[0])
     if goals.supervisor is None or goals.counter is None:
-        raise NoSupervisorError("the counter-strategy of the surroundings is too large to be played")
+        raise NoSupervisorError("the surroundings have no counter-strategy, or one that is too large to be played")
     return SynthesizedModel(goals.supervisor, findings, text, denied=goals)
 
 

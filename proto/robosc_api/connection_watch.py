@@ -36,13 +36,15 @@ from types import TracebackType
 from typing import Any, NamedTuple, Self
 from urllib.parse import unquote
 
-from robosc_api.layers import Layer, behaviour_of, when_call_ends, with_behaviour
-from robosc_api.peers import peer_of
+from robosc_api.calls import call_under_way, peer_of
+from robosc_api.layers import Layer, behaviour_of, with_behaviour
 
 _log = logging.getLogger(__name__)
 
 _DESCRIPTORS = Path("/proc/self/fd")
 _MEMORY = Path("/proc/self/statm")
+_MEMORY_LINE_BYTES = 256
+_PAGE_BYTES = os.sysconf("SC_PAGE_SIZE")
 _HEALTH = "/grpc.health."
 
 _TCP_INFO = getattr(socket, "TCP_INFO", None)
@@ -60,7 +62,10 @@ MEMORY_LOOK_S = 0.05
 """Time between two looks at this process's memory, in seconds."""
 
 LOOK_S = 0.1
-"""Shortest time between two looks at connections, in seconds, unless memory grows."""
+"""Shortest time between two looks at connections while this process works, in seconds, unless memory grows."""
+
+CALM_LOOK_S = 2.0
+"""Shortest time between two looks while this process does next to nothing, in seconds."""
 
 ALERT_LOOK_S = 0.01
 """The same after a flood."""
@@ -73,6 +78,9 @@ SHARE = 0.02
 
 _GROWTH_BYTES = 16 * 2**20
 """Growth of this process's memory that causes a look at once."""
+
+_BUSY_S = 0.02
+"""Processor time of this process since the last look, in seconds, after which it is not calm: a flood takes some."""
 
 _WARNING_S = 10.0
 """Time between two warnings about closed connections, in seconds."""
@@ -390,10 +398,54 @@ class CallsByConnection(Layer):
         def noted(request: Any, context: Any) -> Any:
             peer = peer_of(context)
             arrivals.begun(peer)
-            when_call_ends(lambda _: arrivals.ended(peer, is_check=is_check))
+            call_under_way().at_end.append(lambda: arrivals.ended(peer, is_check=is_check))
             return behaviour(request, context)
 
         return with_behaviour(inner, noted)
+
+
+class LookPace:
+    """Pace of the looks at connections: often while this process works, seldom while it is calm, at once as it grows.
+
+    A look costs a few microseconds for each connection. A flood takes memory or processor time, so that a process that
+    takes neither needs only the looks that close idle connections.
+
+    Args:
+        share: Share of a core that looking takes at most, unless memory grows.
+    """
+
+    def __init__(self, share: float) -> None:
+        self._share = share
+        self._begun_s = float("-inf")
+        self._memory = 0
+        self._took_s = 0.0
+        self._processor_s = float("-inf")
+
+    def is_due(self, now_s: float, memory: int, processor_s: float, *, is_alert: bool) -> bool:
+        """Return True if a look has to begin now; `looked` then says what it took.
+
+        Args:
+            now_s: Current time, in seconds of a monotonic clock.
+            memory: Resident memory of this process, in bytes.
+            processor_s: Processor time that this process has used, in seconds.
+            is_alert: True if a host is suspect.
+        """
+        is_calm = processor_s < self._processor_s + _BUSY_S
+        least_s = 0.0 if is_alert else CALM_LOOK_S if is_calm else LOOK_S
+        wait_s = max(self._took_s / self._share, least_s)
+        if now_s < self._begun_s + wait_s and memory < self._memory + _GROWTH_BYTES:
+            return False
+        self._begun_s, self._memory = now_s, memory
+        return True
+
+    def looked(self, took_s: float, processor_s: float) -> None:
+        """Note the end of a look.
+
+        Args:
+            took_s: Processor time that it took, in seconds.
+            processor_s: Processor time that this process has used, in seconds.
+        """
+        self._took_s, self._processor_s = took_s, processor_s
 
 
 class ConnectionWatch:
@@ -469,23 +521,23 @@ class ConnectionWatch:
             self._unreported.clear()
 
     def _run(self) -> None:
-        due_s = trimmed_s = 0.0
-        memory = _resident_bytes()
-        while not self._end.wait(ALERT_LOOK_S if self._ledger.is_alert else MEMORY_LOOK_S):
-            now_s, taken = self._clock(), _resident_bytes()
-            if now_s < due_s and taken < memory + _GROWTH_BYTES:
-                continue
-            memory = taken
-            if self._returns_memory and self._ledger.is_alert and now_s >= trimmed_s + _TRIM_S:
-                trimmed_s = now_s
-                _return_freed_memory()
-            used_s = time.thread_time()
-            try:
-                self.look()
-            except Exception:
-                # A watch that ends would leave the server open without a word.
-                self._report_failure()
-            due_s = now_s + max((time.thread_time() - used_s) / self._share, 0 if self._ledger.is_alert else LOOK_S)
+        pace = LookPace(self._share)
+        trimmed_s = 0.0
+        with _MEMORY.open("rb", buffering=0) as memory:
+            while not self._end.wait(ALERT_LOOK_S if self._ledger.is_alert else MEMORY_LOOK_S):
+                now_s, is_alert = self._clock(), self._ledger.is_alert
+                if not pace.is_due(now_s, _resident_bytes(memory.fileno()), time.process_time(), is_alert=is_alert):
+                    continue
+                if self._returns_memory and is_alert and now_s >= trimmed_s + _TRIM_S:
+                    trimmed_s = now_s
+                    _return_freed_memory()
+                used_s = time.thread_time()
+                try:
+                    self.look()
+                except Exception:
+                    # A watch that ends would leave the server open without a word.
+                    self._report_failure()
+                pace.looked(time.thread_time() - used_s, time.process_time())
 
     def _report_failure(self) -> None:
         """Log the error that is handled now, unless one was logged just now."""
@@ -512,8 +564,7 @@ class _Sockets:
         known: dict[int, tuple[int, Peer | None]] = {}
         by_peer: dict[Peer, int] = {}
         for descriptor in _descriptors():
-            # Another thread may close it at any time, and another connection may get its number.
-            with contextlib.suppress(OSError):
+            try:
                 inode = os.fstat(descriptor).st_ino
                 before = self._known.get(descriptor)
                 peer = before[1] if before is not None and before[0] == inode else self._peer(descriptor)
@@ -521,6 +572,9 @@ class _Sockets:
                 if peer is not None:
                     found[peer] = _traffic(descriptor)
                     by_peer[peer] = descriptor
+            except OSError:
+                # Another thread may close it at any time, and another connection may get its number.
+                continue
         self._known, self._by_peer = known, by_peer
         return found
 
@@ -632,8 +686,12 @@ def _return_freed_memory() -> None:
         _TRIM(0)
 
 
-def _resident_bytes() -> int:
+def _resident_bytes(descriptor: int) -> int:
+    """Return the size of this process's memory, from an open file of it.
+
+    Opening a file takes longer than all else of this, twenty times a second.
+    """
     try:
-        return int(_MEMORY.read_text(encoding="ascii").split()[1]) * os.sysconf("SC_PAGE_SIZE")
-    except (OSError, ValueError):
+        return int(os.pread(descriptor, _MEMORY_LINE_BYTES, 0).split()[1]) * _PAGE_BYTES
+    except (OSError, ValueError, IndexError):
         return 0

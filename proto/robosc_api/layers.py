@@ -1,11 +1,10 @@
-"""Layers around the handlers of a server, combined into one interceptor.
+"""Layers around the handlers of a server, all of whose services are one handler for gRPC.
 
-Each interceptor of grpc.aio adds a coroutine to every call; layers do not.
+Each interceptor of grpc.aio adds coroutines to every call; layers do not.
 """
 
-import asyncio
 from abc import abstractmethod
-from collections.abc import AsyncIterator, Awaitable, Callable
+from collections.abc import AsyncIterator, Awaitable, Callable, Iterable
 from contextlib import aclosing
 from itertools import groupby
 from typing import Any
@@ -13,19 +12,16 @@ from typing import Any
 import grpc
 import grpc.aio
 
-from robosc_api.peers import begin_call
+from robosc_api.calls import begin_call
+from robosc_api.failures import failure_metadata
 
 
-class Layer(grpc.aio.ServerInterceptor):
-    """Wrapper around handlers, which is an interceptor itself or one of `Layers`."""
+class Layer:
+    """Wrapper around handlers, which is one of those of `LayeredServices`."""
 
     def __init__(self) -> None:
         # By method: the inner handler, and the wrapped one, which is made once and not for each call.
         self._made: dict[str, tuple[Any, Any]] = {}
-
-    async def intercept_service(self, continuation: Callable[[Any], Awaitable[Any]], handler_call_details: Any) -> Any:
-        """Return the wrapped handler of a call."""
-        return self.handler(await continuation(handler_call_details), handler_call_details)
 
     def handler(self, inner: Any, details: Any) -> Any:
         """Return the wrapped handler of a call.
@@ -52,26 +48,59 @@ class Layer(grpc.aio.ServerInterceptor):
         """
 
 
-class Layers(grpc.aio.ServerInterceptor):
-    """Nested layers as one interceptor.
+class LayeredServices(grpc.GenericRpcHandler):
+    """Services inside nested layers, as the one handler that a server of grpc.aio has.
+
+    Services are added here and not to the server, which takes handlers by the name of their method, too: for each of
+    these it waits with a future of its own, all of which it looks at for every call.
 
     Args:
         *layers: The outermost first.
+        most_calls: Maximum number of calls that have begun and not ended, those included that a layer refuses; None: no
+            limit.
     """
 
-    def __init__(self, *layers: Layer) -> None:
+    def __init__(self, *layers: Layer, most_calls: int | None = None) -> None:
+        self._services: list[grpc.GenericRpcHandler] = []
+        self._most_calls, self._calls = most_calls, 0
         self._inside_out: list[Layer] = []
         for is_same, run in groupby(layers[::-1], _is_same_for_each_call):
             found = list(run)
             self._inside_out += [_Joined(found)] if is_same and len(found) > 1 else found
 
-    async def intercept_service(self, continuation: Callable[[Any], Awaitable[Any]], handler_call_details: Any) -> Any:
-        """Return the handler of a call, wrapped in all layers."""
-        begin_call()
-        handler = await continuation(handler_call_details)
+    def add_generic_rpc_handlers(self, handlers: Iterable[grpc.GenericRpcHandler]) -> None:
+        """Add services; generated code calls this for a servicer, as it does for a server."""
+        self._services += handlers
+
+    def add_registered_method_handlers(self, service: str, handlers: Any) -> None:
+        """Do nothing: generated code adds the same methods by `add_generic_rpc_handlers`."""
+
+    def service(self, handler_call_details: Any) -> Any:
+        """Return the handler of a call, wrapped in all layers; None: no service has it."""
+        if self._calls == self._most_calls:
+            return _TOO_MANY
+        self._calls += 1
+        begin_call().at_end.append(self._ended)
+        handler = None
+        for service in self._services:
+            handler = service.service(handler_call_details)
+            if handler is not None:
+                break
         for layer in self._inside_out:
             handler = layer.handler(handler, handler_call_details)
         return handler
+
+    def _ended(self) -> None:
+        self._calls -= 1
+
+
+async def _refuse(requests: Any, context: Any) -> None:
+    code, message = grpc.StatusCode.RESOURCE_EXHAUSTED, "the server has too many calls to refuse; try again later"
+    await context.abort(code, message, failure_metadata(code, message, "SERVER_BUSY", _RETRY_S))
+
+
+_RETRY_S = 1.0
+_TOO_MANY: Any = grpc.stream_stream_rpc_method_handler(_refuse)
 
 
 def _is_same_for_each_call(layer: Layer) -> bool:
@@ -95,19 +124,6 @@ class _Joined(Layer):
         for layer in self._layers:
             inner = layer.wrap(inner, method)
         return inner
-
-
-def when_call_ends(callback: Callable[[Any], None]) -> None:
-    """Call a function when the call whose handler runs has ended for gRPC as well, and its response is on its way.
-
-    gRPC's context offers the same, but then refers to itself: the context, its metadata and its state in gRPC would
-    stay until the garbage collector finds them, and each call would take new memory.
-
-    Args:
-        callback: Function of the call's task, in which gRPC runs handlers.
-    """
-    task: Any = asyncio.current_task()
-    task.add_done_callback(callback)
 
 
 async def write_responses(made: Awaitable[Any] | AsyncIterator[Any], context: Any) -> None:

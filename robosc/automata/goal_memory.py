@@ -161,6 +161,10 @@ class Aim:
         here: Condition over the state and the memory that the mission or detour is at the visit; None for a goal.
         interruption: Condition over the state and the memory under which the visit is not asked for: its mission is
             not, or a detour is under way. None if there is no such case.
+        occasions: Conditions over the state that bring interruptions about: that the mission is not asked for, and what
+            begins its detours.
+        made: Condition over a stable state and the memory before it under which the visit is made there; None for a
+            goal.
     """
 
     name: str
@@ -171,6 +175,8 @@ class Aim:
     visit: Expression | None = None
     here: Expression | None = None
     interruption: Expression | None = None
+    occasions: tuple[Expression, ...] = ()
+    made: Expression | None = None
 
 
 def counted(aims: Collection[Aim]) -> str:
@@ -209,6 +215,15 @@ class Tour:
     places: tuple[Place, ...]
     asked: Expression | None
     stays: bool
+
+    def made(self, number: int) -> Expression:
+        """Return the condition on a stable state that a stage is passed there, be it one of several.
+
+        Args:
+            number: Number of the stage.
+        """
+        wanted = () if self.asked is None else (self.asked,)
+        return conjunction(*wanted, _comes(self.stages, number), self.stages[number].is_passed)
 
 
 @dataclass(frozen=True, slots=True)
@@ -258,8 +273,15 @@ def journey(mission: Mission, number: int) -> Journey:
             target = _negated(place.read)
             place_number = len(mission.visits) + len(aims)
             words = f"visit {visit} of {title}"
-            aims.append(Aim(words, AimKind.DETOUR_VISIT, target, place_number, number, condition, place.read, idle))
+            aims.append(
+                Aim(
+                    *(words, AimKind.DETOUR_VISIT, target, place_number, number, condition, place.read, idle),
+                    occasions=tuple(map(_negated, wanted)),
+                    made=tour.made(visit),
+                )
+            )
     interrupted = [*map(_negated, wanted), *under_way]
+    occasions = (*map(_negated, wanted), *(holds(item.trigger) for item in mission.detours))
     own = [
         Aim(
             f"visit {visit + 1} of {name}",
@@ -270,6 +292,8 @@ def journey(mission: Mission, number: int) -> Journey:
             condition,
             conjunction(*wanted, at[visit]),
             _any(interrupted) if interrupted else None,
+            occasions,
+            tours[0].made(visit),
         )
         for visit, condition in enumerate(mission.visits)
     ]
@@ -312,14 +336,18 @@ def _arrives(stages: Sequence[Stage], place: int) -> Expression:
         stages: The stages, in their order.
         place: Place of the stage among them.
     """
+    return Binary("and", _comes(stages, place), _negated(stages[place].is_passed))
+
+
+def _comes(stages: Sequence[Stage], place: int) -> Expression:
+    """Return the condition that a stage is the current one, or all from the current one up to it are passed."""
     # Before it come those behind it, the farthest first. Chains lean to the left, so that they may be long.
     found: Expression | None = None
     for stage in (*stages[place + 1 :], *stages[:place]):
         comes = stage.here if found is None else Binary("or", found, stage.here)
         found = Binary("and", comes, stage.is_passed)
     here = stages[place].here
-    comes = here if found is None else Binary("or", found, here)
-    return Binary("and", comes, _negated(stages[place].is_passed))
+    return here if found is None else Binary("or", found, here)
 
 
 def _remembered(name: str) -> Expression:

@@ -35,7 +35,7 @@ def file_verification_json(found: FileVerification, supervisor: Supervisor, *, i
         "remarks": list(found.notes),
         "states": report.verification.states if report else None,
         "transitions": report.verification.transitions if report else None,
-        "method": report.method if report else None,
+        "method": found.method if report else None,
         **diagnostics_json(found.diagnostics),
     }
 

@@ -18,14 +18,22 @@ from robosc.automata.goal_memory import counted
 from robosc.certification.certify import certify
 from robosc.certification.goals import GoalExplanation, goal_explanation
 from robosc.certification.progress import Progress
-from robosc.controller_properties import Controller, check_controller, check_strategy, controller_findings
+from robosc.certification.strategies import verify_strategy
+from robosc.controller_properties import Controller, check_controller, controller_findings
 from robosc.errors import Diagnostic, InternalError, NodeLimitError, sorted_diagnostics
 from robosc.model.check import check
 from robosc.model.layers import layer_findings, without_controller_findings
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
-from robosc.strategies import blame_goals, goal_findings, goals_and_missions, layer_goal_findings, synthesize_strategy
+from robosc.strategies import (
+    blame_goals,
+    goal_findings,
+    goals_and_missions,
+    layer_goal_findings,
+    put_off_findings,
+    synthesize_strategy,
+)
 from robosc.supervisor import CheckResult, Supervisor
 from robosc.synthesis import (
     EngineOptions,
@@ -36,7 +44,7 @@ from robosc.synthesis import (
     questions_about,
     synthesize,
 )
-from robosc.verification import DEFAULT_STATES, Limits
+from robosc.verification import DEFAULT_STATES, CheckOutcome, Limits
 
 if TYPE_CHECKING:
     from robosc.explanation import EmptyExplanation
@@ -223,17 +231,22 @@ def make_supervisor(
                 goals = goal_explanation(without, places, found, blame)
             reason = f"no strategy is made for the {goals_and_missions(model)}"
             return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, reason, goals)
-        check = check_strategy(
+        checked = verify_strategy(
             problem.system,
             result.added,
             strategy,
-            limit=Limits.of(verify_limit).positions,
+            Limits.of(verify_limit),
+            engine=result.statistics.engine,
             controller=controller,
             should_stop=should_stop,
+            on_progress=lambda message: on_progress(Progress("strategy", message)),
         )
-        if check.missed is not None:
-            raise InternalError(f"the strategy misses a goal after {', '.join(check.missed.trace)}")
-        outcome: CheckResult = "passed" if check.result == "passed" else "not checked"
-        certificate = msgspec.structs.replace(certificate, goals=outcome)
+        if checked.missed is not None:
+            raise InternalError(f"the strategy misses a goal after {', '.join(checked.missed.trace)}")
+        late = put_off_findings(problem.system.obligations.aims, places, found, checked.put_off)
+        diagnostics = sorted_diagnostics((*diagnostics, *late))
+        outcome: CheckResult = "passed" if checked.outcome is CheckOutcome.PASSED else "not checked"
+        method = f"{certificate.method}; {checked.method}"
+        certificate = msgspec.structs.replace(certificate, goals=outcome, method=method)
     supervisor = Supervisor.supervising(problem.system, result.added, certificate, strategy)
     return SynthesisOutcome(OutcomeStatus.SUPERVISOR, supervisor, diagnostics, result.statistics)

@@ -16,7 +16,8 @@ from robosc.automata.goal_memory import Aim, AimKind
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import subjects
 from robosc.certification.differences import model_differences
-from robosc.controller_properties import Controller, check_controller, check_strategy
+from robosc.certification.strategies import verify_strategy
+from robosc.controller_properties import Controller, check_controller
 from robosc.errors import Diagnostic, sorted_diagnostics
 from robosc.expressions import Value
 from robosc.expressions.text import automaton_text
@@ -94,6 +95,7 @@ class FileVerification:
         notes: Remarks that are worth knowing, but decide nothing.
         report: The verifier's, or None where the supervisor is for another model or deployment.
         goals: Outcome of the check of its strategy, or None where it has none.
+        method: Description of what was done, in one line; empty where there is no report.
     """
 
     diagnostics: tuple[Diagnostic, ...]
@@ -101,6 +103,7 @@ class FileVerification:
     notes: tuple[str, ...]
     report: VerificationReport | None
     goals: CheckOutcome | None = None
+    method: str = ""
 
     def outcomes(self) -> dict[str, CheckOutcome]:
         """Return the outcome of each check, in order."""
@@ -206,16 +209,19 @@ def verify_supervisor_file(
             should_stop=should_stop,
         ).certified()
         faults += [Fault("certificate", text) for text in _false_properties(claimed, properties)]
+    method = report.method
     if supervisor.strategy is not None:
-        under = check_strategy(
+        under = verify_strategy(
             executable,
             supervisor.added,
             supervisor.strategy,
-            limit=limits.positions,
+            limits,
+            engine=engine,
             controller=controller,
             should_stop=should_stop,
+            on_progress=on_progress,
         )
-        goals = CheckOutcome(under.result)
+        goals, method = under.outcome, f"{method}; {under.method}"
         if under.missed is not None:
             if supervisor.certificate.goals == "passed":
                 faults.append(Fault("certificate", "it says 'goals: passed', which is false"))
@@ -234,7 +240,7 @@ def verify_supervisor_file(
         for item in found.failures
     ]
     remarks = (*notes, *_beliefs(supervisor.certificate, found, goals))
-    return FileVerification((), tuple(faults), remarks, report, goals)
+    return FileVerification((), tuple(faults), remarks, report, goals, method)
 
 
 def _missed(aim: Aim | None) -> str:

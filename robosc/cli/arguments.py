@@ -183,8 +183,8 @@ def add_verify_limit_argument(parser: argparse.ArgumentParser, name: str, defaul
         default=default,
         metavar="N",
         help="verify up to N states one by one, recompute the supervisor up to N/4 states of the system without it, "
-        "search symbolically beyond, with 25 N nodes of work, and check a strategy up to N/10 positions; what takes "
-        "more is 'not checked' (default: %(default)s)",
+        "search symbolically beyond, with 25 N nodes of work, also the positions under a strategy that are more than "
+        "N/100, and where that is too much up to N/10 of them; what takes more is 'not checked' (default: %(default)s)",
     )
 
 

@@ -5,6 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+from robosc.certification.reasons import reasons_json
 from robosc.cli import automata, synth
 from robosc.cli.arguments import add_deployment_argument, add_engine_options, add_model_arguments, read_bundle
 from robosc.cli.output import ExitCode, UsageError, report_check
@@ -125,7 +126,7 @@ def _synthesized(outcome: "SynthesisOutcome") -> _Synthesized:
 
 def _report_synthesized(arguments: argparse.Namespace, found: _Synthesized, bundle: Bundle) -> ExitCode:
     """Print the findings and what became of the synthesis as asked, and return the exit status."""
-    summary = {"status": found.status, **synth.reasons_json(found)}
+    summary = {"status": found.status, **reasons_json(found)}
     status = report_check(arguments, found.diagnostics, bundle, summary)
     if not arguments.json:
         synth.report_reasons(found, bundle)

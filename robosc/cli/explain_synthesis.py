@@ -4,6 +4,7 @@ import argparse
 import sys
 from typing import TYPE_CHECKING
 
+from robosc.certification.reasons import reasons_json
 from robosc.cli import automata, synth
 from robosc.cli.arguments import (
     add_deployment_argument,
@@ -97,16 +98,14 @@ def run_with(arguments: argparse.Namespace, explain: "Callable[[Bundle], Explain
     if isinstance(found.explanation, GoalExplanation):
         goals = automata.WithoutSupervisor(found.status, found.diagnostics, found.reason, found.explanation)
         if arguments.json:
-            print_json(
-                {"status": str(found.status), **synth.reasons_json(goals), **diagnostics_json(found.diagnostics)}
-            )
+            print_json({"status": str(found.status), **reasons_json(goals), **diagnostics_json(found.diagnostics)})
         else:
             sys.stdout.write(f"{bundle.main.name}: {visible(found.reason)}\n{synth.why_text(found.explanation)}")
         return ExitCode.FAILED
     if isinstance(found.explanation, NoSupervisor):
         why = automata.WithoutSupervisor(found.status, found.diagnostics, found.reason, None)
         if arguments.json:
-            print_json({"status": str(found.status), **synth.reasons_json(why), **diagnostics_json(found.diagnostics)})
+            print_json({"status": str(found.status), **reasons_json(why), **diagnostics_json(found.diagnostics)})
         else:
             synth.report_problems(why, bundle)
         return ExitCode.FAILED

@@ -3,6 +3,7 @@
 import argparse
 import sys
 
+from robosc.certification.reasons import reasons_json
 from robosc.cli import automata, synth
 from robosc.cli.arguments import add_deployment_argument, add_engine_options, add_model_arguments, read_bundle
 from robosc.cli.output import ExitCode, print_json
@@ -56,7 +57,7 @@ def run(arguments: argparse.Namespace) -> int:
     if outcome.supervisor is None:
         if arguments.json:
             print_json(
-                {"status": str(outcome.status), **synth.reasons_json(outcome), **diagnostics_json(outcome.diagnostics)}
+                {"status": str(outcome.status), **reasons_json(outcome), **diagnostics_json(outcome.diagnostics)}
             )
         else:
             synth.report_problems(outcome, bundle)

@@ -5,6 +5,7 @@ import sys
 from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
+from robosc.certification.reasons import reasons_json
 from robosc.cli import automata, synth
 from robosc.cli.arguments import (
     add_deployment_argument,
@@ -268,7 +269,7 @@ def report_generated(
         print_json(
             {
                 "status": str(outcome.status),
-                **synth.reasons_json(outcome),
+                **reasons_json(outcome),
                 "target": arguments.target,
                 "folder": str(arguments.output),
                 "files": written,

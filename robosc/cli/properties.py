@@ -6,6 +6,7 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from robosc.certification.reasons import reasons_json
 from robosc.cli import synth
 from robosc.cli.arguments import engine_options, given_path, read_bundle
 from robosc.cli.output import ExitCode, ProgressLine, UsageError, print_diagnostics, print_json
@@ -73,7 +74,7 @@ def run(arguments: argparse.Namespace) -> int:
     if outcome.supervisor is None:
         if arguments.json:
             print_json(
-                {"status": str(outcome.status), "reason": outcome.reason, **diagnostics_json(outcome.diagnostics)}
+                {"status": str(outcome.status), **reasons_json(outcome), **diagnostics_json(outcome.diagnostics)}
             )
         else:
             synth.report_problems(outcome, bundle)

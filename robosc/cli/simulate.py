@@ -7,6 +7,7 @@ from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from robosc.certification.reasons import reasons_json
 from robosc.cli import automata
 from robosc.cli.arguments import add_engine_options, add_model_arguments
 from robosc.cli.output import ESCAPED, CommandError, ExitCode, UsageError, has_unicode_output, print_json
@@ -213,9 +214,7 @@ def counter_run(arguments: argparse.Namespace) -> "CounterRun | None":
         why = f"the {aims} can be reached" if aims else "the model has no goals or missions"
         raise CommandError(f"--counter-strategy: the surroundings have none, since {why}", ExitCode.FAILED)
     if arguments.json:
-        print_json(
-            {"status": str(outcome.status), **synth.reasons_json(outcome), **diagnostics_json(outcome.diagnostics)}
-        )
+        print_json({"status": str(outcome.status), **reasons_json(outcome), **diagnostics_json(outcome.diagnostics)})
     else:
         synth.report_problems(outcome, bundle)
     return None

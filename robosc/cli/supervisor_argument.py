@@ -3,6 +3,7 @@
 import argparse
 from typing import TYPE_CHECKING
 
+from robosc.certification.reasons import reasons_json
 from robosc.cli import synth
 from robosc.cli.arguments import read_bundle
 from robosc.cli.output import print_json
@@ -38,7 +39,7 @@ def supervisor_of_arguments(arguments: argparse.Namespace, *, is_json: bool = Fa
     if outcome.supervisor is None:
         if is_json:
             print_json(
-                {"status": str(outcome.status), **synth.reasons_json(outcome), **diagnostics_json(outcome.diagnostics)}
+                {"status": str(outcome.status), **reasons_json(outcome), **diagnostics_json(outcome.diagnostics)}
             )
         else:
             synth.report_problems(outcome, bundle)

@@ -5,6 +5,7 @@ import sys
 from enum import StrEnum
 from typing import TYPE_CHECKING, Protocol
 
+from robosc.certification.reasons import Reasons, reasons_json
 from robosc.cli import automata
 from robosc.cli.arguments import (
     SYNTHESIS_STATES,
@@ -37,18 +38,6 @@ if TYPE_CHECKING:
     from robosc.certification import SynthesisOutcome
     from robosc.certification.goals import GoalExplanation
     from robosc.explanation import EmptyExplanation
-
-
-class Reasons(Protocol):
-    """Object that knows why there is no supervisor."""
-
-    @property
-    def reason(self) -> str:
-        """Reason why there is no supervisor, in one sentence; empty if there is one."""
-
-    @property
-    def explanation(self) -> "EmptyExplanation | GoalExplanation | None":
-        """Explanation of what is to blame if no supervisor exists, or goals cannot be reached."""
 
 
 class Outcome(Reasons, Protocol):
@@ -207,13 +196,3 @@ def why_text(explanation: "EmptyExplanation | GoalExplanation") -> str:
         return empty_text(explanation)
     hint = "'robosc simulate' and 'robosc view' with '--counter-strategy' play the surroundings, against you\n"
     return f"{explanation}\n{hint if explanation.has_counter_strategy else ''}"
-
-
-def reasons_json(outcome: Reasons) -> dict[str, object]:
-    """Return the reason why there is no supervisor, as JSON values."""
-    from robosc.explanation import EmptyExplanation, document
-
-    why = outcome.explanation
-    if why is None or isinstance(why, EmptyExplanation):
-        return {"reason": outcome.reason, "explanation": None if why is None else document(why)}
-    return {"reason": outcome.reason, "explanation": None, "goals": why.document()}

@@ -1,11 +1,12 @@
 """Goals, visits and assumptions in the words of the language, and what a strategy chooses for each goal and visit."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 from robosc.conditions.rendering import Formulas, in_words
 from robosc.expressions import Expression
 from robosc.model.structure import Assumption, Goal, GoalForm, Model
-from robosc.supervisor import DecisionDiagram, Supervisor
+from robosc.supervisor import Choice, DecisionDiagram, Supervisor
 from robosc.supervisor.diagram import diagram_domains
 
 Formula = tuple[str, DecisionDiagram, Expression | None]
@@ -20,11 +21,13 @@ class GoalInWords:
         name: Name, such as `goal 1` or `visit 2 of mission rounds`.
         text: The goal, or the visit's condition, as a user writes it.
         choices: Requests in the order in which they are tried, each with the condition for choosing it.
+        meanwhile: Requests for other goals, tried after them, while this one waits for the surroundings.
     """
 
     name: str
     text: str
     choices: tuple[Formula, ...]
+    meanwhile: tuple[Formula, ...]
 
 
 def goal_text(goal: Goal) -> str:
@@ -55,11 +58,16 @@ def goals_in_words(supervisor: Supervisor) -> tuple[GoalInWords, ...]:
     if supervisor.strategy is None:
         return ()
     formulas = Formulas(diagram_domains(supervisor.executable.remembering_automata))
+
+    def written(mode: Iterable[Choice]) -> tuple[Formula, ...]:
+        return tuple((choice.event, choice.condition, formulas.formula(choice.condition)) for choice in mode)
+
     return tuple(
         GoalInWords(
             name,
             words,
-            tuple((choice.event, choice.condition, formulas.formula(choice.condition)) for choice in mode),
+            written(choice for choice in mode if not choice.is_meanwhile),
+            written(choice for choice in mode if choice.is_meanwhile),
         )
         for (name, words), mode in zip(aims_in_words(supervisor), supervisor.strategy.modes, strict=True)
     )

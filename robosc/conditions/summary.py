@@ -6,7 +6,7 @@ from collections.abc import Collection, Iterable, Sequence
 import msgspec
 
 from robosc.automata import System
-from robosc.conditions.goals import GoalInWords, assumption_text, goals_and_visits, goals_in_words
+from robosc.conditions.goals import Formula, GoalInWords, assumption_text, goals_and_visits, goals_in_words
 from robosc.conditions.literals import Vocabulary
 from robosc.conditions.rendering import Formulas, diagram_lines, in_words, size_in_words
 from robosc.expressions import TRUE, Expression
@@ -22,6 +22,9 @@ _NODES = 150
 
 FROM_THE_FIRST = ", to be read from [1] on:"
 """Words between a diagram's size and its nodes."""
+
+MEANWHILE = "meanwhile for others"
+"""Words before the condition of a request that is taken along for other goals."""
 
 ELSEWHERE = "; --json lists its nodes"
 """Words after the size of a diagram that is not written node by node."""
@@ -71,17 +74,21 @@ def _diagram_json(diagram: DecisionDiagram, vocabulary: Vocabulary) -> list[dict
 
 
 def _goal_json(goal: GoalInWords, vocabulary: Vocabulary, components: frozenset[str]) -> dict[str, object]:
-    return {
-        "name": goal.name,
-        "goal": goal.text,
-        "choices": [
+    def listed(choices: Iterable[Formula]) -> list[dict[str, object]]:
+        return [
             {
                 "event": event,
                 "condition": condition_line(diagram, formula, components),
                 **({} if formula is not None else {"diagram": _diagram_json(diagram, vocabulary)}),
             }
-            for event, diagram, formula in goal.choices
-        ],
+            for event, diagram, formula in choices
+        ]
+
+    return {
+        "name": goal.name,
+        "goal": goal.text,
+        "choices": listed(goal.choices),
+        "meanwhile": listed(goal.meanwhile),
     }
 
 
@@ -177,9 +184,12 @@ def strategy_lines(supervisor: Supervisor) -> list[str]:
     if not goals:
         return []
     vocabulary = Vocabulary(diagram_domains(supervisor.executable.remembering_automata), components)
-    short = short_diagrams(diagram for goal in goals for _, diagram, formula in goal.choices if formula is None)
+    every = (item for goal in goals for item in (*goal.choices, *goal.meanwhile))
+    short = short_diagrams(diagram for _, diagram, formula in every if formula is None)
     what = goals_and_visits(supervisor)
     lines = [f"the strategy approaches its {what} in turn; it requests the first that applies"]
+    if not any(goal.choices or goal.meanwhile for goal in goals):
+        lines = [f"the strategy never requests anything: its {what} come true without that"]
     for goal in goals:
         lines += [f"  {row}" for row in _wrapped(f"for {goal.name}, {goal.text}")]
         rows: list[tuple[str, list[str]]] = []
@@ -187,7 +197,10 @@ def strategy_lines(supervisor: Supervisor) -> list[str]:
             parts = _parts(diagram, formula, vocabulary, components, short)
             always = "otherwise" if rows else "always"
             rows.append((event, [always] if formula == TRUE else [f"where {parts[0]}", *parts[1:]]))
-        if not goal.choices or goal.choices[-1][2] != TRUE:
+        for event, diagram, formula in goal.meanwhile:
+            parts = _parts(diagram, formula, vocabulary, components, short)
+            rows.append((event, [MEANWHILE] if formula == TRUE else [f"{MEANWHILE}, where {parts[0]}", *parts[1:]]))
+        if all(formula != TRUE for _, _, formula in (*goal.choices, *goal.meanwhile)):
             rows.append(("nothing", ["otherwise" if rows else "at all"]))
         lines += [f"    {line}" for line in _table(rows)]
     if supervisor.model.assumptions:

@@ -13,6 +13,7 @@ It shares nothing with the synthesis of strategies but the automata and what is 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
+from operator import ge
 
 from robosc.automata.compile import NO_DATA, Function, State, compile_expression, subjects_read
 from robosc.automata.executable import ExecutableSystem
@@ -63,11 +64,15 @@ class StrategyCheck:
         result: `passed`, `failed` or `not checked`.
         positions: Number of positions that were visited.
         missed: A run that misses a goal, or None.
+        put_off: Numbers of visits that the robot may leave unmade for ever by its own doing: to get to such a visit it
+            begins a detour of the mission or ends what `while` asks for, and comes back without making it, or not at
+            all, though the surroundings interrupt nothing.
     """
 
     result: PropertyResult
     positions: int
     missed: MissedGoal | None = None
+    put_off: tuple[int, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -163,9 +168,14 @@ class StrategyRun:
             tuple(item.condition for item in owed.aims),
             owed.assumptions,
         )
-        read = tuple(dict.fromkeys(part for items in conditions for item in items for part in _read_of_state(item)))
-        self._updates, self._goals, self._assumptions = [_Judgements(items, places, read) for items in conditions]
-        self._read = tuple(compile_expression(part, places) for part in read)
+        self._places = places
+        waiting = tuple(found for aim in owed.aims for found in (aim.interruption, *aim.occasions, aim.made) if found)
+        every = (*conditions, waiting)
+        self._parts = tuple(dict.fromkeys(part for items in every for item in items for part in _read_of_state(item)))
+        self._updates, self._goals, self._assumptions = [
+            _Judgements(items, places, self._parts) for items in conditions
+        ]
+        self._read = tuple(compile_expression(part, places) for part in self._parts)
         self._looks: dict[State, _Look] = {}
         self._modes = tuple(
             tuple((item.event, state_predicate(system, item.condition)) for item in mode) for mode in strategy.modes
@@ -179,6 +189,10 @@ class StrategyRun:
         if found is None:
             found = self._looks[state] = tuple(part(state, NO_DATA) for part in self._read)
         return found
+
+    def judgements(self, conditions: Iterable[Expression]) -> _Judgements:
+        """Return judgements of conditions that come with goals and visits."""
+        return _Judgements(tuple(conditions), self._places, self._parts)
 
     def observed(self, state: State, memory: Memory) -> Memory:
         """Return the memory after a stable state."""
@@ -252,7 +266,9 @@ def check_strategy(
     except TooManyChoicesError:
         return StrategyCheck("not checked", len(search.turns))
     missed = search.missed()
-    return StrategyCheck("passed" if missed is None else "failed", len(search.turns), missed)
+    if missed is not None:
+        return StrategyCheck("failed", len(search.turns), missed)
+    return StrategyCheck("passed", len(search.turns), put_off=tuple(search.put_off(executable)))
 
 
 class _Search:
@@ -395,3 +411,71 @@ class _Search:
             if all(map(any, zip(*owed, strict=True))):
                 return MissedGoal(positions[0][2], self._trace(found[0]), positions[0][0][0])
         return None
+
+    def put_off(self, executable: ExecutableSystem) -> Iterator[int]:
+        """Yield the visits that the robot may leave unmade for ever by its own doing.
+
+        Args:
+            executable: Executable system of the robot.
+        """
+        judged: dict[tuple[Expression, ...], list[tuple[bool, ...]]] = {}
+        for number, aim in enumerate(executable.obligations.aims):
+            turned = [place for place, (turn, _) in enumerate(self.turns) if self.positions[turn][2] == number]
+            if aim.interruption is None or aim.made is None or not turned:
+                continue
+            # Visits of one mission wait for the same.
+            causes = (aim.interruption, *aim.occasions)
+            if causes not in judged:
+                judgements = self._run.judgements(causes)
+                judged[causes] = [
+                    judgements.of(self._run.look(state), state, memory) for (state, _), memory, _ in self.positions
+                ]
+            caused = judged[causes]
+            is_made = self._made(aim.made)
+            begun = [
+                turn
+                for place in turned
+                for turn, _ in [self.turns[place]]
+                if caused[turn][0] and not caused[place][0] and not is_made(place, turn)
+            ]
+            if begun and self._goes_on(begun, caused, is_made):
+                yield number
+
+    def _made(self, condition: Expression) -> Callable[[int, int], bool]:
+        """Return the function that says if a visit is made on the way from one position to another one."""
+        judgements = self._run.judgements((condition,))
+
+        def is_made(before: int, after: int) -> bool:
+            state = self.positions[after][0][0]
+            return judgements.of(self._run.look(state), state, self.positions[before][1])[0]
+
+        return is_made
+
+    def _goes_on(
+        self, begun: Iterable[int], caused: Sequence[tuple[bool, ...]], is_made: Callable[[int, int], bool]
+    ) -> bool:
+        """Return True if a run goes on for ever from some positions without making a visit.
+
+        The surroundings keep to every assumption, and make none of the causes come true for which the visit waits.
+
+        Args:
+            begun: Numbers of the positions.
+            caused: For each position the causes that are true there.
+            is_made: Function that says if the visit is made on the way from one position to another one.
+        """
+        graph: dict[int, list[int]] = {}
+        queue = list(dict.fromkeys(begun))
+        for place in queue:
+            if place not in graph:
+                before = caused[place]
+                moves = [item for item in self.moves[place] if all(map(ge, before, caused[item]))]
+                graph[place] = [item for item in (*moves, self.turns[place][0]) if not is_made(place, item)]
+                queue += graph[place]
+        numbers = components(graph)
+        owed: dict[int, set[tuple[bool, ...]]] = {}
+        for place, targets in graph.items():
+            turn = self.turns[place][0]
+            if turn in targets and numbers[turn] == numbers[place]:
+                (state, _), memory, _ = self.positions[place]
+                owed.setdefault(numbers[place], set()).add(self._run.assumptions(state, memory))
+        return any(all(map(any, zip(*met, strict=True))) for met in owed.values())

@@ -60,7 +60,9 @@ class CounterRun(Run):
         if supervisor is None:
             raise NoCounterStrategyError("a server sends no counter-strategy: synthesize the model on this machine")
         if explanation.counter is None:
-            raise NoCounterStrategyError("the counter-strategy of the surroundings is too large to be played")
+            raise NoCounterStrategyError(
+                "the surroundings have no counter-strategy, or one that is too large to be played"
+            )
         self._explanation = explanation
         executable = supervisor.executable
         owed, system = executable.obligations, executable.remembering_automata

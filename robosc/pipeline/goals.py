@@ -3,9 +3,9 @@
 from collections.abc import Iterable
 from dataclasses import dataclass
 
-from robosc.conditions.goals import aims_in_words, assumptions_in_words, goals_in_words
+from robosc.conditions.goals import Formula, aims_in_words, assumptions_in_words, goals_in_words
 from robosc.conditions.literals import Vocabulary
-from robosc.conditions.summary import ELSEWHERE, condition_line, short_diagrams
+from robosc.conditions.summary import ELSEWHERE, MEANWHILE, condition_line, short_diagrams
 from robosc.pipeline.conditions import Condition
 from robosc.pipeline.results import GoalSummary
 from robosc.supervisor import Supervisor
@@ -29,14 +29,16 @@ class GoalApproach:
         name: Name: `goal 1`, `visit 2 of mission rounds`, `visit 1 of detour 1 of mission rounds`.
         goal: The goal, or the visit's condition, as a user writes it.
         choices: Choices in the order in which they are tried; where none applies, the controller waits.
+        meanwhile: Choices for other goals, tried where it would wait for the surroundings.
     """
 
     name: str
     goal: str
     choices: tuple[Choice, ...]
+    meanwhile: tuple[Choice, ...] = ()
 
     def __repr__(self) -> str:
-        requests = ", ".join(item.event for item in self.choices) or "nothing"
+        requests = ", ".join(item.event for item in (*self.choices, *self.meanwhile)) or "nothing"
         return f"<{self.title}: requests {requests}>"
 
     def __str__(self) -> str:
@@ -54,13 +56,17 @@ class GoalApproach:
 
     def rows(self) -> list[tuple[str, str]]:
         """Each choice with its condition, and at last when nothing is requested, if there is such a case."""
-        short = short_diagrams(item.diagram for item in self.choices if item.formula is None)
+        every = (*self.choices, *self.meanwhile)
+        short = short_diagrams(item.diagram for item in every if item.formula is None)
         rows: list[tuple[str, str]] = []
-        for item in self.choices:
+        for number, item in enumerate(every):
             has_text = item.formula is not None or item.diagram in short
             text = f"where {item if has_text else f'{item.text}{ELSEWHERE}'}"
-            rows.append((item.event, ("otherwise" if rows else "always") if item.adds_nothing else text))
-        if not self.choices or not self.choices[-1].adds_nothing:
+            if number < len(self.choices):
+                rows.append((item.event, ("otherwise" if rows else "always") if item.adds_nothing else text))
+            else:
+                rows.append((item.event, MEANWHILE if item.adds_nothing else f"{MEANWHILE}, {text}"))
+        if not any(item.adds_nothing for item in every):
             rows.append(("nothing", "otherwise" if rows else "at all"))
         return rows
 
@@ -95,17 +101,14 @@ def goals_of(supervisor: Supervisor) -> Goals:
     if not found:
         return Goals()
     vocabulary = Vocabulary(diagram_domains(supervisor.executable.remembering_automata), components)
-    return Goals(
-        GoalApproach(
-            item.name,
-            item.text,
-            tuple(
-                Choice(event, condition_line(diagram, formula, components), formula, diagram, vocabulary)
-                for event, diagram, formula in item.choices
-            ),
+
+    def written(choices: Iterable[Formula]) -> tuple[Choice, ...]:
+        return tuple(
+            Choice(event, condition_line(diagram, formula, components), formula, diagram, vocabulary)
+            for event, diagram, formula in choices
         )
-        for item in found
-    )
+
+    return Goals(GoalApproach(item.name, item.text, written(item.choices), written(item.meanwhile)) for item in found)
 
 
 def goal_summary(supervisor: Supervisor) -> GoalSummary | None:

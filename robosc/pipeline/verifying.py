@@ -7,6 +7,7 @@ from robosc.automata import System
 from robosc.certification import Progress, SynthesisOutcome
 from robosc.certification.file_report import file_verification_json, file_verification_text, has_passed, malformed_json
 from robosc.certification.progress import OnProgress, ShouldStop, ignored, never
+from robosc.certification.reasons import reasons_json
 from robosc.certification.supervisor_file import verify_supervisor_file
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.json_documents import diagnostics_json
@@ -286,5 +287,5 @@ def _synthesized(
 
 def _without(outcome: SynthesisOutcome, model: LoadedModel) -> Verification:
     status, reason = status_of(outcome)
-    report = {"status": str(status), "reason": reason, **diagnostics_json(outcome.diagnostics)}
+    report = {"status": str(status), **reasons_json(outcome), **diagnostics_json(outcome.diagnostics)}
     return Verification(VerificationStatus.NO_SUPERVISOR, findings_of(outcome, model), reason, report)

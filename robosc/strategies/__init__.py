@@ -2,7 +2,7 @@
 
 from robosc.strategies.blame import GoalBlame, blame_goals
 from robosc.strategies.counter_strategy import CounterPlayer, CounterStrategy
-from robosc.strategies.findings import goal_findings, goals_and_missions, layer_goal_findings
+from robosc.strategies.findings import goal_findings, goals_and_missions, layer_goal_findings, put_off_findings
 from robosc.strategies.synthesize import StrategyResult, synthesize_strategy
 
 __all__ = [
@@ -14,5 +14,6 @@ __all__ = [
     "goal_findings",
     "goals_and_missions",
     "layer_goal_findings",
+    "put_off_findings",
     "synthesize_strategy",
 ]

@@ -171,6 +171,9 @@ class _Trials:
             nearest = None
             if self.result.is_hopeless:
                 nearest = nearest_to(synthesis, unreached, self.executable, self.added, self.should_stop)
+            # Goals that are reached in name alone need nothing to be done against them.
+            if synthesis.is_won(range(len(synthesis.assumptions)), unreached):
+                return None, nearest
             try:
                 return synthesis.counter(unreached), nearest
             except UnsupportedModelError:
@@ -243,7 +246,8 @@ class _Trials:
             for goals in (range(len(synthesis.goals)), self.result.unreached):
 
                 def is_enough(kept: frozenset[int], goals: Sequence[int] = goals) -> bool:
-                    return synthesis.is_won((*range(count), *sorted(kept)), goals)
+                    assumed = (*range(count), *sorted(kept))
+                    return synthesis.is_won(assumed, goals) and synthesis.can_come_true(assumed, goals)
 
                 if is_enough(frozenset(fitting)):
                     return tuple(candidates[item - count] for item in without_needless(fitting, is_enough))

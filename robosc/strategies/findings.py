@@ -1,6 +1,6 @@
 """Findings about goals, missions and assumptions: what cannot be reached, is not needed, or can be broken."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from robosc.automata.goal_memory import Aim, AimKind
 from robosc.conditions.goals import assumption_text
@@ -10,6 +10,9 @@ from robosc.model.structure import Deployment, Model
 from robosc.source import Location
 from robosc.strategies.blame import GoalBlame
 from robosc.strategies.synthesize import StrategyResult
+
+MAXIMUM_RELATED = 5
+"""Related places of one kind that a finding shows."""
 
 
 def goal_findings(
@@ -37,6 +40,18 @@ def goal_findings(
                 "Make it a goal as well, assume only what the surroundings decide, or write 'assume allow ...'.",
             )
         )
+    if result.impossible:
+        found.append(_impossible(places, result))
+    for number in result.idle:
+        found.append(
+            Diagnostic(
+                Severity.WARNING,
+                "idle-goal",
+                "nothing is ever done for this goal: it is true whenever the controller decides",
+                _place(places, aims[number]),
+                "Compare it with what can happen, such as its numbers with the ranges of variables, or remove it.",
+            )
+        )
     for number in result.never_made:
         found.append(
             Diagnostic(
@@ -58,6 +73,31 @@ def goal_findings(
             )
         )
     return tuple(found)
+
+
+def put_off_findings(
+    aims: Sequence[Aim], places: Places, result: StrategyResult, put_off: Iterable[int]
+) -> tuple[Diagnostic, ...]:
+    """Return the diagnostics about visits that the robot may leave unmade for ever by its own doing.
+
+    Args:
+        aims: Goals and visits of the model.
+        places: Source locations of the model's parts.
+        result: Result of the synthesis of a strategy.
+        put_off: Numbers of these visits among the goals and visits, as the check of that strategy found them.
+    """
+    return tuple(
+        Diagnostic(
+            Severity.WARNING,
+            "visit-put-off",
+            "the robot may put this visit off for ever: its way there begins a detour of the mission, or ends what "
+            "'while' asks for, and it need not come back to the visit",
+            _place(places, aims[number]),
+            "Let 'on' and 'while' speak about what the surroundings do, or about places that are not on the way.",
+        )
+        for number in put_off
+        if number not in result.never_made
+    )
 
 
 def layer_goal_findings(model: Model, places: Places, deployment: Deployment) -> tuple[Diagnostic, ...]:
@@ -85,6 +125,21 @@ def layer_goal_findings(model: Model, places: Places, deployment: Deployment) ->
 def goals_and_missions(model: Model) -> str:
     """Return a word for what a model's strategy is to reach: goals, missions or both."""
     return " and ".join(word for word, items in (("goals", model.goals), ("missions", model.missions)) if items)
+
+
+def _impossible(places: Places, result: StrategyResult) -> Diagnostic:
+    """Return the finding about assumptions that cannot come true."""
+    first, *others = (places.assumptions[number] for number in result.impossible)
+    what = "these assumptions cannot come true together" if others else "this assumption cannot come true"
+    when = "whatever happens" if result.is_impossible_alone else "while the goals do"
+    return Diagnostic(
+        Severity.ERROR,
+        "impossible-assumption",
+        f"{what} again and again, {when}: every goal would be reached in name alone",
+        first,
+        "Correct the condition, or remove what does not come true.",
+        _related([("this assumption belongs to them", place) for place in others]),
+    )
 
 
 def _unreached(aims: Sequence[Aim], places: Places, result: StrategyResult, blame: GoalBlame | None) -> Diagnostic:
@@ -144,4 +199,11 @@ def _place(places: Places, aim: Aim) -> Location:
 
 
 def _related(found: Sequence[tuple[str, Location]]) -> tuple[RelatedPlace, ...]:
-    return tuple(RelatedPlace(message, location) for message, location in found[:5])
+    """Return the first few places; the last of them says how many others there are."""
+    shown = [RelatedPlace(message, location) for message, location in found[:MAXIMUM_RELATED]]
+    if more := len(found) - len(shown):
+        last = shown.pop()
+        shown.append(
+            RelatedPlace(f"{last.message} ({more} more {'is' if more == 1 else 'are'} not shown)", last.location)
+        )
+    return tuple(shown)

@@ -13,7 +13,7 @@ algorithm for the evaluation of fixpoint expressions", Theoretical Computer Scie
 (beginning from earlier results).
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Any, Protocol
 
@@ -128,7 +128,7 @@ def solve(
     return Solution(winning, tuple(approaches), rounds)
 
 
-def approach_uninterrupted(
+def approach_in_earnest(
     arena: TwoSidedArena,
     assumptions: Sequence[Any],
     goal: Any,
@@ -136,35 +136,47 @@ def approach_uninterrupted(
     winning: Any,
     *,
     false: Any,
+    near: Mapping[int, Any] | None = None,
     check_stop: Callable[[], object] = lambda: None,
 ) -> tuple[Approach, ...]:
-    """Return steps towards a goal that also counts as true where it is interrupted, such as by a detour.
+    """Return steps towards a goal that rely on nothing that would not come, and on no interruption of the goal.
 
-    Interruptions are left to the surroundings: the controller neither brings them about nor waits for them where it can
-    make progress without them. Only where there is no other way, it does.
+    Interruptions, such as a detour in which the goal counts as true, are left to the surroundings: the controller
+    neither brings them about nor waits for them where it can make progress without them. It waits for an assumption
+    that it may keep from coming true only where the surroundings can make it true, maybe after requests that do not
+    give up what it waits for. Only where there is no other way, it does something else.
 
     Args:
         arena: The game.
         assumptions: Predicates that the surroundings make true again and again.
         goal: Positions in which the goal is true, interrupted ones among them.
-        interrupted: Positions in which it is interrupted.
+        interrupted: Positions in which it is interrupted; None if it never is.
         winning: The positions from which the controller wins.
         false: The predicate that is true nowhere.
+        near: Positions from which the surroundings alone can make an assumption true, by the numbers of those that the
+            controller may keep from coming true.
         check_stop: Function called before each step; it may end the work with an error.
     """
     failing = [~item for item in assumptions] or [false]
-    calm = winning & ~interrupted
+    calm = winning if interrupted is None else winning & ~interrupted
     # An assumption that only an interruption makes true is not worth waiting for.
     hopeful = [~item & _leading(arena, item & calm, calm, check_stop) for item in assumptions] or [false]
-    search = _Search(arena, failing, winning, false, check_stop)
+    search = _EarnestSearch(arena, failing, winning, false, check_stop)
     reached = goal & arena.turn(winning)
     found: list[Approach] = []
     while True:
         before = [item.positions for item in found]
         nearer = before[-1] if before else false
-        step = search.step(reached, nearer, hopeful, (nearer & calm,))
-        if step is None:
-            step = search.step(reached, nearer, failing, (*(item & calm for item in before), *before))
+        ways = [(failing, (nearer,), winning)]
+        if interrupted is not None:
+            anyhow = (*(item & calm for item in before), *before)
+            ways = [(hopeful, (nearer & calm,), calm), (failing, anyhow, winning)]
+        steps = (
+            search.step(reached, nearer, waited, onwards, within, helped)
+            for helped in ((near, {}) if near else ({},))
+            for waited, onwards, within in ways
+        )
+        step = next((item for item in steps if item is not None), None)
         if step is None:
             return tuple(found)
         found.append(step)
@@ -237,24 +249,6 @@ class _Search:
             found.append(Approach(positions, nearer, progress, waiting, (nearer,)))
             nearer, last = positions, progress
 
-    def step(self, reached: Any, nearer: Any, failing: Sequence[Any], onwards: tuple[Any, ...]) -> Approach | None:
-        """Return one step towards a goal, or None if it adds no position.
-
-        Args:
-            reached: Positions in which the goal is true, and the controller's turn leads to where it goes on winning.
-            nearer: Positions from which progress was known before.
-            failing: For each assumption, the positions in which it fails and is waited for.
-            onwards: Positions that requests may lead into, those of the first part before those of the next one.
-        """
-        progress = reached
-        for item in onwards[-1:]:
-            progress = progress | self.arena.turn(item)
-        waiting = tuple(self._waiting(progress, item, self.winning) for item in failing)
-        positions = nearer
-        for item in waiting:
-            positions = positions | item
-        return None if positions == nearer else Approach(positions, nearer, progress, waiting, onwards)
-
     def _waiting(self, progress: Any, failing: Any, bound: Any) -> Any:
         """Return the largest set in which each turn makes progress, or stays in the set while an assumption fails.
 
@@ -274,3 +268,61 @@ class _Search:
             if narrowed == staying:
                 return staying
             staying = narrowed
+
+
+@dataclass(frozen=True, slots=True)
+class _EarnestSearch(_Search):
+    """Search that can also look at what both sides can do together."""
+
+    arena: TwoSidedArena
+
+    def step(
+        self,
+        reached: Any,
+        nearer: Any,
+        failing: Sequence[Any],
+        onwards: tuple[Any, ...],
+        within: Any,
+        near: Mapping[int, Any],
+    ) -> Approach | None:
+        """Return one step towards a goal, or None if it adds no position.
+
+        Args:
+            reached: Positions in which the goal is true, and the controller's turn leads to where it goes on winning.
+            nearer: Positions from which progress was known before.
+            failing: For each assumption, the positions in which it fails and is waited for.
+            onwards: Positions that requests may lead into, those of the first part before those of the next one.
+            within: Positions in which moves begin that are to lead near an assumption, and which they do not leave.
+            near: For some assumptions, by number, positions from which the surroundings alone can make them true. The
+                controller waits for these only where moves can lead there while it goes on waiting.
+        """
+        progress = reached
+        for item in onwards[-1:]:
+            progress = progress | self.arena.turn(item)
+        waiting = tuple(
+            self._waiting_helped(progress, item, near[number], within)
+            if number in near
+            else self._waiting(progress, item, self.winning)
+            for number, item in enumerate(failing)
+        )
+        positions = nearer
+        for item in waiting:
+            positions = positions | item
+        return None if positions == nearer else Approach(positions, nearer, progress, waiting, onwards)
+
+    def _waiting_helped(self, progress: Any, failing: Any, near: Any, within: Any) -> Any:
+        """Return the largest set to wait in, as `_waiting` does, in which moves can lead nearer before any progress.
+
+        Args:
+            progress: Positions in which the turn can make progress.
+            failing: Positions in which the assumption is not true.
+            near: Positions from which the surroundings alone can make it true.
+            within: Positions that such moves begin in and do not leave; none is needed from others.
+        """
+        bound, staying = None, self.winning
+        while staying != bound:
+            bound = self._waiting(progress, failing, staying)
+            inside = bound & within & ~progress
+            led = _leading(self.arena, inside & near, inside, self.check_stop)
+            staying = led | (bound & ~inside)
+        return staying

@@ -12,10 +12,10 @@ from typing import Any
 
 from robosc.automata import ExecutableSystem
 from robosc.automata.goal_memory import holds
-from robosc.expressions import Expression
 from robosc.strategies.arena import ControllerArena
 from robosc.strategies.counter_strategy import CounterStage, CounterStrategy, oppose
-from robosc.strategies.gr1 import Approach, Solution, approach_uninterrupted, solve
+from robosc.strategies.gr1 import Approach, Solution, approach_in_earnest, solve
+from robosc.strategies.meanwhile import Meanwhile, ModeGame, Requests
 from robosc.strategies.preferences import preferred_order
 from robosc.supervisor import AddedCondition, Choice, DecisionDiagram, Strategy
 from robosc.synthesis.changes import changed_subjects
@@ -38,6 +38,10 @@ class StrategyResult:
             empty where there is a strategy.
         is_hopeless: True if these goals cannot be reached even if the surroundings do all they can for it.
         preventable: Numbers of assumptions that the robot itself can keep from coming true, though nobody allows it.
+        impossible: Numbers of assumptions that cannot come true together again and again, or not while the goals do,
+            whatever both sides do; a set of which none can be left out.
+        is_impossible_alone: True if they cannot even without the goals.
+        idle: Numbers of goals that are true wherever the controller has its turn, so that nothing is done for them.
         never_made: Numbers of visits that no run makes, though the mission as a whole can go on for ever: it does not
             ask for them, or not while their condition can be true; empty where goals are not reached.
         unneeded: Numbers of assumptions without which the goals are reached just as well.
@@ -50,6 +54,9 @@ class StrategyResult:
     unreached: tuple[int, ...]
     is_hopeless: bool
     preventable: tuple[int, ...]
+    impossible: tuple[int, ...]
+    is_impossible_alone: bool
+    idle: tuple[int, ...]
     never_made: tuple[int, ...]
     unneeded: tuple[int, ...]
     positions: int
@@ -113,20 +120,29 @@ class StrategySynthesis:
         """
         solution = self._solution(range(len(self.assumptions)), range(len(self.goals)))
         is_won = self.arena.can_begin(solution.winning)
-        unreached = () if is_won else self._unreached()
+        unreached, impossible, is_alone = self._in_name_alone() if is_won else (self._unreached(), (), False)
+        is_won = is_won and not unreached and not impossible
         preventable = self.preventable(allowed)
         unneeded = self._unneeded(solution) if is_won else ()
         met = self.arena.met() if is_won else self.false
+        near = {item: self._left_to_surroundings(self.assumptions[item]) for item in allowed} if is_won else {}
         if is_won:
-            solution = self._uninterrupted(solution)
+            earnest = self._in_earnest(solution.winning, near)
+            solution = replace(
+                solution,
+                approaches=tuple(earnest.get(item, steps) for item, steps in enumerate(solution.approaches)),
+            )
             # Visits that are not interrupted may need more, though interruptions would do.
-            visits = [solution.approaches[number] for number, _ in self._interruptible()]
+            visits = [steps for number, steps in earnest.items() if self._aims[number].interruption is not None]
             unneeded = tuple(item for item in unneeded if not any(self._rely(steps, item) for steps in visits))
         return StrategyResult(
-            strategy=self._strategy(solution, allowed, met) if is_won and not preventable else None,
+            strategy=self._strategy(solution, near, met) if is_won and not preventable else None,
             unreached=unreached,
             is_hopeless=bool(unreached) and not self.can_be_reached(unreached),
             preventable=preventable,
+            impossible=impossible,
+            is_impossible_alone=is_alone,
+            idle=self._idle(met) if is_won else (),
             never_made=self._never_made(met) if is_won else (),
             unneeded=unneeded,
             positions=self._count(self.arena.positions),
@@ -211,16 +227,47 @@ class StrategySynthesis:
     def _unreached(self) -> tuple[int, ...]:
         """Return a smallest set, by leaving out, of goals that cannot be reached together; later ones go first."""
         every = range(len(self.assumptions))
-        kept = list(range(len(self.goals)))
-        for item in reversed(range(len(self.goals))):
-            fewer = [number for number in kept if number != item]
-            if fewer and not self.is_won(every, fewer):
-                kept = fewer
-        return tuple(kept)
+        return _fewest(range(len(self.goals)), lambda fewer: not self.is_won(every, fewer))
 
-    def can_be_reached(self, goals: Sequence[int]) -> bool:
+    def _in_name_alone(self) -> tuple[tuple[int, ...], tuple[int, ...], bool]:
+        """Return what keeps goals from being reached otherwise than in name, because some assumption has to fail.
+
+        Returns:
+            Goals that cannot be reached together, even if both sides do all they can for it; assumptions that cannot
+            come true together; and whether these cannot even without the goals. At most one set is not empty.
+        """
+        goals, assumptions = range(len(self.goals)), range(len(self.assumptions))
+        if not assumptions or self.can_come_true(assumptions, goals):
+            return (), (), False
+        is_alone = not self.can_come_true(assumptions, ())
+        if not is_alone and not self.can_be_reached(goals):
+            return _fewest(goals, lambda fewer: not self.can_be_reached(fewer)), (), False
+        others = () if is_alone else goals
+        return (), _fewest(assumptions, lambda fewer: not self.can_come_true(fewer, others)), is_alone
+
+    def _idle(self, met: Any) -> tuple[int, ...]:
+        """Return the goals that are true in every position that can be met.
+
+        Args:
+            met: The positions that can be met.
+        """
+        met = met & self.arena.positions
+        goals = (number for number, item in enumerate(self._aims) if item.mission is None)
+        return tuple(number for number in goals if met & ~self.goals[number] == self.false)
+
+    def can_be_reached(self, goals: Iterable[int]) -> bool:
         """Return True if both sides together can make goals true again and again."""
-        return self.arena.can_begin(self._possible([self.goals[item] for item in goals]))
+        return self.can_come_true((), goals)
+
+    def can_come_true(self, assumptions: Iterable[int], goals: Iterable[int]) -> bool:
+        """Return True if both sides together can make assumptions and goals true again and again.
+
+        Args:
+            assumptions: Numbers of the assumptions.
+            goals: Numbers of the goals.
+        """
+        wanted = [*(self.assumptions[item] for item in assumptions), *(self.goals[item] for item in goals)]
+        return self.arena.can_begin(self._possible(wanted))
 
     def _possible(self, wanted: Sequence[Any]) -> Any:
         """Return the positions from which both sides together can make conditions true again and again."""
@@ -306,23 +353,27 @@ class StrategySynthesis:
     def _count(self, predicate: Any) -> int:
         return count_models(self._manager, predicate, self._encoding.state_names)
 
-    def _interruptible(self) -> Iterator[tuple[int, Expression]]:
-        """Yield the numbers of the visits that can be interrupted, with the condition that they are."""
-        for number, item in enumerate(self._aims):
-            if item.interruption is not None:
-                yield number, item.interruption
+    def _in_earnest(self, winning: Any, near: Mapping[int, Any]) -> dict[int, tuple[Approach, ...]]:
+        """Return steps, by goal, that do without interruptions and without idle waiting, as far as they can.
 
-    def _uninterrupted(self, solution: Solution) -> Solution:
-        """Return a solution whose steps towards visits do without interruptions, as far as they can."""
-        approaches = list(solution.approaches)
-        for number, interruption in self._interruptible():
-            approaches[number] = approach_uninterrupted(
-                *(self.arena, self.assumptions, self.goals[number], self.arena.condition(interruption)),
-                solution.winning,
+        Args:
+            winning: The positions from which the goals can be reached.
+            near: For each assumption that the robot may keep from coming true, the positions from which the
+                surroundings alone can make it true.
+        """
+        interruptions = [item.interruption for item in self._aims]
+        return {
+            number: approach_in_earnest(
+                *(self.arena, self.assumptions, self.goals[number]),
+                None if interruption is None else self.arena.condition(interruption),
+                winning,
                 false=self.false,
+                near=near,
                 check_stop=self._monitor.check_stop,
             )
-        return replace(solution, approaches=tuple(approaches))
+            for number, interruption in enumerate(interruptions)
+            if near or interruption is not None
+        }
 
     def _never_made(self, met: Any) -> tuple[int, ...]:
         """Return the visits that neither side can bring about, though the supervisor allows all that it does.
@@ -348,10 +399,18 @@ class StrategySynthesis:
         first = len(self._aims) - len(visits)
         return tuple(first + number for number, is_made in enumerate(visits) if not is_made)
 
-    def _strategy(self, solution: Solution, allowed: Collection[int], met: Any) -> Strategy:
+    def _strategy(self, solution: Solution, near: Mapping[int, Any], met: Any) -> Strategy:
         simplifier = Simplifier(self._encoding, self._seconds)
-        near = {item: self._left_to_surroundings(self.assumptions[item]) for item in allowed}
-        return Strategy(tuple(self._mode(solution, number, simplifier, met, near) for number in range(len(self.goals))))
+        modes = [self._mode(solution, number, near) for number in range(len(self.goals))]
+        # Assumptions that the strategy helps with come first where several can be waited for.
+        places = (*near, *(item for item in range(len(self.assumptions)) if item not in near))
+        own = [self._choices(mode.chosen, solution.winning & met & ~mode.goal, simplifier) for mode in modes]
+        meanwhile = Meanwhile(self.arena, modes, [left for _, left in own], places, near, self.false)
+        found = []
+        for number, (choices, left) in enumerate(own):
+            others, _ = self._choices(meanwhile.of(number), left, simplifier, is_meanwhile=True)
+            found.append((*choices, *others))
+        return Strategy(tuple(found))
 
     def _left_to_surroundings(self, assumption: Any) -> Any:
         """Return the positions from which the surroundings alone can make an assumption true."""
@@ -373,60 +432,96 @@ class StrategySynthesis:
             place: Number of the assumption.
             near: Positions from which the surroundings alone can make it true.
         """
-        staying, progress = approach.waiting[place], approach.progress
-        interruption = self._aims[number].interruption
+        everywhere, interruption = approach.waiting[place], self._aims[number].interruption
+        calm = everywhere if interruption is None else everywhere & ~self.arena.condition(interruption)
+        # Luck, and then interruptions, are waited for only where nothing else helps.
+        ways = [(calm & ~approach.progress, near), (calm, near | approach.progress)]
         if interruption is not None:
-            progress = progress & ~self.arena.condition(interruption)
-        found, before = staying & (near | progress), None
-        while found != before:
-            before = found
-            closer = staying & self.arena.responses(found) & ~found
-            if closer != self._manager.false:
-                found = found | closer
-                continue
-            for event in self._requests:
-                helped = staying & ~found & self.arena.choice(event, before)
-                if helped != self._manager.false:
-                    yield event, helped
-                    found = found | helped
+            ways.append((everywhere, near))
+        found = self._manager.false
+        for staying, wanted in ways:
+            found, before = found | (staying & wanted), None
+            while found != before:
+                before = found
+                closer = staying & self.arena.responses(found) & ~found
+                if closer != self._manager.false:
+                    found = found | closer
+                    continue
+                for event in self._requests:
+                    helped = staying & ~found & self.arena.choice(event, before)
+                    if helped != self._manager.false:
+                        yield event, helped
+                        found = found | helped
 
-    def _mode(
-        self, solution: Solution, number: int, simplifier: Simplifier, met: Any, near: Mapping[int, Any]
-    ) -> tuple[Choice, ...]:
-        """Return the requests that approach a goal, in order, each with the condition for choosing it.
+    def _mode(self, solution: Solution, number: int, near: Mapping[int, Any]) -> ModeGame:
+        """Return the mode that approaches a goal.
 
         Args:
             solution: The solution.
             number: Number of the goal.
-            simplifier: Simplifier of the conditions.
-            met: Positions that can be met.
             near: For each assumption that the robot may keep from coming true, the positions from which the
                 surroundings alone can make it true.
         """
-        chosen: dict[str, Any] = {}
+        chosen: Requests = {}
+        nearer: Requests = {}
         decided = self.goals[number]
         for approach in solution.approaches[number]:
             here = approach.positions & ~approach.nearer
-            for target, event in product(approach.onwards, self._requests):
+            # The first half of several parts is that without interruptions.
+            calm = max(1, len(approach.onwards) // 2)
+            for (place, target), event in product(enumerate(approach.onwards), self._requests):
                 found = here & ~decided & self.arena.choice(event, target)
                 if found != self._manager.false:
                     chosen[event] = chosen.get(event, self._manager.false) | found
                     decided = decided | found
+                    if place < calm:
+                        nearer[event] = nearer.get(event, self._manager.false) | found
             for place, positions in near.items():
                 for event, helped in self._helping(approach, number, place, positions):
                     found = here & ~decided & helped
                     chosen[event] = chosen.get(event, self._manager.false) | found
                     decided = decided | found
-        care = solution.winning & met & ~self.goals[number]
+                # An assumption that is waited for is waited for until it comes, or progress is made.
+                here = here & ~approach.waiting[place]
+        interruption = self._aims[number].interruption
+        interrupted = self.false if interruption is None else self.arena.condition(interruption)
+        return ModeGame(self.goals[number], interrupted, solution.approaches[number], chosen, nearer)
+
+    def _choices(
+        self, chosen: Requests, care: Any, simplifier: Simplifier, *, is_meanwhile: bool = False
+    ) -> tuple[tuple[Choice, ...], Any]:
+        """Return requests, in order, each with the condition for choosing it, and the positions left.
+
+        Args:
+            chosen: For each request the positions in which it is chosen.
+            care: Positions that count.
+            simplifier: Simplifier of the conditions.
+            is_meanwhile: True for requests that a mode takes along for others.
+        """
         choices: list[Choice] = []
         for event in self._requests:
             if event in chosen and chosen[event] & care != self._manager.false:
                 condition = simplifier.condition(chosen[event], care)
                 if condition is None:
                     condition = extract(self._encoding, self._manager.true)
-                choices.append(Choice(event, condition))
+                choices.append(Choice(event, condition, is_meanwhile))
                 care = care & ~chosen[event]
-        return tuple(choices)
+        return tuple(choices), care
+
+
+def _fewest(items: Iterable[int], is_enough: Callable[[list[int]], bool]) -> tuple[int, ...]:
+    """Return items that are enough, of which none can be left out; later ones are left out first.
+
+    Args:
+        items: Items that are enough together.
+        is_enough: Function that decides whether some are.
+    """
+    kept = list(items)
+    for item in reversed(list(kept)):
+        fewer = [number for number in kept if number != item]
+        if fewer and is_enough(fewer):
+            kept = fewer
+    return tuple(kept)
 
 
 def _without(solution: Solution, place: int) -> Solution:

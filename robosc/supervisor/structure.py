@@ -60,16 +60,18 @@ class AddedCondition(msgspec.Struct, frozen=True):
     condition: DecisionDiagram
 
 
-class Choice(msgspec.Struct, frozen=True):
+class Choice(msgspec.Struct, frozen=True, omit_defaults=True):
     """Condition for choosing a request.
 
     Attributes:
         event: The request's event.
         condition: Condition over the state and the memory of goals.
+        is_meanwhile: True if it is for other goals, while the goal of its mode waits for the surroundings.
     """
 
     event: Annotated[str, msgspec.Meta(max_length=511)]
     condition: DecisionDiagram
+    is_meanwhile: bool = False
 
 
 class Strategy(msgspec.Struct, frozen=True):
@@ -77,7 +79,8 @@ class Strategy(msgspec.Struct, frozen=True):
 
     Attributes:
         modes: For each goal of the model, in its order, then for each visit of its missions, the choices that approach
-            it: the first whose condition is true, else none. Once it is reached, the next one in turn is approached.
+            it, then those that are taken along for others meanwhile: the first whose condition is true, else none. Once
+            it is reached, the next one in turn is approached.
     """
 
     modes: tuple[tuple[Choice, ...], ...]

@@ -545,14 +545,16 @@ def _validate_strategy(supervisor: Supervisor) -> None:
     requests = set(supervisor.executable.requests)
     domains = diagram_domains(supervisor.executable.remembering_automata)
     for number, mode in enumerate(strategy.modes, start=1):
-        seen: set[str] = set()
-        for item in mode:
+        seen: set[tuple[str, bool]] = set()
+        for item, before in zip(mode, (None, *mode), strict=False):
             with _at(f"mode {number} of the strategy"):
                 if item.event not in requests:
                     raise InvalidSupervisorError(f"there is no request {item.event[:80]!a}")
-                if item.event in seen:
+                if before is not None and before.is_meanwhile and not item.is_meanwhile:
+                    raise InvalidSupervisorError("what is requested meanwhile, for other goals, stands last")
+                if (item.event, item.is_meanwhile) in seen:
                     raise InvalidSupervisorError(f"{item.event} stands twice")
-                seen.add(item.event)
+                seen.add((item.event, item.is_meanwhile))
                 validate_condition(item.condition, domains)
 
 

@@ -9,11 +9,11 @@ from typing import Any
 import grpc.aio
 from grpc_health.v1 import health as health_names
 from grpc_health.v1 import health_pb2_grpc
-from grpc_reflection.v1alpha import reflection
+from grpc_reflection.v1alpha import reflection, reflection_pb2_grpc
 
 from robosc import __version__
 from robosc_api.connection_watch import Arrivals, ConnectionLimits, ConnectionWatch
-from robosc_api.layers import Layers
+from robosc_api.layers import LayeredServices
 from robosc_api.malformed import MalformedRequests
 from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts
 from robosc_api.security import Guard, Rule, Scope, SecurityError, TokenFile, add_port, caller_of, token_or_host_of
@@ -72,7 +72,7 @@ _UNREAD_RESULTS = 8
 """Unread results of maximum size that the server holds in memory."""
 
 _REFUSED_CALLS = 1000
-"""Calls that can be refused with a reason at the same time; beyond them gRPC refuses without a reason or log line."""
+"""Calls that can be refused and logged at the same time; those beyond them are refused without a log line."""
 
 _IDLE_S = 120.0
 """Time after which a connection without calls is closed; clients reconnect by themselves."""
@@ -157,11 +157,16 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         JOB_SERVICE_NAME, health_names.SERVICE_NAME, reflection.SERVICE_NAME, limit=QUICK_BYTES
     )
     connections = usable_connections(settings.connections, settings.worker_processes)
-    server = grpc.aio.server(
-        interceptors=[Layers(calls, guard, open_calls, prompt, arrivals, malformed)],
-        options=_options(settings, request_limits.submission_bytes, connections),
-        maximum_concurrent_rpcs=settings.open_calls + 2 * HEALTH_CALLS + _REFUSED_CALLS,
+    layered = LayeredServices(
+        calls,
+        guard,
+        open_calls,
+        prompt,
+        arrivals,
+        malformed,
+        most_calls=settings.open_calls + 2 * HEALTH_CALLS + _REFUSED_CALLS,
     )
+    server = grpc.aio.server(None, (layered,), options=_options(settings, request_limits.submission_bytes, connections))
     address = add_port(server, settings.address, settings.security)
     stack.push_async_callback(stop, server)
     store = await asyncio.to_thread(open_store, settings.state_dir, settings.database_url)
@@ -214,11 +219,12 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         keys=keys,
     )
 
-    server.add_generic_rpc_handlers((synthesis.handler(),))
-    add_job_service(jobs, server)
+    layered.add_generic_rpc_handlers((synthesis.handler(),))
+    add_job_service(jobs, layered)
     health = Health({SERVICE_NAME: ("workers",), JOB_SERVICE_NAME: ("store", "workers")})
-    health_pb2_grpc.add_HealthServicer_to_server(health, server)
-    reflection.enable_server_reflection((*services, health_names.SERVICE_NAME, reflection.SERVICE_NAME), server)
+    health_pb2_grpc.add_HealthServicer_to_server(health, layered)
+    reflected = reflection.aio.ReflectionServicer((*services, health_names.SERVICE_NAME, reflection.SERVICE_NAME))
+    reflection_pb2_grpc.add_ServerReflectionServicer_to_server(reflected, layered)
     metrics.set_sources(
         waiting=lambda: scheduler.waiting,
         running=lambda: scheduler.running,

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import AsyncIterable, Callable
 from typing import Any
 
+from robosc_api.calls import call_under_way
 from robosc_api.security import caller_of
 from robosc_server.tasks.task import Reason, RefusedError
 
@@ -45,23 +46,33 @@ class ResultSender:
         Raises:
             RefusedError: Too many bytes that were sent before are not read yet.
         """
-        read: Callable[[], None] = _do_nothing
+        # The last message, and the one before it until gRPC accepts the last.
+        unread: list[Callable[[], None]] = []
+        call_under_way().at_end.append(lambda: _call_each(unread))
         async for message in messages:
-            is_read = self.reserve(context, (message,))
+            unread.append(self._count(context, (message,)))
             await context.write(message)
             # gRPC accepts a message once it has sent the one before.
-            read()
-            read = is_read
+            _call_each(unread[:-1])
+            del unread[:-1]
 
-    def reserve(self, context: Any, messages: tuple[bytes, ...]) -> Callable[[], None]:
+    def reserve(self, context: Any, messages: tuple[bytes, ...]) -> None:
         """Count a result until its call is over; it may have to wait before it can be sent.
 
         Args:
-            context: Context of the call (of grpc.aio).
+            context: Context of the call (of grpc.aio), whose handler runs.
             messages: Serialized messages of the result.
 
-        Returns:
-            Function to call if it becomes known earlier that the result has been read.
+        Raises:
+            RefusedError: Too many bytes that were sent before are not read yet.
+        """
+        forget = self._count(context, messages)
+        if forget is not _do_nothing:
+            # The call must have ended for gRPC, too: a handler that has ended has only handed its messages over.
+            call_under_way().at_end.append(forget)
+
+    def _count(self, context: Any, messages: tuple[bytes, ...]) -> Callable[[], None]:
+        """Count messages, and return the function to call once when they are read, or never will be.
 
         Raises:
             RefusedError: Too many bytes that were sent before are not read yet.
@@ -80,20 +91,19 @@ class ResultSender:
                 Reason.SERVER_BUSY, "too many results of other callers are still unread; try again later", _RETRY_S
             )
         self._unread[caller] += size
-        is_held = True
 
-        def forget(_: Any = None) -> None:
-            nonlocal is_held
-            if is_held:
-                is_held = False
-                self._unread[caller] -= size
-                if not self._unread[caller]:
-                    del self._unread[caller]
+        def forget() -> None:
+            self._unread[caller] -= size
+            if not self._unread[caller]:
+                del self._unread[caller]
 
-        # The call must have ended for gRPC, too: a handler that has ended has only handed its messages over.
-        context.add_done_callback(forget)
         return forget
 
 
 def _do_nothing() -> None:
     """Do nothing."""
+
+
+def _call_each(functions: list[Callable[[], None]]) -> None:
+    for function in functions:
+        function()

@@ -1,11 +1,24 @@
 """Distinction between callers."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import pytest
 
-from robosc_api.security import ENTRY, Entry, Scope, caller_of, is_admin, network_of
-from robosc_api.security.callers import CALLER, host_of
+from robosc_api.calls import CALL, Call
+from robosc_api.security import Entry, Scope, caller_of, is_admin, network_of
+from robosc_api.security.callers import host_of
+
+
+@contextmanager
+def under_way(call: Call) -> Iterator[Call]:
+    """A call under way; yields it."""
+    token = CALL.set(call)
+    try:
+        yield call
+    finally:
+        CALL.reset(token)
 
 
 class Context:
@@ -37,21 +50,17 @@ def test_the_host_of_a_peer(peer: str, host: str) -> None:
 def test_a_token_goes_before_a_certificate_and_that_before_a_host() -> None:
     assert caller_of(Context("ipv4:192.0.2.1:4711")) == "192.0.2.1"
     assert caller_of(Context("ipv4:192.0.2.1:4711", b"laptop")) == "laptop"
-    token = CALLER.set("named")
-    try:
+    with under_way(Call()) as call:
+        call.caller = "named"
         assert caller_of(Context("ipv4:192.0.2.1:4711", b"laptop")) == "named"
-    finally:
-        CALLER.reset(token)
 
 
 def test_only_a_token_of_that_scope_makes_an_admin() -> None:
     assert not is_admin()
     for scopes, expected in (({Scope.SYNTHESIZE}, False), ({Scope.ADMIN}, True)):
-        token = ENTRY.set(Entry("a", frozenset(scopes), "0" * 64))
-        try:
+        with under_way(Call()) as call:
+            call.entry = Entry("a", frozenset(scopes), "0" * 64)
             assert is_admin() is expected
-        finally:
-            ENTRY.reset(token)
 
 
 @pytest.mark.parametrize(

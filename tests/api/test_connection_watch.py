@@ -17,12 +17,13 @@ from robosc_api.connection_watch import (
     ConnectionLimits,
     ConnectionWatch,
     Ledger,
+    LookPace,
     Peer,
     Traffic,
     address_of,
     can_watch,
 )
-from robosc_api.layers import Layer, Layers, behaviour_of, with_behaviour
+from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.request_timeouts import RequestTimeouts
 from support.floods import MOST_BYTES, endless_headers, resets
 from support.small_server import SERVICE, call, small_server
@@ -121,7 +122,7 @@ def test_too_many_connections_cost_the_host_with_the_most_those_that_are_not_use
     assert set(closed) <= set(many[2:])
 
 
-KIB = 2**10
+KIB, MIB = 2**10, 2**20
 REFUSED = 64 * KIB
 """Bytes that arrive of a request that is refused for its size, as measured."""
 
@@ -208,10 +209,10 @@ async def watched_server(arrivals: Arrivals, *outer: Layer) -> AsyncIterator[tup
     def listen(server: grpc.aio.Server) -> None:
         ports.append(server.add_insecure_port("127.0.0.1:0"))
 
-    layers = Layers(*outer, RequestTimeouts(PATIENCE_S), arrivals)
+    layers = (*outer, RequestTimeouts(PATIENCE_S), arrivals)
     options = [("grpc.max_receive_message_length", LARGEST_BYTES), ("grpc.http2.bdp_probe", 0)]
     async with (
-        small_server(interceptors=[layers], unary=answer, setup=listen, options=options),
+        small_server(layers=layers, unary=answer, listen=listen, options=options),
         grpc.aio.insecure_channel(f"127.0.0.1:{ports[0]}") as channel,
     ):
         yield channel, ports[0]
@@ -317,6 +318,39 @@ def test_open_calls_keep_their_connection() -> None:
     asyncio.run(watched())
 
 
+def test_looks_are_seldom_while_the_process_is_calm() -> None:
+    pace = LookPace(0.02)
+    assert pace.is_due(100.0, 50 * MIB, 3.0, is_alert=False)
+    pace.looked(0.001, 3.001)
+    assert not pace.is_due(101.9, 50 * MIB, 3.01, is_alert=False)
+    assert pace.is_due(102.1, 50 * MIB, 3.01, is_alert=False)
+    pace.looked(0.001, 3.011)
+    # The next one comes soon when the process has worked, but not at once.
+    assert not pace.is_due(102.15, 50 * MIB, 3.05, is_alert=False)
+    assert pace.is_due(102.25, 50 * MIB, 3.05, is_alert=False)
+
+
+def test_looks_are_made_at_once_when_memory_grows_or_a_host_is_suspect() -> None:
+    pace = LookPace(0.02)
+    assert pace.is_due(100.0, 50 * MIB, 3.0, is_alert=False)
+    pace.looked(0.001, 3.001)
+    assert not pace.is_due(100.06, 65 * MIB, 3.001, is_alert=False)
+    assert pace.is_due(100.06, 66 * MIB, 3.001, is_alert=False)
+    pace.looked(0.001, 3.002)
+    assert not pace.is_due(100.12, 67 * MIB, 3.002, is_alert=False)
+    assert pace.is_due(100.12, 67 * MIB, 3.002, is_alert=True)
+
+
+def test_looks_take_a_share_of_a_core_however_much_there_is_to_look_at() -> None:
+    pace = LookPace(0.02)
+    for is_alert in (False, True):
+        assert pace.is_due(100.0, 50 * MIB, 3.0, is_alert=is_alert)
+        pace.looked(0.1, 3.1)
+        assert not pace.is_due(104.9, 50 * MIB, 5.0, is_alert=is_alert)
+        assert pace.is_due(105.1, 50 * MIB, 5.0, is_alert=is_alert)
+        pace = LookPace(0.02)
+
+
 @needs_counts
 def test_failures_of_the_watch_are_logged_now_and_then(
     monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
@@ -326,7 +360,7 @@ def test_failures_of_the_watch_are_logged_now_and_then(
 
     def failing(watch: ConnectionWatch) -> None:
         # The next look is due, and after the fourth one the next line.
-        now_s.append(now_s[-1] + (10.0 if len(now_s) == 5 else 0.2))
+        now_s.append(now_s[-1] + (10.0 if len(now_s) == 5 else 2.1))
         looks.release()
         raise RuntimeError("broken")
 

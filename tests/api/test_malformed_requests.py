@@ -6,6 +6,7 @@ from typing import Any
 import grpc
 from grpc_health.v1 import health_pb2
 
+from robosc_api.layers import LayeredServices
 from robosc_api.malformed import MalformedRequests
 from support.small_server import SERVICE, call, small_server
 from support.waiting import PATIENCE_S
@@ -30,18 +31,18 @@ async def raw(request: bytes, context: Any) -> bytes:
     return request
 
 
-def with_messages(server: grpc.aio.Server) -> None:
+def with_messages(services: LayeredServices) -> None:
     handlers: dict[str, Any] = {
         "Unary": grpc.unary_unary_rpc_method_handler(echo, Message.FromString),
         "Generator": grpc.unary_stream_rpc_method_handler(generator, Message.FromString),
         "Writer": grpc.unary_stream_rpc_method_handler(writer, Message.FromString),
     }
-    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Messages", handlers),))
+    services.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Messages", handlers),))
 
 
 async def test_they_are_refused_with_a_reason_and_messages_are_not() -> None:
     checked = MalformedRequests("test.Messages", SERVICE)
-    async with small_server(interceptors=[checked], unary=raw, setup=with_messages) as (channel, _):
+    async with small_server(layers=[checked], unary=raw, setup=with_messages) as (channel, _):
         # Methods that take bytes look at them themselves.
         assert (await call(channel, WRONG)).answer == WRONG
         right = Message(service="name").SerializeToString()

@@ -8,6 +8,7 @@ from typing import Any
 import grpc
 import pytest
 
+from robosc_api.layers import LayeredServices
 from robosc_api.request_timeouts import RequestTimeouts
 from support.held_time import HeldLoop
 from support.small_server import SERVICE, call, small_server
@@ -40,7 +41,7 @@ async def collect(requests: AsyncIterator[bytes], context: Any) -> bytes:
     return b"".join([request async for request in requests])
 
 
-def with_all_kinds(server: grpc.aio.Server) -> None:
+def with_all_kinds(services: LayeredServices) -> None:
     handlers: dict[str, Any] = {
         "Unary": grpc.unary_unary_rpc_method_handler(answer),
         "Generator": grpc.unary_stream_rpc_method_handler(generator),
@@ -48,7 +49,7 @@ def with_all_kinds(server: grpc.aio.Server) -> None:
         "Both": grpc.stream_stream_rpc_method_handler(echo),
         "Collect": grpc.stream_unary_rpc_method_handler(collect),
     }
-    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Kinds", handlers),))
+    services.add_generic_rpc_handlers((grpc.method_handlers_generic_handler("test.Kinds", handlers),))
 
 
 def silent(channel: Any, name: str) -> Any:
@@ -75,7 +76,7 @@ async def refusal(made: Any) -> tuple[Any, str]:
 @pytest.mark.parametrize("name", ["Unary", "Generator", "Writer"])
 async def test_a_request_comes_in_time_or_the_call_ends(name: str, loop: HeldLoop) -> None:
     timeouts = RequestTimeouts(LIMIT_S)
-    async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
+    async with small_server(layers=[timeouts], setup=with_all_kinds) as (channel, _):
         made = [silent(channel, name) for _ in range(3)]
         await until(lambda: waits(timeouts) == 3)
         await loop.passed(LIMIT_S / 2)
@@ -94,7 +95,7 @@ async def test_a_request_comes_in_time_or_the_call_ends(name: str, loop: HeldLoo
 
 @pytest.mark.parametrize("name", ["Unary", "Writer"])
 async def test_an_end_without_a_request_is_reported_at_once(name: str) -> None:
-    async with small_server(interceptors=[RequestTimeouts(LONG_S)], setup=with_all_kinds) as (channel, _):
+    async with small_server(layers=[RequestTimeouts(LONG_S)], setup=with_all_kinds) as (channel, _):
         made = silent(channel, name)
         await made.done_writing()
         assert (await refusal(made))[0] is grpc.StatusCode.INVALID_ARGUMENT
@@ -108,7 +109,7 @@ async def test_a_stream_of_requests_goes_on_as_long_as_they_come(name: str, loop
         ((LONG_S, LIMIT_S), "each further one within 0.25"),
     ):
         timeouts = RequestTimeouts(limits[0], {path: limits[1]})
-        async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
+        async with small_server(layers=[timeouts], setup=with_all_kinds) as (channel, _):
             made = silent(channel, name)
             if limits[0] == LONG_S:
                 for text in (b"a", b"b"):
@@ -128,7 +129,7 @@ async def test_a_stream_of_requests_goes_on_as_long_as_they_come(name: str, loop
 
 async def test_streams_that_nothing_is_said_of_are_left_alone(loop: HeldLoop) -> None:
     timeouts = RequestTimeouts(LIMIT_S)
-    async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
+    async with small_server(layers=[timeouts], setup=with_all_kinds) as (channel, _):
         quiet, other = silent(channel, "Both"), silent(channel, "Unary")
         await until(lambda: waits(timeouts) == 1)
         await loop.passed(LIMIT_S)
@@ -153,7 +154,7 @@ async def test_the_wait_is_for_the_request_alone(loop: HeldLoop) -> None:
         return request
 
     timeouts = RequestTimeouts(LIMIT_S)
-    async with small_server(interceptors=[timeouts], unary=slow) as (channel, _):
+    async with small_server(layers=[timeouts], unary=slow) as (channel, _):
         made: Any = channel.unary_unary(f"/{SERVICE}/Unary")
         stays, goes = made(b"stays", timeout=PATIENCE_S), made(b"goes", timeout=PATIENCE_S)
         late: Any = channel.stream_unary(f"/{SERVICE}/Unary")(timeout=PATIENCE_S)
@@ -185,7 +186,7 @@ async def test_who_cancels_at_the_same_moment_is_obeyed() -> None:
 
 async def test_those_that_begin_while_others_wait_are_looked_for_later(loop: HeldLoop) -> None:
     timeouts = RequestTimeouts(LIMIT_S)
-    async with small_server(interceptors=[timeouts], setup=with_all_kinds) as (channel, _):
+    async with small_server(layers=[timeouts], setup=with_all_kinds) as (channel, _):
         made = []
         for number in range(1, 4):
             made.append(silent(channel, "Unary"))

@@ -1,6 +1,7 @@
 """Tokens that expire, and the commands that keep a token file."""
 
 import argparse
+import hmac
 import json
 import logging
 import os
@@ -15,7 +16,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc_api.security import Quota, Scope, SecurityError, TokenFile, add_tokens_arguments, make_token, run_tokens
-from robosc_api.security.tokens import SOON_S, Entry, parse_tokens, read_time, time_text
+from robosc_api.security.tokens import SOON_S, Entry, TokenIndex, parse_tokens, read_time, time_text
 from support.waiting import PATIENCE_S
 
 DAY_S = 86400
@@ -151,6 +152,87 @@ def test_a_line_says_all_of_a_token(entry: Entry) -> None:
     assert parse_tokens(f"{entry}  # comment", "") == (entry,)
     if entry.expires_s is not None:
         assert read_time(time_text(entry.expires_s)) == entry.expires_s
+
+
+@given(st.lists(ENTRIES, max_size=12, unique_by=lambda entry: entry.digest))
+def test_an_index_finds_what_going_through_all_tokens_finds(entries: list[Entry]) -> None:
+    index = TokenIndex(entries)
+    for entry in entries:
+        assert index.find(entry.digest) is entry
+        assert index.named(entry.name) is next(other for other in entries if other.name == entry.name)
+        assert index.is_replaced(entry) == any(replaces(other, entry) for other in entries)
+    expiring = [entry for entry in entries if entry.expires_s is not None and not index.is_replaced(entry)]
+    assert list(index.unreplaced) == sorted(expiring, key=lambda entry: entry.expires_s or 0)
+    for scope in Scope:
+        for now_s in {0, *(entry.expires_s for entry in entries if entry.expires_s is not None)}:
+            is_valid = any(scope in entry.scopes and entry.is_valid(now_s) for entry in entries)
+            assert (now_s < index.last_s(scope)) == is_valid
+    assert index.find("0" * 63) is index.named("") is None
+
+
+def replaces(other: Entry, entry: Entry) -> bool:
+    """True if a token replaces another one."""
+    is_longer = entry.expires_s is not None and other.is_valid(entry.expires_s)
+    return is_longer and other.name == entry.name and other.scopes >= entry.scopes
+
+
+MANY = 10_000
+
+
+@pytest.mark.parametrize("owners", [1, MANY])
+def test_a_token_takes_as_many_steps_among_ten_thousand_as_among_two(
+    owners: int, file: Path, clock: Clock, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    comparisons = 0
+
+    def compare(one: str, other: str) -> bool:
+        nonlocal comparisons
+        comparisons += 1
+        return one == other
+
+    monkeypatch.setattr(hmac, "compare_digest", compare)
+    found: dict[int, list[int]] = {}
+    for count in (2, MANY):
+        made = [
+            make_token(f"caller{number % owners}", (Scope.SYNTHESIZE,), expires_s=NOW_S + DAY_S + number)
+            for number in range(count)
+        ]
+        write(file, *(line for _, line in made))
+        tokens = tokens_of(file, clock)
+        expired, stays = made[0][0], made[-1][0]
+        assert {tokens.find(token) is not None for token, _ in made} == {True}
+        comparisons = 0
+        steps = []
+        for seconds in (0.0, 1.0):
+            # After a second, it is checked whether the file has changed and what expires.
+            clock.now_s += seconds
+            steps += [lines_of(tokens.find, stays), lines_of(tokens.find, "robosc_unknown")]
+            steps += [lines_of(tokens.named, f"caller{(count - 1) % owners}"), lines_of(tokens.named, "nobody")]
+        assert comparisons == 2
+        clock.now_s = float(NOW_S + DAY_S)
+        assert tokens.find(expired) is None and tokens.find_expired(expired) is not None
+        assert tokens.find(stays) is not None
+        found[count] = steps
+        clock.now_s = float(NOW_S)
+    assert found[2] == found[MANY]
+
+
+def lines_of(function: Callable[..., Any], *arguments: Any) -> int:
+    """Return the number of lines of Python that a call takes."""
+    count = 0
+
+    def traced(frame: Any, event: str, argument: Any) -> Any:
+        nonlocal count
+        count += event == "line"
+        return traced
+
+    before = sys.gettrace()
+    sys.settrace(traced)
+    try:
+        function(*arguments)
+    finally:
+        sys.settrace(before)
+    return count
 
 
 def test_rotation_overlaps(run: Run, file: Path, clock: Clock) -> None:

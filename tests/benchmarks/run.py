@@ -3,8 +3,8 @@
 Usage: run.py [NAME...]                       (all of them without an argument)
        run.py cif DIR [--against FILE]    (a folder of CIF models: see cif.py)
 
-Names: cold-start, conditions, editor, execution, goals, gr1, language, strategies, synthesis; of the service:
-service-load, call-cpu, isolation, task-cpu; of the bridge: decoders, drive-bases, live-view, live-view-pixels,
+Names: cold-start, conditions, editor, execution, goal-checks, goals, gr1, language, strategies, synthesis; of the
+service: service-load, call-cpu, isolation, task-cpu; of the bridge: decoders, drive-bases, live-view, live-view-pixels,
 loop-period, maze, reaction, endurance, shipped, twin.
 """
 
@@ -31,6 +31,7 @@ import cold_start
 import conditions
 import editor
 import execution
+import goal_checks
 import goals
 import gr1
 import language
@@ -47,6 +48,7 @@ TABLES: dict[str, Callable[[], str]] = {
     "editor": editor.table,
     "endurance": endurance.table,
     "execution": execution.table,
+    "goal-checks": goal_checks.table,
     "goals": goals.table,
     "gr1": gr1.table,
     "isolation": isolation.table,

@@ -31,10 +31,12 @@ from support.generated import load_module, loaded_file
 from support.goal_porter import porter_supervisor
 from support.missions import strategic
 from support.models import model_of
+from support.page_courier import messages, page_courier_supervisor
 from support.random_controllers import random_controller, random_robot
 from support.random_couriers import strategic_courier
 from support.random_goals import strategic_controller
 from support.random_supervisors import CERTIFICATE, random_supervisor
+from support.random_waiting import strategic_waiting
 from support.rounds import long_detour_supervisor
 
 ROBOTS = sorted(WORLDS)
@@ -143,18 +145,33 @@ def _strategic(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
 
 
 def _couriers(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
-    """Yield a robot with a detour of two visits, and random ones with missions, each with a run under its strategy."""
+    """Yield robots with detours, and random ones with missions, each with a run under its strategy."""
     yield long_detour_supervisor(), random_scenario(long_detour_supervisor(), first, 200)
+    answered = [item for message in messages(first, 100) for item in (message, Action("tick"))]
+    yield page_courier_supervisor(), Scenario(tuple(answered), {"assumption_timeout_s": 0.5})
     for seed in range(first, first + 60):
         supervisor = strategic_courier(seed)
         if supervisor is not None:
             yield supervisor, random_scenario(supervisor, seed, 80)
 
 
+def _waiting(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
+    """Yield random robots that do something for other goals while they wait, each with a run under its strategy."""
+    for seed in range(first, first + 60):
+        supervisor = strategic_waiting(seed)
+        modes = () if supervisor is None or supervisor.strategy is None else supervisor.strategy.modes
+        if supervisor is not None and any(item.is_meanwhile for mode in modes for item in mode):
+            yield supervisor, random_scenario(supervisor, seed, 80)
+
+
 # Assumptions of the couriers that were reported as owed are rarely met again.
 @pytest.mark.parametrize(
     ("robots", "least", "kinds"),
-    [(_strategic, 50, ("reached", "approach", "owed", "met")), (_couriers, 300, ("reached", "approach", "owed"))],
+    [
+        (_strategic, 50, ("reached", "approach", "owed", "met")),
+        (_couriers, 300, ("reached", "approach", "owed")),
+        (_waiting, 300, ("reached", "approach", "owed")),
+    ],
 )
 def test_strategies_in_python(
     robots: Callable[[int], Iterator[tuple[Supervisor, Scenario]]], least: int, kinds: tuple[str, ...]
@@ -171,7 +188,9 @@ def test_strategies_in_python(
 @needs_gcc
 def test_strategies_in_c(tmp_path: Path) -> None:
     requests, logged = 0, Counter[str]()
-    for number, (supervisor, scenario) in enumerate((*islice(_strategic(1_500), 4), *islice(_couriers(60), 6))):
+    for number, (supervisor, scenario) in enumerate(
+        (*islice(_strategic(1_500), 4), *islice(_couriers(60), 7), *islice(_waiting(0), 3))
+    ):
         expected = observe(supervisor, scenario)
         # Some with sanitizers, which take the compiler three times as long.
         options = () if number % 4 == 0 else ("-O0",)
@@ -233,6 +252,57 @@ def test_a_long_mission_in_python() -> None:
 @needs_gcc
 def test_a_long_mission_in_c(tmp_path: Path) -> None:
     supervisor, scenario, expected = _run_of_a_tour()
+    compare(C99Target(supervisor, tmp_path), scenario, expected)
+
+
+_ERRANDS = """robot Errands {
+    datatype enum Charge from integer to { value < 2 -> low default -> enough }
+    component Base {
+        incoming message go with identifier: "/go", type: none
+        incoming message back with identifier: "/back", type: none
+        outgoing message arrived with identifier: "/arrived", type: none
+        behaviour {
+            variable trips: integer(0..3)
+            initial marked state here { on request to go goto leaving }
+            state leaving { on response from arrived do trips := if trips < 3 then trips + 1 else 0 goto there }
+            marked state there { on request to back goto returning }
+            state returning { on response from arrived goto here }
+        }
+    }
+    component Battery {
+        outgoing message battery with identifier: "/battery", type: Charge
+        outgoing message plugged with identifier: "/plugged", type: boolean
+        behaviour {
+            variable charge: Charge = enough
+            variable is_plugged: boolean
+            on response from battery do charge := value
+            on response from plugged do is_plugged := value
+            initial marked state watched { }
+        }
+    }
+    goal once Base.there
+    goal once Base.trips = 2 and Battery.charge = low
+    goal always eventually Base.here or Base.trips = 1
+    goal Battery.is_plugged leads to Base.there
+    goal Base.trips > 1 or Battery.charge = low leads to Base.here
+    assume always eventually Battery.charge = enough
+    assume always eventually Battery.charge = low
+    assume Base.leaving leads to Base.there
+    assume Base.returning leads to Base.here
+}"""
+
+
+@needs_gcc
+def test_goals_of_all_forms_in_c(tmp_path: Path) -> None:
+    """Conditions on one location, one enum, a truth value, a number, and several of them."""
+    supervisor = strategic(model_of(_ERRANDS))
+    scenario = random_scenario(supervisor, 7, 250)
+    expected = observe(supervisor, scenario)
+    lines = [line for item in expected for line in item.log]
+    reached = Counter(line["aim"] for line in lines if line["kind"] == "reached")
+    assert set(reached) >= {f"goal {number}" for number in range(1, 6)}, reached
+    # A goal that was reached once stays so until a restart.
+    assert reached["goal 1"] <= 1 + sum(line["kind"] == "restart" for line in lines) < reached["goal 5"]
     compare(C99Target(supervisor, tmp_path), scenario, expected)
 
 

@@ -12,7 +12,6 @@ from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import PLANT_LOCATIONS, communication_plant_name
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.clock import ManualClock
-from robosc.execution.runtime.decision import AnyRequest
 from robosc.execution.runtime.executor import Executor
 from robosc.execution.runtime.protocol import DataDoesNotFit
 from robosc.execution.runtime.runner import Status
@@ -70,7 +69,7 @@ def built(supervisor: Supervisor, program: str, folder: Path, *options: str) -> 
     return folder / "test"
 
 
-class Splitmix(AnyRequest):
+class Splitmix:
     """The policy `random` of generated C."""
 
     def __init__(self, seed: int) -> None:
@@ -405,7 +404,8 @@ class Reference:
 def settings_words(layout: Layout, settings: Settings) -> list[object]:
     """The command that makes generated code begin with settings, which are spelled out."""
     numbers = {name: number for number, name in enumerate(layout.communications)}
-    words: list[object] = ["n", POLICIES.index(settings.policy or "fair"), len(settings.priority)]
+    own = "fair" if layout.supervisor.strategy is None else "strategy"
+    words: list[object] = ["n", POLICIES.index(settings.policy or own), len(settings.priority)]
     words += [numbers[name] for name in settings.priority]
     words += [settings.seed, int(settings.every == "event")]
     words += [("default", "keep", "fault").index(settings.on_unknown)]

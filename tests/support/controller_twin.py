@@ -11,6 +11,7 @@ from typing import Any
 
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.protocol import Reading
+from robosc.execution.runtime.requests import PolicyDecisions
 from robosc.expressions.evaluate import evaluate
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
@@ -62,9 +63,6 @@ class _Wanted:
     def __init__(self, number: int) -> None:
         self._number = number
 
-    def candidates(self, enabled: Any) -> Any:
-        return enabled
-
     def choose(self, candidates: Any) -> int:
         assert self._number in candidates
         return self._number
@@ -112,7 +110,9 @@ class World:
         self.system.steps.clear()
         kind, name, *data = move
         if kind == "request":
-            self.executor._decisions.policy = _Wanted(self.executor._request_names.index(name))
+            decisions = self.executor._decisions
+            assert isinstance(decisions, PolicyDecisions)
+            decisions.policy = _Wanted(self.executor._request_names.index(name))
             self.executor.tick()
         elif kind == "message":
             self.executor.receive(name, data[0])

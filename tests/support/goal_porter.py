@@ -9,7 +9,7 @@ from robosc.supervisor import Supervisor
 from support.models import bundle_of
 
 PAGE = (Path(__file__).parents[2] / "docs" / "strategies.md").read_text(encoding="utf-8")
-LOOP, PORTER = re.findall(r"^```robosc file=\w+.rscd\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
+LOOP, PORTER, *_ = re.findall(r"^```robosc file=\w+.rscd\n(.*?)^```$", PAGE, flags=re.MULTILINE | re.DOTALL)
 
 
 @cache

@@ -6,8 +6,9 @@ W. Zielonka, "Infinite games on finitely coloured graphs with applications to au
 Computer Science 200(1-2), 1998, pp. 135-183.
 """
 
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from itertools import product
 from typing import Any
 
 from robosc.automata import ExecutableSystem
@@ -62,6 +63,8 @@ class _Visit:
     mission: MissionTwin
     is_done: Callable[[Mark, Any], bool]
     is_interrupted: Callable[[Mark, Any], bool] | None
+    is_own: bool
+    """True for a visit of the mission itself, False for one of a detour."""
 
     @property
     def start(self) -> Mark:
@@ -114,15 +117,16 @@ class Game:
         place = next((place for place, kept in enumerate((*self.assumptions, *self.goals)) if kept is item), None)
         return item.holds(False if place is None else marks[place], state)
 
-    def can_meet_again_and_again(self, goals: Iterable[int]) -> bool:
-        """Return True if both sides together can make goals true again and again."""
+    def can_meet_again_and_again(self, goals: Iterable[int], assumptions: Iterable[int] = ()) -> bool:
+        """Return True if both sides together can make goals and assumptions true again and again."""
+        items = [*(self.goals[item] for item in goals), *(self.assumptions[item] for item in assumptions)]
         following = {
             position: {*self.successors[position], *self.choices[position].values(), position} - {LOST}
             for position in self.choices
         }
         # Each position can be waited in: a turn at which a goal is true is a turn in its component.
         return any(
-            all(any(self.holds(position, self.goals[item]) for position in component) for item in goals)
+            all(any(self.holds(position, item) for position in component) for item in items)
             for component in components(list(following), following.__getitem__)
         )
 
@@ -180,9 +184,9 @@ def game_of(executable: ExecutableSystem, added: Iterable[AddedCondition], limit
     model = executable.model
     twins = [mission_twin(mission, test) for mission in model.missions]
     visits = [
-        _Visit(twin, is_done, is_interrupted)
+        _Visit(twin, is_done, is_interrupted, number < len(twin.visits))
         for twin in twins
-        for (_, is_done), is_interrupted in zip(twin.aims(), twin.interruptions(), strict=True)
+        for number, ((_, is_done), is_interrupted) in enumerate(zip(twin.aims(), twin.interruptions(), strict=True))
     ]
     game = Game(items(model.assumptions, "assumption"), [*items(model.goals, "goal"), *visits])
     everything = [*game.assumptions, *game.goals]
@@ -404,15 +408,31 @@ def components(vertices: list[Any], after: Callable[[Any], set[Any]]) -> Iterato
             yield component
 
 
-def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position, int], set[Position]]:
-    """Return the distance of each winning position from a goal, and those from which only interruptions help.
+@dataclass(frozen=True)
+class Distances:
+    """Distances of winning positions from a goal.
+
+    Attributes:
+        far: Distance of each position.
+        last_resort: Positions from which only interruptions help.
+        waited: For each distance, from 1 on, and each assumption, where a turn makes progress or waits for it.
+    """
+
+    far: dict[Position, int]
+    last_resort: set[Position]
+    waited: list[list[set[Position]]]
+
+
+def distances(game: Game, won: set[Position], goal: int) -> Distances:
+    """Return the distance of each winning position from a goal.
 
     A position has distance k + 1 where, for some assumption, the surroundings cannot prevent that each turn gets to
     distance k or less, or to the goal, or stays where that assumption fails. This is the definition, round by round:
     N. Piterman, A. Pnueli and Y. Sa'ar, "Synthesis of reactive(1) designs", VMCAI 2006, LNCS 3855, pp. 364-380.
 
     Of a visit no turn may lead to where it is interrupted, and no assumption counts that only comes true there, as long
-    as there are such positions.
+    as there are such positions. Before that, an assumption is waited for only where moves that stay there can lead to
+    where the surroundings alone can make it true. The robot may keep all of them from coming true.
 
     Args:
         game: The game.
@@ -423,6 +443,7 @@ def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position,
     calm = won if is_calm is None else set(filter(is_calm, won))
     found: dict[Position, int] = {}
     last_resort = set[Position]()
+    sets: list[list[set[Position]]] = []
 
     def turns(position: Position) -> set[Any]:
         return {position, *game.choices[position].values()}
@@ -435,13 +456,16 @@ def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position,
         while wider := {at for at in calm if (turns(at) | game.successors[at]) & hope} - hope:
             hope |= wider
         hopeful.append(failed & hope)
+    alone = [game.alone(owed) for owed in game.assumptions]
+    ways = [(failing, won)] if is_calm is None else [(hopeful, calm), (failing, won)]
     while True:
-        for waited, allowed in ((failing, won),) if is_calm is None else ((hopeful, calm), (failing, won)):
+        for is_earnest, (waited, allowed) in product((True, False) if alone else (False,), ways):
             onwards = found.keys() & allowed
             progress = {position for position in won if position in reached or turns(position) & onwards}
             near = set[Position]()
+            stayed: list[set[Position]] = []
             # The empty assumption is one that never fails.
-            for failed in waited or [set[Position]()]:
+            for number, failed in enumerate(waited or [set[Position]()]):
                 staying = set(won)
                 while True:
                     kept = {
@@ -450,14 +474,22 @@ def distances(game: Game, won: set[Position], goal: int) -> tuple[dict[Position,
                         if game.successors[position] <= staying
                         and (position in progress or (position in failed and turns(position) & staying))
                     }
+                    if is_earnest:
+                        inside = (kept & allowed) - progress
+                        led = inside & alone[number]
+                        while wider := {at for at in inside if (turns(at) | game.successors[at]) & led} - led:
+                            led |= wider
+                        kept -= inside - led
                     if kept == staying:
                         break
                     staying = kept
                 near |= staying
+                stayed.append(staying)
             if not near <= found.keys():
                 break
         else:
-            return found, last_resort
+            return Distances(found, last_resort, sets)
+        sets.append(stayed)
         fresh = near - found.keys()
         if is_calm is not None and waited is failing:
             last_resort |= fresh
@@ -472,26 +504,179 @@ def _is_calm(game: Game, goal: int) -> Callable[[Position], bool] | None:
     return None if is_interrupted is None else lambda position: not is_interrupted(position[1][number], position[0][0])
 
 
-def leading(
-    game: Game, far: dict[Position, int], last_resort: set[Position], position: Position, goal: int
-) -> set[str]:
+def leading(game: Game, known: Distances, position: Position, goal: int) -> set[str]:
     """Return the requests that a strategy may choose in a position, before it looks at preferences.
+
+    Where only interruptions help, what leads nearest is chosen, of what does not interrupt the visit, if there is any.
 
     Args:
         game: The game.
-        far: Distance of each position.
-        last_resort: Positions from which only interruptions help: there what leads nearest is chosen, of what does not
-            interrupt the visit, if there is any.
+        known: Distances from the goal.
         position: The position.
         goal: Number of the goal or visit.
     """
-    is_calm = _is_calm(game, goal)
+    is_calm, far = _is_calm(game, goal), known.far
     near = {name: end for name, end in game.choices[position].items() if far.get(end, 10**9) < far[position]}
     if is_calm is None:
         return set(near)
     calm = {name: end for name, end in near.items() if is_calm(end)}
-    if position not in last_resort:
+    if position not in known.last_resort:
         return set(calm)
     near = calm or near
     least = min((far[end] for end in near.values()), default=0)
     return {name for name, end in near.items() if far[end] == least}
+
+
+def taken_along(
+    game: Game, known: Sequence[Distances], allowed: Collection[int], own: Decide, position: Position, goal: int
+) -> str | None:
+    """Return the request for another goal that a strategy issues while it waits in a position.
+
+    Args:
+        game: The game.
+        known: Distances from each goal.
+        allowed: Numbers of the assumptions that the robot may keep from coming true.
+        own: Decisions of each mode for its own goal.
+        position: The position, in which the mode requests nothing for its own goal.
+        goal: Number of the goal that it waits for.
+    """
+
+    def distance(at: Any, number: int) -> int:
+        return 0 if game.holds(at, game.goals[number]) else known[number].far[at]
+
+    def is_calm(at: Any, number: int) -> bool:
+        calm = _is_calm(game, number)
+        return calm is None or calm(at)
+
+    waited = known[goal].waited[known[goal].far[position] - 1]
+    order = [*allowed, *(item for item in range(len(game.assumptions)) if item not in allowed)]
+    place = next(item for item in order if position in waited[item])
+    within = waited[place] & game.alone(game.assumptions[place]) if place in allowed else waited[place]
+    count = len(game.goals)
+    others = [(goal + step) % count for step in range(1, count)]
+    for number, other in enumerate(others):
+        if distance(position, other) == 0:
+            continue
+        event, _ = own(position, other)
+        target: Any = game.choices[position].get(event or "")
+        if event is None or not {position, target} <= within or not (is_calm(target, goal) and is_calm(target, other)):
+            continue
+        is_nearer = known[other].far[target] < known[other].far[position]
+        if is_nearer and all(distance(target, item) <= distance(position, item) for item in others[:number]):
+            return event
+    return None
+
+
+def endless_requests(game: Game, decide: Decide) -> Any:
+    """Return a position and a mode from which requests go on for ever without a move of the surroundings, or None.
+
+    Only requests count that one mode issues one after the other: goals that are all reached by requests alone are
+    reached again and again.
+    """
+    after: dict[Any, Any] = {}
+    for position in game.choices:
+        for mode in range(len(game.goals)):
+            event, number = decide(position, mode)
+            target = game.choices[position].get(event or "")
+            if number == mode and target not in (None, LOST):
+                after[position, mode] = (target, mode)
+    done = set[Any]()
+    for first in after:
+        path = dict[Any, None]()
+        at = first
+        while at in after and at not in done:
+            if at in path:
+                return at
+            path[at] = None
+            at = after[at]
+        done |= path.keys()
+    return None
+
+
+def put_off(game: Game, names: Sequence[str], decide: Decide) -> set[int]:
+    """Return the visits that a strategy interrupts instead of making them, and then may leave unmade for ever.
+
+    A run counts in which the surroundings keep to the assumptions, neither interrupt the visit anywhere nor make a
+    condition true that leads to an interruption.
+
+    Args:
+        game: The game.
+        names: Names of its goals and visits.
+        decide: Decisions of the strategy.
+    """
+    found = set[int]()
+    for goal, item in enumerate(game.goals):
+        is_calm = _is_calm(game, goal)
+        if is_calm is None or isinstance(item, Item):
+            continue
+        own, place = item, len(game.assumptions) + goal
+
+        def is_made(before: Any, after: Any, own: _Visit = own, place: int = place, name: str = names[goal]) -> bool:
+            return name in own.mission.made(before[1][place], after[0][0])
+
+        def is_brought_about(before: Any, after: Any, own: _Visit = own, is_calm: Any = is_calm) -> bool:
+            # Visits of a detour wait only while the mission is not asked for.
+            causes = list(own.mission.causes())[: None if own.is_own else 1]
+            calmed = is_calm(before) and not is_calm(after)
+            return calmed or any(cause(after[0][0]) and not cause(before[0][0]) for cause in causes)
+
+        vertices, chosen = _under(game, decide)
+        turns: dict[Any, Any] = {}
+        after: dict[Any, set[Any]] = {}
+        begun = set[Any]()
+        for vertex in vertices:
+            position, mode = vertex
+            moved, number = chosen[vertex]
+            after[vertex] = {
+                (target, mode)
+                for target in game.successors[position]
+                if not is_made(position, target) and not is_brought_about(position, target)
+            }
+            if not is_made(position, moved):
+                turns[vertex] = (moved, number)
+                after[vertex].add(turns[vertex])
+                if number == goal and is_calm(position) and not is_calm(moved):
+                    begun.add(turns[vertex])
+        if _is_fair_run(game, after, turns, begun):
+            found.add(goal)
+    return found
+
+
+def _under(game: Game, decide: Decide) -> tuple[list[Any], dict[Any, Any]]:
+    """Return the positions under a strategy, each with a mode, and where each turn leads: a position and a mode."""
+    chosen: dict[Any, Any] = {}
+    queue: list[Any] = [(game.first, 0)]
+    for vertex in queue:
+        if vertex not in chosen:
+            position, mode = vertex
+            event, after = decide(position, mode)
+            chosen[vertex] = (position if event is None else game.choices[position][event], after)
+            queue += [chosen[vertex], *((target, mode) for target in game.successors[position])]
+    return list(chosen), chosen
+
+
+def _is_fair_run(game: Game, after: Mapping[Any, set[Any]], turns: Mapping[Any, Any], start: Collection[Any]) -> bool:
+    """Return True if a run goes on for ever in a graph on which each assumption comes true at turns again and again.
+
+    The definition by a greatest fixed point: E. A. Emerson and C.-L. Lei, "Modalities for model checking: branching
+    time logic strikes back", Science of Computer Programming 8(3), 1987, pp. 275-306.
+    """
+    kept = set(after)
+    while True:
+        before = set(kept)
+        for owed in (None, *game.assumptions):
+            near = {
+                vertex
+                for vertex, turn in turns.items()
+                if vertex in kept and turn in kept and (owed is None or game.holds(vertex[0], owed))
+            }
+            while wider := {vertex for vertex in kept - near if after[vertex] & near}:
+                near |= wider
+            kept &= near
+        if kept == before:
+            break
+    reached, queue = set(start), list(start)
+    for vertex in queue:
+        queue += after[vertex] - reached
+        reached |= after[vertex]
+    return bool(reached & kept)

@@ -10,6 +10,7 @@ from typing import Any
 import grpc.aio
 import pytest
 
+from robosc_api.layers import LayeredServices
 from robosc_api.v1 import jobs_pb2_grpc
 from robosc_server.jobs import (
     Caller,
@@ -102,8 +103,9 @@ def sweep_by_hand(monkeypatch: pytest.MonkeyPatch) -> None:
 @asynccontextmanager
 async def offered(manager: JobManager, identify: Callable[[Context], Caller] = caller_of) -> AsyncIterator[Any]:
     """The jobs' service over gRPC; yields a stub."""
-    server = grpc.aio.server(interceptors=[CallInterceptor(Metrics("of a test"))])
-    add_job_service(JobService(manager, accepted, identify), server)
+    services = LayeredServices(CallInterceptor(Metrics("of a test")))
+    add_job_service(JobService(manager, accepted, identify), services)
+    server = grpc.aio.server(None, (services,))
     port = server.add_insecure_port("127.0.0.1:0")
     await server.start()
     try:

@@ -99,6 +99,11 @@ class MissionTwin:
         for _, visits in self.detours:
             yield from [of_detour] * len(visits)
 
+    def causes(self) -> Iterator[Callable[[Any], bool]]:
+        """Yield what its own visits wait for once it is true: that it is not asked for, and what begins its detours."""
+        yield lambda state: not self.asked(state)
+        yield from (trigger for trigger, _ in self.detours)
+
     def _is_own_done(self, number: int, mark: Mark, state: Any) -> bool:
         return not self.asked(state) or mark[0] != number or self.visits[number - 1](state) or any(mark[1:])
 

@@ -18,7 +18,7 @@ from tempfile import TemporaryDirectory
 from unittest import mock
 
 from robosc.execution.runtime.event_log import JsonLinesLog
-from robosc.execution.runtime.requests import Decisions
+from robosc.execution.runtime.requests import PolicyDecisions
 from robosc_bridge.daemon.states import State
 from robosc_bridge.transport.system_host import SYSTEM_HOST, SystemHost
 from robosc_simulated import SimulatedTurtleBot3, Walls
@@ -194,7 +194,7 @@ def _sees_nothing_ahead(bridge: Driven) -> None:
 
 
 def _fails(bridge: Driven, stack: ExitStack) -> Cause:
-    failing = mock.patch.object(Decisions, "decide", side_effect=RuntimeError("in a decision"))
+    failing = mock.patch.object(PolicyDecisions, "decide", side_effect=RuntimeError("in a decision"))
     return lambda: stack.enter_context(failing)
 
 

@@ -1,6 +1,6 @@
 """Random couriers: robots with much to request and several ways to each place, so that most missions can be reached."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from random import Random
 
 import msgspec
@@ -34,15 +34,17 @@ def strategic_courier(seed: int) -> Supervisor | None:
     It may keep its assumptions from coming true.
     """
     found = random_courier(seed)
-    if found is None:
-        return None
-    model, added = found
+    return None if found is None else strategic_supervisor(*found)
+
+
+def strategic_supervisor(model: Model, added: Sequence[AddedCondition]) -> Supervisor | None:
+    """Return a supervisor with its strategy, which may keep assumptions from coming true; None if there is none."""
     allowed = tuple(msgspec.structs.replace(item, is_allowed=True) for item in model.assumptions)
     model = msgspec.structs.replace(model, assumptions=allowed)
     strategy = synthesize_strategy(ExecutableSystem(model, Deployment.CONTROLLER), added).strategy
     if strategy is None:
         return None
-    supervisor = supervisor_of(model, added=added)
+    supervisor = supervisor_of(model, added=tuple(added))
     certificate = msgspec.structs.replace(supervisor.certificate, goals="not checked")
     return msgspec.structs.replace(supervisor, strategy=strategy, certificate=certificate)
 

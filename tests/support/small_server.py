@@ -13,7 +13,9 @@ import grpc.aio
 import structlog
 from google.rpc import error_details_pb2, status_pb2
 
-from robosc_server.operations.logs import REQUEST_ID, configure_logging
+from robosc_api.calls import request_id
+from robosc_api.layers import Layer, LayeredServices
+from robosc_server.operations.logs import configure_logging
 from robosc_server.operations.settings import LogFormat, LogLevel
 from robosc_server.tasks.task import Reason, RefusedError
 from support.waiting import PATIENCE_S
@@ -36,27 +38,30 @@ async def answer(request: bytes, context: Any) -> bytes:
             await asyncio.Event().wait()
         case b"code":
             context.set_code(grpc.StatusCode.ABORTED)
-    return REQUEST_ID.get().encode()
+    return request_id().encode()
 
 
 @asynccontextmanager
 async def small_server(
     *,
-    interceptors: Sequence[Any] = (),
+    layers: Sequence[Layer] = (),
     unary: Callable[..., Any] | None = None,
     stream: Callable[..., Any] | None = None,
-    setup: Callable[[grpc.aio.Server], Any] = lambda server: None,
+    setup: Callable[[LayeredServices], Any] = lambda services: None,
+    listen: Callable[[grpc.aio.Server], Any] = lambda server: None,
     options: Sequence[tuple[str, int]] = (),
 ) -> AsyncIterator[tuple[grpc.aio.Channel, grpc.aio.Server]]:
     """A server with the methods `Unary` and `Stream` on bytes, and a channel to it."""
-    server = grpc.aio.server(interceptors=list(interceptors), options=list(options))
+    services = LayeredServices(*layers)
+    server = grpc.aio.server(None, (services,), options=list(options))
     handlers: dict[str, Any] = {}
     if unary is not None:
         handlers["Unary"] = grpc.unary_unary_rpc_method_handler(unary)
     if stream is not None:
         handlers["Stream"] = grpc.unary_stream_rpc_method_handler(stream)
-    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, handlers),))
-    setup(server)
+    services.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, handlers),))
+    setup(services)
+    listen(server)
     port = server.add_insecure_port("127.0.0.1:0")
     await server.start()
     try:

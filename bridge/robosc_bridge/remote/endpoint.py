@@ -12,10 +12,10 @@ os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 
 import grpc.aio
 from grpc_health.v1 import health, health_pb2_grpc
-from grpc_reflection.v1alpha import reflection
+from grpc_reflection.v1alpha import reflection, reflection_pb2_grpc
 
 from robosc_api.connection_watch import Arrivals, CallsByConnection, ConnectionLimits, ConnectionWatch
-from robosc_api.layers import Layers
+from robosc_api.layers import LayeredServices
 from robosc_api.malformed import MalformedRequests
 from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts
 from robosc_api.security import Guard, SecurityError, ServerSecurity, TokenFile, add_port
@@ -135,15 +135,16 @@ class RemoteEndpoint(ServedEndpoint):
         prompt = RequestTimeouts(REQUEST_LIMIT_S, dict.fromkeys(REFLECTION_METHODS, REFLECTION_IDLE_S))
         arrivals = Arrivals()
         # Outside of the request timeouts: a call without a request is open, too.
-        layers = Layers(
+        services = LayeredServices(
             shutdown, guard, CallsByConnection(arrivals), prompt, arrivals, MalformedRequests(convert.SERVICE_NAME)
         )
-        server = grpc.aio.server(interceptors=[layers], options=_options())
+        server = grpc.aio.server(None, (services,), options=_options())
         service = BridgeService(self._operations, settings.operator_timeout_s)
-        convert.add_service(service, server)  # type: ignore[no-untyped-call]  # generated
-        health_pb2_grpc.add_HealthServicer_to_server(Health(self._operations.feed), server)
+        convert.add_service(service, services)  # type: ignore[no-untyped-call]  # generated
+        health_pb2_grpc.add_HealthServicer_to_server(Health(self._operations.feed), services)
         names = (convert.SERVICE_NAME, health.SERVICE_NAME, reflection.SERVICE_NAME)
-        reflection.enable_server_reflection(names, server)
+        reflected = reflection.aio.ReflectionServicer(names)
+        reflection_pb2_grpc.add_ServerReflectionServicer_to_server(reflected, services)
         self.address = add_port(server, settings.address, security)
         await server.start()
         self._is_listening()

@@ -13,7 +13,7 @@ import grpc
 import grpc.aio
 
 from robosc_api.malformed import MalformedError
-from robosc_api.security import CALLER, Rule, Scope
+from robosc_api.security import Rule, Scope, token_name
 from robosc_bridge.daemon import states
 from robosc_bridge.daemon.operations import UNDONE_BY, Operations
 from robosc_bridge.remote import convert
@@ -275,5 +275,5 @@ class _ClosingError(Exception):
 
 def _caller(context: Context) -> str:
     """Return the caller's name, for the log."""
-    name = CALLER.get()
+    name = token_name()
     return f"'{name}' at {context.peer()}" if name else str(context.peer())

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from robosc.certification.goals import GoalExplanation
+from robosc.certification.reasons import reasons_json
 from robosc.cli import automata
 from robosc.cli.arguments import (
     MAXIMUM_LIMIT,
@@ -27,7 +28,7 @@ from robosc.cli.output import CommandError, ExitCode, UsageError, print_diagnost
 from robosc.cli.properties import add_arguments as add_property_arguments
 from robosc.cli.properties import property_file
 from robosc.cli.sign import read_supervisor
-from robosc.cli.synth import add_modular_argument, reasons_json, refuse_modular, report_reasons
+from robosc.cli.synth import add_modular_argument, refuse_modular, report_reasons
 from robosc.exploration import DEFAULT_LIMIT
 from robosc.json_documents import diagnostics_json, json_text
 from robosc.model.structure import Deployment

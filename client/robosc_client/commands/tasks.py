@@ -9,6 +9,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from robosc.certification.reasons import reasons_json
 from robosc.cli import automata, properties, synth
 from robosc.cli import check as check_here
 from robosc.cli import explain_synthesis as explain_here
@@ -247,7 +248,7 @@ def _explore(arguments: argparse.Namespace, client: Client) -> int:
     made = outcome_from_response(found)
     if found.graph is None:
         if arguments.json:
-            print_json({"status": str(made.status), **synth.reasons_json(made), **diagnostics_json(made.diagnostics)})
+            print_json({"status": str(made.status), **reasons_json(made), **diagnostics_json(made.diagnostics)})
         else:
             synth.report_problems(made, bundle)
         return ExitCode.FAILED

@@ -12,7 +12,7 @@ from robosc_api.security.arguments import (
     credentials_of,
     issue_token,
 )
-from robosc_api.security.callers import CALLER, ENTRY, caller_of, is_admin, network_of, token_or_host_of
+from robosc_api.security.callers import caller_of, is_admin, network_of, token_name, token_or_host_of
 from robosc_api.security.client import Credentials, check_credentials, close_channel, open_async_channel, open_channel
 from robosc_api.security.errors import SecurityError
 from robosc_api.security.guard import Guard, Rule
@@ -21,8 +21,6 @@ from robosc_api.security.token_commands import add_tokens_arguments, run_tokens
 from robosc_api.security.tokens import Entry, Quota, Scope, TokenFile, make_token, missing_scope
 
 __all__ = [
-    "CALLER",
-    "ENTRY",
     "Credentials",
     "Entry",
     "Guard",
@@ -53,5 +51,6 @@ __all__ = [
     "open_async_channel",
     "open_channel",
     "run_tokens",
+    "token_name",
     "token_or_host_of",
 ]

@@ -1,21 +1,15 @@
 """Identity of the caller of the current call."""
 
-from contextvars import ContextVar
+from collections.abc import Callable
 from functools import lru_cache
 from ipaddress import IPv4Address, ip_address, ip_network
 from typing import Any
 from urllib.parse import unquote
 
-from robosc_api.peers import peer_of
-from robosc_api.security.tokens import Entry, Scope
+from robosc_api.calls import CALL, peer_of
+from robosc_api.security.tokens import Scope
 
 _NETWORK_BITS = 64
-
-CALLER: ContextVar[str] = ContextVar("caller", default="")
-"""Name of the token of the current call; empty: no token is required."""
-
-ENTRY: ContextVar[Entry | None] = ContextVar("entry", default=None)
-"""Entry of the token of the current call."""
 
 
 def caller_of(context: Any) -> str:
@@ -24,18 +18,24 @@ def caller_of(context: Any) -> str:
     Args:
         context: Context of the call under way.
     """
-    return CALLER.get() or _certificate_name(context) or host_of(peer_of(context))
+    return _known_or(context, _certificate_or_host)
 
 
 def token_or_host_of(context: Any) -> str:
     """Return the name of a caller, without client certificates."""
-    return CALLER.get() or host_of(peer_of(context))
+    return _known_or(context, _host)
+
+
+def token_name() -> str:
+    """Return the name of the token of the call under way; empty: it came with none."""
+    call = CALL.get()
+    return "" if call is None or call.entry is None else call.entry.name
 
 
 def is_admin() -> bool:
     """Return True if the call under way came with a token for the scope `admin`."""
-    entry = ENTRY.get()
-    return entry is not None and Scope.ADMIN in entry.scopes
+    call = CALL.get()
+    return call is not None and call.entry is not None and Scope.ADMIN in call.entry.scopes
 
 
 @lru_cache(maxsize=4096)
@@ -58,6 +58,24 @@ def network_of(caller: str) -> str:
     if isinstance(address, IPv4Address) or address.ipv4_mapped or address.is_loopback:
         return caller
     return str(ip_network((address, _NETWORK_BITS), strict=False))
+
+
+def _known_or(context: Any, find: Callable[[Any], str]) -> str:
+    """Return the name of a caller, which is asked for once for each call."""
+    call = CALL.get()
+    if call is None:
+        return find(context)
+    if not call.caller:
+        call.caller = find(context)
+    return call.caller
+
+
+def _certificate_or_host(context: Any) -> str:
+    return _certificate_name(context) or _host(context)
+
+
+def _host(context: Any) -> str:
+    return host_of(peer_of(context))
 
 
 def _certificate_name(context: Any) -> str:

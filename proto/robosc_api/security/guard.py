@@ -7,11 +7,10 @@ from typing import Any
 
 import grpc
 
+from robosc_api.calls import call_under_way, peer_of
 from robosc_api.failures import failure_metadata
 from robosc_api.layers import Layer, behaviour_of, with_behaviour, writing
-from robosc_api.peers import peer_of
 from robosc_api.security.addresses import is_loopback_peer
-from robosc_api.security.callers import CALLER, ENTRY
 from robosc_api.security.forwarded import forwarded_entry
 from robosc_api.security.host_sample import HostSample
 from robosc_api.security.tokens import Entry, Scope, TokenFile, time_text
@@ -93,9 +92,8 @@ class Guard(Layer):
                 # Refuse at once: a handler of unary requests would wait for a request that may never arrive, and count
                 # as an open call.
                 return grpc.stream_stream_rpc_method_handler(self._refuse(rule, method, entry))
-            # The handler runs in the same task, and so sees what is set here.
-            CALLER.set(entry.name)
-            ENTRY.set(entry)
+            call = call_under_way()
+            call.caller, call.entry = entry.name, entry
         return super().handler(inner, details)
 
     def _refuse(self, rule: Rule, method: str, entry: Entry | None) -> Any:

@@ -32,7 +32,7 @@ from robosc_api.security.tokens import (
     Entry,
     Quota,
     Scope,
-    lasting_longer,
+    TokenIndex,
     make_token,
     parse_line,
     parse_tokens,
@@ -110,14 +110,14 @@ def run_tokens(arguments: argparse.Namespace, wall_clock: Callable[[], float] = 
 
 
 def _list(arguments: argparse.Namespace, now_s: float) -> None:
-    entries = parse_tokens(read_text(arguments.file), str(arguments.file))
+    index = TokenIndex(parse_tokens(read_text(arguments.file), str(arguments.file)))
     if arguments.json:
-        _print_json({"tokens": [_document(entry, entries, now_s) for entry in entries]})
+        _print_json({"tokens": [_document(entry, index, now_s) for entry in index.entries]})
         return
     rows = [("NAME", "ID", "SCOPES", "EXPIRES", "STATE", "QUOTAS")]
-    for entry in entries:
+    for entry in index.entries:
         expires = "never" if entry.expires_s is None else time_text(entry.expires_s)
-        state = _state(entry, entries, now_s)
+        state = _state(entry, index, now_s)
         rows.append((entry.name, entry.id, _scopes(entry), expires, state, str(entry.quota)))
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
@@ -178,7 +178,8 @@ def _revoke(arguments: argparse.Namespace, now_s: float) -> None:
             raise SecurityError(f"{arguments.file}: no token with the name or id '{arguments.token}'")
         lines[:] = [line for line in lines if parse_line(line, str(arguments.file)) not in wanted]
     if arguments.json:
-        _print_json({"revoked": [_document(entry, entries, now_s) for entry in wanted]})
+        index = TokenIndex(entries)
+        _print_json({"revoked": [_document(entry, index, now_s) for entry in wanted]})
     else:
         sys.stdout.writelines(f"{entry.name} {entry.id}: revoked\n" for entry in wanted)
 
@@ -195,7 +196,9 @@ def _deliver(arguments: argparse.Namespace, token: str, line: str) -> None:
         write_token(arguments.output, token)
     try:
         if arguments.json:
-            document = {key: value for key, value in _document(entry, (entry,), 0.0).items() if key != "state"}
+            document = {
+                key: value for key, value in _document(entry, TokenIndex((entry,)), 0.0).items() if key != "state"
+            }
             where = {"token": token} if arguments.output is None else {"token_file": str(arguments.output)}
             _print_json(document | where)
         elif arguments.output is None:
@@ -220,22 +223,22 @@ def _scopes(entry: Entry) -> str:
     return ",".join(sorted(entry.scopes))
 
 
-def _state(entry: Entry, entries: tuple[Entry, ...], now_s: float) -> str:
+def _state(entry: Entry, index: TokenIndex, now_s: float) -> str:
     if not entry.is_valid(now_s):
         return "expired"
-    if lasting_longer(entry, entries) is not None:
+    if index.is_replaced(entry):
         return "replaced"
     return "valid" if entry.is_valid(now_s + SOON_S) else "expires soon"
 
 
-def _document(entry: Entry, entries: tuple[Entry, ...], now_s: float) -> dict[str, Any]:
+def _document(entry: Entry, index: TokenIndex, now_s: float) -> dict[str, Any]:
     quotas = {name: getattr(entry.quota, name) for name in Quota.__slots__}
     return {
         "name": entry.name,
         "id": entry.id,
         "scopes": sorted(entry.scopes),
         "expires": None if entry.expires_s is None else time_text(entry.expires_s),
-        "state": _state(entry, entries, now_s),
+        "state": _state(entry, index, now_s),
         "quotas": {name: value for name, value in quotas.items() if value is not None},
     }
 

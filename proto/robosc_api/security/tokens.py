@@ -7,6 +7,7 @@ A token has 256 random bits, so its digest needs neither salt nor many rounds: t
 import hashlib
 import hmac
 import logging
+import math
 import os
 import re
 import secrets
@@ -17,14 +18,15 @@ from collections.abc import Callable, Iterable
 from dataclasses import dataclass, fields
 from datetime import UTC, datetime
 from enum import StrEnum
+from functools import lru_cache
 from pathlib import Path
 
 from robosc_api.security.errors import SecurityError
 
 _log = logging.getLogger(__name__)
 
-MAXIMUM_BYTES = 64 * 1024
-"""Maximum size of a token file, in bytes."""
+MAXIMUM_BYTES = 4 * 2**20
+"""Maximum size of a token file, in bytes: 20,000 tokens with all that may stand in a line."""
 
 ID_DIGITS = 8
 """Number of digits of a digest that name a token."""
@@ -38,6 +40,7 @@ SOON_S = 14 * 86400.0
 _CHECK_PERIOD_S = 1.0
 _PREFIX = "robosc_"
 _TIME = "%Y-%m-%dT%H:%M:%SZ"
+_FULL_TIME = re.compile(r"[0-9]{4}-[0-9]{2}-[0-9]{2}T[0-9]{2}:[0-9]{2}:[0-9]{2}Z\Z")
 _EXPIRES = "expires"
 _LINE = re.compile(
     r"(?P<name>[A-Za-z0-9._-]{1,64})\s+(?P<scopes>[a-z,]+)\s+sha256:(?P<digest>[0-9a-f]{64})(?P<more>(\s+\S+)*)\Z"
@@ -51,6 +54,9 @@ class Scope(StrEnum):
     OPERATE = "operate"
     SYNTHESIZE = "synthesize"
     ADMIN = "admin"
+
+
+_SCOPES = frozenset(Scope)
 
 
 @dataclass(frozen=True, slots=True)
@@ -145,7 +151,13 @@ def read_time(text: str) -> int:
     Raises:
         ValueError: It has another form.
     """
-    return round(datetime.strptime(text, _TIME).replace(tzinfo=UTC).timestamp())
+    # The same in a tenth of the time: a file may have thousands of tokens.
+    read = datetime.fromisoformat if _FULL_TIME.match(text) else _read_other_time
+    return round(read(text).replace(tzinfo=UTC).timestamp())
+
+
+def _read_other_time(text: str) -> datetime:
+    return datetime.strptime(text, _TIME)
 
 
 def _digest(token: str) -> str:
@@ -187,12 +199,22 @@ def parse_line(line: str, place: str) -> Entry | None:
     if not match:
         # Not the line itself, which may contain the token by mistake.
         raise SecurityError(f"{place}: expected NAME SCOPE,SCOPE sha256:DIGEST")
-    unknown = [word for word in match["scopes"].split(",") if word not in set(Scope)]
-    if unknown:
-        raise SecurityError(f"{place}: unknown scope '{unknown[0]}': use {', '.join(Scope)}")
-    scopes = frozenset(Scope(word) for word in match["scopes"].split(","))
+    try:
+        scopes = _scopes_of(match["scopes"])
+    except ValueError as error:
+        raise SecurityError(f"{place}: unknown scope '{error}': use {', '.join(Scope)}") from None
     quota, expires_s = _options(match["more"].split(), place)
     return Entry(match["name"], scopes, match["digest"], quota, expires_s)
+
+
+@lru_cache(maxsize=64)
+def _scopes_of(text: str) -> frozenset[Scope]:
+    """The scopes of a line; raises ValueError with a word that is none."""
+    words = text.split(",")
+    for word in words:
+        if word not in _SCOPES:
+            raise ValueError(word)
+    return frozenset(Scope(word) for word in words)
 
 
 def _options(words: list[str], place: str) -> tuple[Quota, int | None]:
@@ -219,27 +241,58 @@ def _options(words: list[str], place: str) -> tuple[Quota, int | None]:
     return Quota(**amounts), expires_s
 
 
-def lasting_longer(entry: Entry, entries: Iterable[Entry]) -> Entry | None:
-    """Return a token that replaces another one: of the same owner, for all its scopes, and valid for longer."""
-    if entry.expires_s is None:
-        return None
-    for other in entries:
-        if other.name == entry.name and other.scopes >= entry.scopes and other.is_valid(entry.expires_s):
-            return other
-    return None
+class TokenIndex:
+    """Tokens, found by digest and by name, with those that others replace; no lookup goes through all of them.
+
+    Attributes:
+        entries: The tokens, in the order of the file.
+        unreplaced: Those that expire and that no other one replaces, the earliest first.
+    """
+
+    def __init__(self, entries: Iterable[Entry]) -> None:
+        self.entries = tuple(entries)
+        self._by_digest = {entry.digest: entry for entry in self.entries}
+        self._by_name: dict[str, Entry] = {}
+        # Last expiry of the tokens of an owner, by their scopes.
+        self._last_s: dict[str, dict[frozenset[Scope], float]] = {}
+        for entry in self.entries:
+            self._by_name.setdefault(entry.name, entry)
+            last_s = self._last_s.setdefault(entry.name, {})
+            last_s[entry.scopes] = max(last_s.get(entry.scopes, 0.0), _end_s(entry))
+        expiring = [entry for entry in self.entries if entry.expires_s is not None and not self.is_replaced(entry)]
+        self.unreplaced = tuple(sorted(expiring, key=_end_s))
+
+    def find(self, digest: str) -> Entry | None:
+        """Return the token with a digest, valid or not; None: there is none.
+
+        How long this takes tells nothing of use: whoever sends a token cannot choose its digest. It takes the same time
+        for any number of tokens.
+        """
+        found = self._by_digest.get(digest)
+        return found if found is not None and hmac.compare_digest(found.digest, digest) else None
+
+    def named(self, name: str) -> Entry | None:
+        """Return the first token of an owner; None: there is none."""
+        return self._by_name.get(name)
+
+    def is_replaced(self, entry: Entry) -> bool:
+        """Return True if another token replaces one: of the same owner, for all its scopes, and valid for longer."""
+        end_s = _end_s(entry)
+        return any(
+            last_s > end_s and scopes >= entry.scopes for scopes, last_s in self._last_s.get(entry.name, {}).items()
+        )
+
+    def last_s(self, scope: Scope) -> float:
+        """Return the time at which the last token with a scope expires, in seconds since 1970; 0: there is none."""
+        ends_s = (
+            last_s for by_scopes in self._last_s.values() for scopes, last_s in by_scopes.items() if scope in scopes
+        )
+        return max(ends_s, default=0.0)
 
 
-def unreplaced(entries: Iterable[Entry]) -> list[Entry]:
-    """Return the tokens that expire and that no other one replaces."""
-    by_owner: dict[str, list[Entry]] = {}
-    for entry in entries:
-        by_owner.setdefault(entry.name, []).append(entry)
-    return [
-        entry
-        for owned in by_owner.values()
-        for entry in owned
-        if entry.expires_s is not None and lasting_longer(entry, owned) is None
-    ]
+def _end_s(entry: Entry) -> float:
+    """Return the time at which a token expires, in seconds since 1970; infinity: never."""
+    return math.inf if entry.expires_s is None else entry.expires_s
 
 
 def missing_scope(entries: Iterable[Entry], needed: Scope) -> str | None:
@@ -280,17 +333,17 @@ class TokenFile:
         self._reported_expired: set[str] = set()
         self._is_scope_missing = False
         self._lock = threading.Lock()
-        self._entries, self._stamp = _read(path)
+        self._take(*_read(path))
         self._warn()
         self._checked_s = clock()
 
     def find(self, token: str) -> Entry | None:
-        """Return the entry of a valid token in constant time; None: the token is unknown or has expired."""
+        """Return the entry of a valid token; None: the token is unknown or has expired."""
         found = self._find(token)
         return found if found is not None and found.is_valid(self._wall_clock()) else None
 
     def find_expired(self, token: str) -> Entry | None:
-        """Return the entry of a token that has expired, in constant time, and log it once; None: it is none."""
+        """Return the entry of a token that has expired, and log it once; None: it is none."""
         found = self._find(token)
         if found is None or found.expires_s is None or found.is_valid(self._wall_clock()):
             return None
@@ -306,61 +359,60 @@ class TokenFile:
         return found
 
     def _find(self, token: str) -> Entry | None:
-        digest = _digest(token[:MAXIMUM_TOKEN])
-        found = None
-        for entry in self._current():
-            if hmac.compare_digest(entry.digest, digest):
-                found = entry
-        return found if len(token) <= MAXIMUM_TOKEN else None
+        return self._current().find(_digest(token)) if len(token) <= MAXIMUM_TOKEN else None
 
     def named(self, name: str) -> Entry | None:
-        """Return a token of an owner; None: there is none."""
-        return next((entry for entry in self._current() if entry.name == name), None)
+        """Return the first token of an owner; None: there is none."""
+        return self._current().named(name)
 
     @property
     def entries(self) -> tuple[Entry, ...]:
         """All of them, the expired ones included."""
-        return self._current()
+        return self._current().entries
 
     def seconds_to_expiry(self) -> dict[str, float]:
         """Return the seconds until tokens expire, by id, if no other token replaces them; negative: expired."""
         now_s = self._wall_clock()
-        return {
-            entry.id: entry.expires_s - now_s for entry in unreplaced(self._current()) if entry.expires_s is not None
-        }
+        return {entry.id: _end_s(entry) - now_s for entry in self._current().unreplaced}
 
-    def _current(self) -> tuple[Entry, ...]:
+    def _current(self) -> TokenIndex:
         with self._lock:
             if self._clock() - self._checked_s >= _CHECK_PERIOD_S:
                 self._checked_s = self._clock()
                 try:
                     if stamp_of(self._path.stat()) != self._stamp:
-                        self._entries, self._stamp = _read(self._path)
+                        self._take(*_read(self._path))
                         _log.info("%s: reloaded", self._path)
-                        known = {entry.digest for entry in self._entries}
+                        known = {entry.digest for entry in self._index.entries}
                         self._reported_soon &= known
                         self._reported_expired &= known
                 except (OSError, SecurityError) as error:
                     _log.error("the changed token file is not used: %s", error)
                 self._warn()
-            return self._entries
+            return self._index
+
+    def _take(self, entries: tuple[Entry, ...], stamp: tuple[int, int, int]) -> None:
+        self._index, self._stamp = TokenIndex(entries), stamp
+        # Tokens that expire, the next one last.
+        self._expiring = [*reversed(self._index.unreplaced)]
+        self._last_needed_s = math.inf if self._needed is None else self._index.last_s(self._needed)
 
     def _warn(self) -> None:
         """Log a warning when a token expires soon, and when no token has the needed scope any more."""
         now_s = self._wall_clock()
-        for entry in unreplaced(self._entries):
-            if entry.digest in self._reported_soon or entry.is_valid(now_s + SOON_S) or entry.expires_s is None:
+        while self._expiring and not self._expiring[-1].is_valid(now_s + SOON_S):
+            entry = self._expiring.pop()
+            if entry.digest in self._reported_soon or entry.expires_s is None:
                 continue
             self._reported_soon.add(entry.digest)
             verb = "expires" if entry.is_valid(now_s) else "has expired"
             _log.warning(
                 "the token %s of '%s' %s at %s: rotate it", entry.id, entry.name, verb, time_text(entry.expires_s)
             )
-        valid = [entry for entry in self._entries if entry.is_valid(now_s)]
-        words = None if self._needed is None else missing_scope(valid, self._needed)
-        if words is not None and not self._is_scope_missing:
-            _log.warning("%s: %s", self._path, words)
-        self._is_scope_missing = words is not None
+        is_missing = now_s >= self._last_needed_s
+        if self._needed is not None and is_missing and not self._is_scope_missing:
+            _log.warning("%s: %s", self._path, missing_scope((), self._needed))
+        self._is_scope_missing = is_missing
 
 
 def stamp_of(status: os.stat_result) -> tuple[int, int, int]:

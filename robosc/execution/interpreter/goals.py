@@ -186,6 +186,16 @@ class GoalsOfSystem:
             whole.update({(_MEMORY, name): value for name, value in mission.remembered(place).items()})
         return next((request for request, condition in self._modes[mode] if condition(whole)), None)
 
+    def remembered(self) -> tuple[int, tuple[bool, ...], tuple[MissionPlace, ...]]:
+        """Return what is remembered, as a hashable value."""
+        account = self._account
+        return account.mode, tuple(account.kept.values()), account.missions
+
+    def recall(self, remembered: tuple[int, tuple[bool, ...], tuple[MissionPlace, ...]]) -> None:
+        """Remember what `remembered` has returned."""
+        mode, kept, missions = remembered
+        self._account = Account(dict(zip(self._kept, kept, strict=True)), missions, mode)
+
     def snapshot(self) -> Account:
         """Return what is kept, as a value to come back to."""
         return self._account

@@ -100,8 +100,11 @@ class InterpretedSystem:
         self._request_events = tuple(info.name + ".request" for info in requesting(self.description.communications))
         self._batches = batches(self.description.communications)
         self._goals = None
+        domains = place_domains(model)
+        # Goals and strategies read what takes part in synthesis alone.
+        self._situation = tuple(place for place in domains if place in self._initial)
         if supervisor.strategy is not None:
-            self._goals = GoalsOfSystem(model, supervisor.strategy, self._request_events, place_domains(model))
+            self._goals = GoalsOfSystem(model, supervisor.strategy, self._request_events, domains)
 
     def restart(self) -> None:
         """Return to the initial state."""
@@ -201,6 +204,19 @@ class InterpretedSystem:
     def location(self, communication: str) -> str:
         """Return the location of a service or action; an unknown name is a KeyError."""
         return str(self._state[communication_plant_name(self._model.communication(communication)), None])
+
+    def situation(self) -> tuple[Value, ...]:
+        """Return the part of the state that goals and the strategy depend on."""
+        return tuple(map(self._state.__getitem__, self._situation))
+
+    def remembered(self) -> Any:
+        """Return what is remembered of goals and missions; None where there is no strategy."""
+        return None if self._goals is None else self._goals.remembered()
+
+    def recall(self, remembered: Any) -> None:
+        """Remember what `remembered` has returned."""
+        if self._goals is not None:
+            self._goals.recall(remembered)
 
     def observe(self) -> tuple[bool, ...]:
         """Take in a stable state, for what the strategy remembers; return what is met, and where missions are."""

@@ -1,5 +1,5 @@
 """
-Choice of the enabled request that is issued: the policies of semantics 3.5.
+Choice of the enabled request that is issued: the policies of semantics 3.5 but `strategy`.
 
 Requests have the numbers 0 to N - 1, in source order. A decision calls `choose` with the
 candidates, and again without those that could not be issued; then `issued` for the request that
@@ -11,20 +11,11 @@ from __future__ import annotations
 import random
 from typing import List, Protocol, Sequence, Tuple
 
-from robosc.execution.runtime.progress import ProgressAccount
-
 _NEVER = -1
 
 
 class Policy(Protocol):
     """Policy that decides between requests that are enabled together."""
-
-    def candidates(self, enabled: Tuple[int, ...]) -> Tuple[int, ...]:
-        """
-        Return those of the enabled requests that may be issued at a decision.
-
-        They are asked for once in each stable state.
-        """
 
     def choose(self, candidates: Sequence[int]) -> int:
         """One of the candidates (at least one, ascending)."""
@@ -36,17 +27,7 @@ class Policy(Protocol):
         """End the decision; `enabled` were the requests that were enabled at it."""
 
 
-class AnyRequest:
-    """Part of a policy by which every enabled request may be issued."""
-
-    __slots__ = ()
-
-    def candidates(self, enabled: Tuple[int, ...]) -> Tuple[int, ...]:
-        """Return all of them."""
-        return enabled
-
-
-class FairPolicy(AnyRequest):
+class FairPolicy:
     """
     Newly enabled requests first, then never issued ones, then the one issued longest ago.
 
@@ -102,7 +83,7 @@ class FairPolicy(AnyRequest):
         self._decision += 1
 
 
-class PriorityPolicy(AnyRequest):
+class PriorityPolicy:
     """
     The first enabled request of a list; if none of them is enabled, fair.
 
@@ -134,7 +115,7 @@ class PriorityPolicy(AnyRequest):
         self._fair.close(enabled)
 
 
-class RandomPolicy(AnyRequest):
+class RandomPolicy:
     """
     Policy that takes any candidate with equal probability, the same sequence for the same seed.
 
@@ -156,38 +137,6 @@ class RandomPolicy(AnyRequest):
 
     def close(self, enabled: Tuple[int, ...]) -> None:
         """Chance has no memory."""
-
-
-class StrategyPolicy:
-    """
-    The request that the supervisor's strategy chooses, or none.
-
-    :param progress: Account of the strategy's progress, which asks the strategy.
-    """
-
-    __slots__ = ('_progress',)
-
-    def __init__(self, progress: ProgressAccount) -> None:
-        self._progress = progress
-
-    def candidates(self, enabled: Tuple[int, ...]) -> Tuple[int, ...]:
-        """
-        Return the chosen request alone, or nothing.
-
-        An action whose cancelled goal is not known to have ended is not enabled: it is waited for.
-        """
-        chosen = self._progress.decide()
-        return (chosen,) if chosen in enabled else ()
-
-    def choose(self, candidates: Sequence[int]) -> int:
-        """Return the only one."""
-        return candidates[0]
-
-    def issued(self, request: int) -> None:
-        """Do nothing: the system remembers what a strategy needs."""
-
-    def close(self, enabled: Tuple[int, ...]) -> None:
-        """Do nothing: the system remembers what a strategy needs."""
 
 
 def make_policy(policy: str, names: Sequence[str], priority: Sequence[str], seed: int) -> Policy:

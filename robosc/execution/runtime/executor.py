@@ -6,13 +6,13 @@ It issues the requests itself (semantics 3.5), on top of what all executors do.
 
 from __future__ import annotations
 
-from typing import Optional
+from typing import Optional, Union
 
 from robosc.execution.runtime.clock import Clock
-from robosc.execution.runtime.decision import make_policy, Policy, StrategyPolicy
+from robosc.execution.runtime.decision import make_policy, Policy
 from robosc.execution.runtime.event_log import EventLog
 from robosc.execution.runtime.protocol import ControlledSystem, Middleware
-from robosc.execution.runtime.requests import Decisions
+from robosc.execution.runtime.requests import PolicyDecisions, StrategyDecisions
 from robosc.execution.runtime.runner import Runner
 from robosc.execution.runtime.safe_stop import describe_error
 from robosc.execution.runtime.settings import Settings
@@ -45,7 +45,7 @@ class Executor(Runner):
             policy = 'strategy' if system.description.has_strategy else 'fair'
             self.settings = self.settings._replace(policy=policy)
         self._request_names = [request.name for request in self._requests]
-        self._decisions = Decisions(
+        parts = (
             system,
             middleware,
             self._requests,
@@ -54,8 +54,14 @@ class Executor(Runner):
             self._releases,
             self._calls,
             self._goals,
-            self._new_policy(),
         )
+        self._decisions: Union[PolicyDecisions, StrategyDecisions]
+        if self.settings.policy == 'strategy' and self._progress is not None:
+            self._progress.is_followed = True
+            self._decisions = StrategyDecisions(*parts)
+            self._decisions.progress = self._progress
+        else:
+            self._decisions = PolicyDecisions(*parts)
         self._decides_after_batch = self.settings.every == 'event'
 
     def tick(self) -> None:
@@ -76,7 +82,8 @@ class Executor(Runner):
             self._fail(describe_error(error))
 
     def _begin(self) -> None:
-        self._decisions.policy = self._new_policy()
+        if isinstance(self._decisions, PolicyDecisions):
+            self._decisions.policy = self._new_policy()
         super()._begin()
 
     def _end_batch(self) -> None:
@@ -87,8 +94,6 @@ class Executor(Runner):
 
     def _new_policy(self) -> Policy:
         settings = self.settings
-        policy = settings.policy or 'fair'
-        if policy == 'strategy' and self._progress is not None:
-            self._progress.is_followed = True
-            return StrategyPolicy(self._progress)
-        return make_policy(policy, self._request_names, settings.priority, settings.seed)
+        return make_policy(
+            settings.policy or 'fair', self._request_names, settings.priority, settings.seed
+        )

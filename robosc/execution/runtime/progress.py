@@ -217,36 +217,88 @@ def _place(tour: _Tour, seen: Tuple[bool, ...]) -> Optional[int]:
     return None
 
 
-MAXIMUM_CHANGES = 1000
+MAXIMUM_CHANGES = 4096
 """Number of changes that are remembered at once, so that they need not be found again."""
 
+_MAXIMUM_OPEN = 256
+"""Number of changes at which the account is brought up to date, though nobody asks for it."""
 
-class _Change(NamedTuple):
+
+class _Memory:
     """
-    Change of what is seen from one stable state to the next.
+    Memory of a strategy after a stable state.
 
+    :ivar seen: Result of `observe` in that state; empty before the first.
+    :ivar remembered: Everything that the system remembers.
+    :ivar known: Known changes from there to the next stable state, by that state's situation.
+    """
+
+    __slots__ = ('known', 'remembered', 'seen')
+
+    def __init__(self, seen: Tuple[bool, ...], remembered: Any) -> None:
+        self.seen = seen
+        self.remembered = remembered
+        self.known: Dict[Any, _Change] = {}
+
+
+class _Change:
+    """
+    Change from what is remembered of one stable state to what is of the next.
+
+    :ivar after: Memory after it.
+    :ivar known: Known changes from there on.
     :ivar unmet: Numbers of the aims and assumptions that are not met from now on.
     :ivar reached: Numbers of those that are met from now on, then of the visits that are made.
     :ivar is_owed: True if an assumption is not met from now on.
-    :ivar following: Known changes of what is seen after this one, by what they lead to.
+    :ivar times: Number of times that it came about and is not in the account yet.
+    :ivar at_s: Time at which it came about last.
+    :ivar choice: Choice of the strategy after it; None: it was not asked yet.
     """
 
-    unmet: Tuple[int, ...]
-    reached: Tuple[int, ...]
-    is_owed: bool
-    following: Dict[Tuple[bool, ...], _Change]
+    __slots__ = ('after', 'at_s', 'choice', 'is_owed', 'known', 'reached', 'times', 'unmet')
+
+    def __init__(
+        self, after: _Memory, unmet: Tuple[int, ...], reached: Tuple[int, ...], is_owed: bool
+    ) -> None:
+        self.after = after
+        self.known = after.known
+        self.unmet = unmet
+        self.reached = reached
+        self.is_owed = is_owed
+        self.times = 0
+        self.at_s = 0.0
+        self.choice: Optional[_Choice] = None
+
+
+class _Choice(NamedTuple):
+    """
+    Choice of a strategy in a stable state.
+
+    :ivar request: Number of the chosen request; None: it waits.
+    :ivar approached: Number of the aim that it approaches.
+    :ivar after: Memory after the choice.
+    """
+
+    request: Optional[int]
+    approached: int
+    after: _Memory
 
 
 class ProgressAccount:
     """
-    Account of a strategy's progress, which costs time only when something changes.
+    Account of a strategy's progress.
 
-    :param system: System with a strategy.
+    All of it depends on what is remembered and on the situation of the next stable state alone,
+    of which robots are in the same few again and again. So the account is a table of changes that
+    grows as they come about, like the automaton of a regular expression by lazy transition
+    evaluation (A. V. Aho, R. Sethi, J. D. Ullman: Compilers, 1986). A change that is known takes
+    the same short time for a robot with few aims and one with many. How often each aim was
+    reached, and since when it is not met, is worked out of the changes when somebody asks.
+
+    :param system: System with a strategy; what it remembers is not used while changes are known.
     :param recorder: Recorder that gives the time and writes the entries.
     :param requests: Names of all requests' communications, by number.
     :param timeout_s: Seconds after which an assumption that is owed is reported; 0: never.
-    :ivar observe: Take in a stable state, and return what is met in it.
-    :ivar seen: Result of `observe` in the last stable state; empty before the first.
     :ivar is_followed: True if the strategy chooses the requests.
     :ivar due_s: Time at which the next assumption is to be reported.
     :ivar wake: Called with that time when it has come nearer.
@@ -254,26 +306,28 @@ class ProgressAccount:
 
     __slots__ = (
         '_approached',
-        '_changes',
+        '_change',
         '_chosen',
         '_count',
         '_counts',
         '_items',
         '_known',
         '_known_count',
+        '_memories',
+        '_memory',
         '_missions',
         '_numbers',
+        '_open',
         '_recorder',
         '_reported',
         '_requests',
         '_since_s',
+        '_situation',
         '_system',
         '_timeout_s',
         '_visits',
         'due_s',
         'is_followed',
-        'observe',
-        'seen',
         'wake',
     )
 
@@ -285,7 +339,7 @@ class ProgressAccount:
         timeout_s: float,
     ) -> None:
         self._system = system
-        self.observe = system.observe
+        self._situation = system.situation
         self._recorder = recorder
         self._requests = requests
         self._timeout_s = timeout_s if timeout_s > 0 else math.inf
@@ -296,62 +350,132 @@ class ProgressAccount:
         self._numbers = range(len(self._items))
         self._missions = _missions(description)
         self._visits = range(self._count - sum(map(_size, self._missions)), self._count)
-        # Known changes, by what was seen before them.
-        self._known: Dict[Tuple[bool, ...], Dict[Tuple[bool, ...], _Change]] = {}
+        self._memories: Dict[Any, _Memory] = {}
         self._known_count = 0
+        # Changes that came about and are not in the counts and times yet.
+        self._open: List[_Change] = []
         self.is_followed = False
         self.wake: Callable[[float], None] = lambda due_s: None
         self.restart()
 
     def restart(self) -> None:
-        """Forget everything: the system is in its initial state again."""
+        """Forget what happened: the system is in its initial state again."""
         number = len(self._items)
-        self.seen: Tuple[bool, ...] = ()
         self._counts = [0] * number
         self._since_s = [0.0] * number
+        for change in self._open:
+            change.times = 0
+        self._open.clear()
         self._reported: Set[int] = set()
-        self._changes = self._known.setdefault((), {})
+        self._memory = self._remember(())
+        self._change = _Change(self._memory, (), (), is_owed=False)
+        self._known = self._memory.known
         self._approached: Optional[int] = None
         self._chosen: Optional[int] = None
         self.due_s = math.inf
 
-    def change(self, seen: Tuple[bool, ...]) -> None:
-        """Take in a stable state in which something else than `seen` is seen."""
+    @property
+    def seen(self) -> Tuple[bool, ...]:
+        """Return what the system saw in the last stable state; empty before the first."""
+        return self._memory.seen
+
+    def observe(self) -> None:
+        """Take in a stable state."""
         # This is written out for speed: the cycle time of the controller.
-        change = self._changes.get(seen)
+        change = self._known.get(self._situation())
         if change is None:
-            change = self._learn(seen)
-        unmet, reached, is_owed, self._changes = change
-        self.seen = seen
-        if unmet:
-            now_s, since_s = self._recorder.began_s, self._since_s
-            for number in unmet:
-                since_s[number] = now_s
-            if is_owed and now_s + self._timeout_s < self.due_s:
+            change = self._learn()
+        self._change = change
+        self._memory = change.after
+        self._known = change.known
+        if change.reached or change.unmet:
+            now_s = change.at_s = self._recorder.began_s
+            if change.times:
+                change.times += 1
+            else:
+                self._begin(change)
+            if change.is_owed and now_s + self._timeout_s < self.due_s:
                 # One that was to be reported earlier may be met by now: that costs a look.
                 self.due_s = now_s + self._timeout_s
                 self.wake(self.due_s)
-        if reached:
-            counts = self._counts
-            for number in reached:
-                counts[number] += 1
-            if self._reported or self._recorder.is_active:
-                self._report(reached)
+            if change.reached and (self._reported or self._recorder.is_active):
+                self._report(change.reached)
+
+    def _learn(self) -> _Change:
+        """Return the change to this stable state, which is not known."""
+        before = self._memory.seen
+        self._system.recall(self._memory.remembered)
+        seen = self._system.observe()
+        changed = [it for it in self._numbers if not before or seen[it] is not before[it]]
+        unmet = tuple(number for number in changed if not seen[number])
+        reached: List[int] = []
+        if before:
+            reached += [it for it in changed if seen[it] and it not in self._visits]
+            reached += self._visits_made(before, seen)
+        is_owed = any(number >= self._count for number in unmet)
+        change = _Change(self._remember(seen), unmet, tuple(reached), is_owed)
+        if self._known_count < MAXIMUM_CHANGES:
+            self._known[self._situation()] = change
+            self._known_count += 1
+        return change
 
     def decide(self) -> Optional[int]:
         """Return the number of the request that the strategy chooses in this stable state."""
-        chosen = self._chosen = self._system.choose()
-        approached = self._system.mode
-        if chosen is None and False not in self.seen[: self._count]:
-            approached = NO_AIM
+        choice = self._change.choice
+        if choice is None:
+            choice = self._change.choice = self._choose()
+        chosen, approached, memory = choice
+        self._chosen = chosen
+        self._memory = memory
+        self._known = memory.known
         if approached != self._approached:
             self._approached = approached
             if self._recorder.is_active:
                 self._recorder.approach(None if approached == NO_AIM else self._items[approached])
         return chosen
 
+    def _choose(self) -> _Choice:
+        """Ask the strategy; what it remembered may be of another state."""
+        system = self._system
+        system.recall(self._memory.remembered)
+        seen = system.observe()
+        chosen = system.choose()
+        approached = system.mode
+        if chosen is None and False not in seen[: self._count]:
+            approached = NO_AIM
+        return _Choice(chosen, approached, self._remember(seen))
+
+    def _remember(self, seen: Tuple[bool, ...]) -> _Memory:
+        """Return the memory of a state in which this was seen."""
+        key = seen, self._system.remembered()
+        memory = self._memories.get(key)
+        if memory is None:
+            memory = _Memory(*key)
+            if self._known_count < MAXIMUM_CHANGES:
+                self._memories[key] = memory
+        return memory
+
+    def _begin(self, change: _Change) -> None:
+        """Note a change that is to get into the account."""
+        change.times = 1
+        self._open.append(change)
+        if len(self._open) >= _MAXIMUM_OPEN:
+            self._update()
+
+    def _update(self) -> None:
+        """Bring the account up to date."""
+        counts, since_s = self._counts, self._since_s
+        for change in self._open:
+            for number in change.reached:
+                counts[number] += change.times
+            for number in change.unmet:
+                since_s[number] = max(since_s[number], change.at_s)
+            change.times = 0
+        self._open.clear()
+
     def expire(self, now_s: float) -> None:
         """Report each assumption that is owed for too long by now, once."""
+        self._update()
         for number in self._owed():
             # The sum is the deadline: their difference may be rounded to less.
             if now_s >= self._since_s[number] + self._timeout_s and number not in self._reported:
@@ -362,6 +486,7 @@ class ProgressAccount:
 
     def at(self, now_s: float) -> Progress:
         """Return the progress at a time."""
+        self._update()
         made = self._made()
         standings = [self._standing(number, now_s, made) for number in self._numbers]
         approached, chosen = self._approached, self._chosen
@@ -408,25 +533,6 @@ class ProgressAccount:
                 made.update(range(tour.first, tour.first + number))
         return made
 
-    def _learn(self, seen: Tuple[bool, ...]) -> _Change:
-        """Find out what changes between the last stable state and this one."""
-        if self._known_count >= MAXIMUM_CHANGES:
-            self._known.clear()
-            self._changes = self._known.setdefault(self.seen, {})
-            self._known_count = 0
-        before = self.seen
-        changed = [it for it in self._numbers if not before or seen[it] is not before[it]]
-        unmet = tuple(number for number in changed if not seen[number])
-        reached: List[int] = []
-        if before:
-            reached += [it for it in changed if seen[it] and it not in self._visits]
-            reached += self._visits_made(before, seen)
-        is_owed = any(number >= self._count for number in unmet)
-        change = _Change(unmet, tuple(reached), is_owed, self._known.setdefault(seen, {}))
-        self._changes[seen] = change
-        self._known_count += 1
-        return change
-
     def _visits_made(self, before: Tuple[bool, ...], seen: Tuple[bool, ...]) -> Iterator[int]:
         """Yield the numbers of the visits that are made between two stable states."""
         for mission in self._missions:
@@ -448,6 +554,7 @@ class ProgressAccount:
                 yield from _tour_made(tour, first, (tour.visits if now is None else now) - first)
 
     def _report(self, reached: Tuple[int, ...]) -> None:
+        self._update()
         for number in reached:
             if number < self._count:
                 self._recorder.reached(self._items[number], self._counts[number])

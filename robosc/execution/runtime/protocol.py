@@ -262,11 +262,27 @@ class StrategicSystem(ControlledSystem, Protocol):
     """
     A controlled system with a strategy, which its description says.
 
+    What it makes of a stable state depends on that state's situation and on what it remembers, so
+    that an executor need not ask again what it asked before.
+
     :ivar mode: Number of the aim whose turn it is: the one that the last choice approached, unless
         all of them were met.
     """
 
     mode: int
+
+    def situation(self) -> Any:
+        """
+        Return the part of the state that `observe` and `choose` depend on, as a hashable value.
+
+        Everything else that they depend on is remembered.
+        """
+
+    def remembered(self) -> Any:
+        """Return what is remembered of goals and missions, with `mode`, as a hashable value."""
+
+    def recall(self, remembered: Any) -> None:
+        """Remember what `remembered` has returned, and nothing else."""
 
     def observe(self) -> Tuple[bool, ...]:
         """
@@ -284,7 +300,7 @@ class StrategicSystem(ControlledSystem, Protocol):
         """
         Return the number of the request that the strategy chooses in this stable state.
 
-        None if it waits. Goals that are true are noted.
+        The state has been observed. None if the strategy waits. Goals that are true are noted.
         """
 
 

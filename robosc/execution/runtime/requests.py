@@ -6,6 +6,7 @@ from typing import Dict, NamedTuple, Optional, Sequence, Tuple
 
 from robosc.execution.runtime.calls import Calls, Goals
 from robosc.execution.runtime.decision import Policy
+from robosc.execution.runtime.progress import ProgressAccount
 from robosc.execution.runtime.protocol import (
     CommunicationInfo,
     ControlledSystem,
@@ -18,6 +19,7 @@ from robosc.execution.runtime.release import Releases
 from robosc.execution.runtime.steps import Steps
 
 _MESSAGE = 'incoming message'
+_ACTION = 'action'
 
 
 class Request(NamedTuple):
@@ -80,12 +82,10 @@ class Decisions:
     :param releases: Messages that keep acting.
     :param calls: Service calls under way.
     :param goals: Goals under way.
-    :param policy: Policy that decides between enabled requests, by number; may be replaced.
     """
 
     __slots__ = (
         '_calls',
-        '_candidates',
         '_goals',
         '_middleware',
         '_recorder',
@@ -93,7 +93,6 @@ class Decisions:
         '_requests',
         '_steps',
         '_system',
-        'policy',
     )
 
     def __init__(
@@ -106,7 +105,6 @@ class Decisions:
         releases: Releases,
         calls: Calls,
         goals: Goals,
-        policy: Policy,
     ) -> None:
         self._system = system
         self._middleware = middleware
@@ -116,37 +114,6 @@ class Decisions:
         self._releases = releases
         self._calls = calls
         self._goals = goals
-        self.policy = policy
-        # The policy's choice among what is enabled depends on the stable state alone.
-        self._candidates: Tuple[int, ...] = ()
-
-    def decide(self, now_s: float) -> bool:
-        """
-        Issue one of the enabled requests of this stable state, if there is any.
-
-        :returns: True if a service was called or a goal was sent, so that something new waits for
-            time to pass.
-        """
-        enabled = self._steps.enabled
-        if enabled is None:
-            enabled = self._steps.enabled = self._find_enabled()
-            # A strategy notes the goals that are true, also where it has nothing to choose.
-            self._candidates = self.policy.candidates(enabled)
-        issued = None
-        candidates = self._candidates
-        if enabled:
-            if self._releases.waiting:
-                ending, others = self._split(candidates)
-                issued = self._issue_one_of(ending, now_s)
-                if issued is None:
-                    # A strategy may choose something else, or nothing: then none of them comes.
-                    if candidates is not enabled:
-                        self._release_waiting()
-                    issued = self._issue_one_of(others, now_s)
-            else:
-                issued = self._issue_one_of(candidates, now_s)
-        self.policy.close(enabled)
-        return issued is not None and issued.kind != _MESSAGE
 
     def _find_enabled(self) -> Tuple[int, ...]:
         """
@@ -170,23 +137,6 @@ class Decisions:
         }
         ending = tuple([number for number in enabled if self._requests[number].name in names])
         return ending, tuple([number for number in enabled if number not in ending])
-
-    def _release_waiting(self) -> None:
-        """Release what waits for a message that does not come."""
-        for identifier in self._releases.waiting:
-            self._steps.release(identifier)
-
-    def _issue_one_of(self, candidates: Tuple[int, ...], now_s: float) -> Optional[Request]:
-        """Issue and return the policy's choice, or the next if its data is not known or unfit."""
-        policy = self.policy
-        while candidates:
-            chosen = policy.choose(candidates)
-            request = self._requests[chosen]
-            if self._issue(request, now_s):
-                policy.issued(chosen)
-                return request
-            candidates = tuple([number for number in candidates if number != chosen])
-        return None
 
     def _issue(self, request: Request, now_s: float) -> bool:
         """Issue a request; return False if its data is unknown or does not fit."""
@@ -233,3 +183,106 @@ class Decisions:
         if request.keeps_acting and self._releases.is_acting(request.identifier):
             self._steps.release(request.identifier)
         return False
+
+
+class PolicyDecisions(Decisions):
+    """
+    Decisions by a policy that chooses among the enabled requests.
+
+    :ivar policy: The policy; may be replaced.
+    """
+
+    __slots__ = ('policy',)
+
+    policy: Policy
+
+    def decide(self, now_s: float) -> bool:
+        """
+        Issue one of the enabled requests of this stable state, if there is any.
+
+        :returns: True if a service was called or a goal was sent, so that something new waits for
+            time to pass.
+        """
+        enabled = self._steps.candidates
+        if enabled is None:
+            enabled = self._steps.candidates = self._find_enabled()
+        issued = None
+        if enabled:
+            if self._releases.waiting:
+                ending, others = self._split(enabled)
+                issued = self._issue_one_of(ending, now_s)
+                if issued is None:
+                    issued = self._issue_one_of(others, now_s)
+            else:
+                issued = self._issue_one_of(enabled, now_s)
+        self.policy.close(enabled)
+        return issued is not None and issued.kind != _MESSAGE
+
+    def _issue_one_of(self, candidates: Tuple[int, ...], now_s: float) -> Optional[Request]:
+        """Issue and return the policy's choice, or the next if its data is not known or unfit."""
+        policy = self.policy
+        while candidates:
+            chosen = policy.choose(candidates)
+            request = self._requests[chosen]
+            if self._issue(request, now_s):
+                policy.issued(chosen)
+                return request
+            candidates = tuple([number for number in candidates if number != chosen])
+        return None
+
+
+class StrategyDecisions(Decisions):
+    """
+    Decisions by the strategy of the supervisor: the request that it chooses, or none.
+
+    :ivar progress: Account of the strategy's progress, which asks the strategy.
+    """
+
+    __slots__ = ('progress',)
+
+    progress: ProgressAccount
+
+    def decide(self, now_s: float) -> bool:
+        """
+        Issue the chosen request of this stable state, if it is enabled.
+
+        :returns: True if a service was called or a goal was sent, so that something new waits for
+            time to pass.
+        """
+        candidates = self._steps.candidates
+        if candidates is None:
+            candidates = self._steps.candidates = self._find_chosen()
+        if self._releases.waiting:
+            ending, others = self._split(candidates)
+            if ending and self._issue(self._requests[ending[0]], now_s):
+                return False
+            # The strategy chooses something else, or nothing: then no message comes that the
+            # releases wait for.
+            self._release_waiting()
+            candidates = others
+        if not candidates:
+            return False
+        request = self._requests[candidates[0]]
+        return self._issue(request, now_s) and request.kind != _MESSAGE
+
+    def _find_chosen(self) -> Tuple[int, ...]:
+        """
+        Return the number of the chosen request alone, or nothing.
+
+        An action whose cancelled goal is not known to have ended is waited for. A strategy is
+        asked also where it has nothing to choose: it notes the goals that are true.
+        """
+        chosen = self.progress.decide()
+        if chosen is None:
+            return ()
+        request = self._requests[chosen]
+        if not self._system.enabled(request.event):
+            return ()
+        if request.kind == _ACTION and self._goals.is_open(request.name):
+            return ()
+        return (chosen,)
+
+    def _release_waiting(self) -> None:
+        """Release what waits for a message that does not come."""
+        for identifier in self._releases.waiting:
+            self._steps.release(identifier)

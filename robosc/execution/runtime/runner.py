@@ -183,7 +183,11 @@ class Runner:
 
     @property
     def progress(self) -> Optional[Progress]:
-        """Return how far the strategy is; None where there is none."""
+        """
+        Return how far the strategy is; None where there is none.
+
+        This brings the account up to date, so that it is for the thread of all other calls, too.
+        """
         if self._progress is None:
             return None
         return self._progress.at(self._clock.monotonic())

@@ -34,8 +34,8 @@ class Steps:
     :param goals: Goals under way.
     :param on_unknown: Meaning of an unknown enum: `default`, `keep` or `fault`.
     :param progress: Account of the strategy's progress; None where there is no strategy.
-    :ivar enabled: Numbers of the requests that the stable state enables, or None before they are
-        computed.
+    :ivar candidates: Numbers of the requests that may be issued in the stable state, or None
+        before they are computed.
     :ivar unchanging: Messages whose request was issued in this stable state and changed nothing:
         their data, and whether it is the default. A request's data and its step depend only on
         the state.
@@ -51,7 +51,7 @@ class Steps:
         '_releases',
         '_stable',
         '_system',
-        'enabled',
+        'candidates',
         'unchanging',
     )
 
@@ -72,7 +72,7 @@ class Steps:
         self._goals = goals
         self._on_unknown = on_unknown
         self._progress = progress
-        self.enabled: Optional[Tuple[int, ...]] = None
+        self.candidates: Optional[Tuple[int, ...]] = None
         self.unchanging: Dict[str, Tuple[Any, bool]] = {}
         # The system's `changes` in the last stable state, or None if the state may not be stable.
         self._stable: Optional[int] = None
@@ -85,7 +85,7 @@ class Steps:
         if self._progress is not None:
             self._progress.restart()
         self._stable = None
-        self.enabled = None
+        self.candidates = None
         self.unchanging.clear()
         self._pending = None
 
@@ -170,17 +170,14 @@ class Steps:
         if has_changed:
             # Should anything raise on the way, the state does not count as stable.
             self._stable = None
-            self.enabled = None
+            self.candidates = None
             self.unchanging.clear()
             event = self._silent_step()
             if event is not None:
                 self._run_on(event)
             self._stable = self._system.changes
-            progress = self._progress
-            if progress is not None:
-                seen = progress.observe()
-                if seen != progress.seen:
-                    progress.change(seen)
+            if self._progress is not None:
+                self._progress.observe()
             if self._goals:
                 self._goals.observe_stable_state()
             for identifier in self._releases.due(issuing):

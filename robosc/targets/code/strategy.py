@@ -1,7 +1,7 @@
 """Memory and choices of a strategy, as statements that all languages share."""
 
 from collections import Counter
-from collections.abc import Iterable
+from collections.abc import Collection, Iterable
 
 from robosc.automata.executable import ExecutableSystem
 from robosc.automata.goal_memory import MEMORY, Place, Tour
@@ -13,15 +13,24 @@ from robosc.targets.code.naming import Namer
 from robosc.targets.code.statements import Assign, Block, Comment, Let, Return, when
 
 
-def observing(executable: ExecutableSystem, scope: ExpressionWriter, namer: Namer) -> Block:
-    """Return the statements that take in a stable state: all that is remembered changes at once."""
+def observing(
+    executable: ExecutableSystem, scope: ExpressionWriter, namer: Namer, besides: Collection[str] = ()
+) -> Block:
+    """Return the statements that take in a stable state: all that is remembered changes at once.
+
+    Args:
+        executable: Executable system of the robot.
+        scope: Writer of expressions over the state.
+        namer: Namer of the function.
+        besides: Names of places that other statements change.
+    """
     obligations = executable.obligations
     locals_ = _Locals(namer)
     moving = {place for tour in obligations.tours for place in tour.places}
     kept = [
         (place, locals_.held("kept", scope.truth(place.update), always=True))
         for place in obligations.places
-        if place not in moving
+        if place not in moving and place.name not in besides
     ]
     kept += [item for tour in obligations.tours if tour.places for item in _moved(tour, scope, locals_)]
     assigned = [Assign(scope.variable_place(MEMORY, place.name), code) for place, code in kept]

@@ -17,8 +17,13 @@ WIDE = 5
 """Digits from which an integer is wide."""
 
 
-def place_order(system: System) -> tuple[int, ...]:
-    """The places of a state tuple in a good order."""
+def place_order(system: System, followers: Mapping[Subject, Set[Subject]] | None = None) -> tuple[int, ...]:
+    """The places of a state tuple in a good order.
+
+    Args:
+        system: The system.
+        followers: For some places that no event moves, others: each stands right behind the last one of these.
+    """
     places = {subject: place for place, subject in enumerate(subjects(system))}
     weights: list[dict[int, float]] = [{} for _ in places]
     for group in _groups(system):
@@ -28,7 +33,19 @@ def place_order(system: System) -> tuple[int, ...]:
                 if other != place:
                     # A condition that ties many places together ties each two of them loosely.
                     weights[place][other] = weights[place].get(other, 0.0) + 1 / (len(members) - 1)
-    return cuthill_mckee(weights)
+    order = cuthill_mckee(weights)
+    return _followed(order, {places[one]: {places[item] for item in read} for one, read in (followers or {}).items()})
+
+
+def _followed(order: tuple[int, ...], followers: Mapping[int, Set[int]]) -> tuple[int, ...]:
+    """Return an order in which each of some places stands right behind the last one of others."""
+    level = {place: number for number, place in enumerate(order)}
+    behind: dict[int, list[int]] = {}
+    for place, others in followers.items():
+        if others:
+            behind.setdefault(max(others, key=lambda other: level[other]), []).append(place)
+    moved = {place for places in behind.values() for place in places}
+    return tuple(item for place in order if place not in moved for item in (place, *behind.get(place, ())))
 
 
 def cuthill_mckee(weights: Sequence[dict[int, float]]) -> tuple[int, ...]:

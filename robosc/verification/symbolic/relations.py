@@ -4,6 +4,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+from robosc.automata.compile import Carried
 from robosc.automata.decision import Decision
 from robosc.automata.semantics import plant_invariants_on
 from robosc.automata.state import Subject, subject_type
@@ -90,8 +91,17 @@ class Relations:
         """Return the predicate that conditions are all true."""
         return self._variables.all_of(self._plain.truth(condition).true for condition in conditions)
 
-    def relation(self, event: Event) -> Relation:
-        """The relation of an event."""
+    def truth(self, condition: Expression) -> Any:
+        """Return the predicate that a condition is true."""
+        return self._plain.truth(condition).true
+
+    def relation(self, event: Event, options: Iterable[Carried] | None = None) -> Relation:
+        """The relation of an event.
+
+        Args:
+            event: The event.
+            options: Data that it can carry, each as the values of some paths, None where one is unknown; None: any.
+        """
         variables, manager = self._variables, self._variables.manager
         automata = [item for item in variables.system.automata if event.name in item.alphabet]
         places = sorted(place for item in automata for place in self._changed(item, event.name))
@@ -101,6 +111,8 @@ class Relations:
         able = self._conditions(event, variables.system.plant_conditions) if automata else manager.false
         possible = variables.all_of([able, *(part.possible for part in plants)])
         data = variables.possible_data(event.name)
+        if options is not None:
+            data = data & variables.any_of(variables.carried(event.name, item) for item in options)
         names_of_data = [
             name
             for (owner, _), digits in variables.data.items()

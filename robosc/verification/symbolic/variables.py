@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 from typing import Any
 
-from robosc.automata.compile import State
+from robosc.automata.compile import Carried, State
 from robosc.automata.decision import Decision
 from robosc.automata.inputs import connected_inputs, valuations
 from robosc.automata.state import Subject, initial_values, subject_domain, subjects
@@ -82,6 +82,12 @@ def make_manager(engine: str) -> Any:
 class Variables:
     """All variables of a system.
 
+    Args:
+        system: The system.
+        engine: Engine of the decision diagrams: see `make_manager`.
+        work: Count of the work.
+        followers: For some places of a state that no event moves, what they depend on: see `place_order`.
+
     Attributes:
         manager: The decision diagrams.
         system: The system.
@@ -90,7 +96,9 @@ class Variables:
         level: Depth of each variable, of all there are.
     """
 
-    def __init__(self, system: System, engine: str, work: Work) -> None:
+    def __init__(
+        self, system: System, engine: str, work: Work, followers: Mapping[Subject, Set[Subject]] | None = None
+    ) -> None:
         self.system = system
         self.manager = make_manager(engine)
         self.work = work
@@ -104,7 +112,7 @@ class Variables:
             for number, item in enumerate(system.inputs)
         }
         self.level: dict[str, int] = {}
-        self.names = self._declare(place_order(system))
+        self.names = self._declare(place_order(system, followers))
         allow_depth(2 * len(self.names) + sum(len(item.names) + 1 for item in self.data.values()), _FRAMES_PER_LEVEL)
 
     def _add(self, *names: str) -> None:
@@ -263,6 +271,15 @@ class Variables:
         for group in connected_inputs(inputs):
             if any(item.may_be_unknown for item in group):
                 result = result & self._possible_knowledge(group)
+        return result
+
+    def carried(self, event: str, data: Carried) -> Any:
+        """Return the predicate that an occurrence of an event carries some data."""
+        result = self.manager.true
+        for path, value in data:
+            digits = self.data[event, path]
+            known = self.manager.true if digits.known is None else self.manager.var(digits.known)
+            result = result & (~known if value is None else known & self.has_value(digits, value))
         return result
 
     def _has_any_value(self, digits: Digits) -> Any:

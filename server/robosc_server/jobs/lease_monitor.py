@@ -145,9 +145,7 @@ class LeaseMonitor:
 
     async def _notify_watchers(self) -> None:
         """Notify watchers of jobs that other servers have changed."""
-        watched = {
-            job_id: revision for job_id, revision in self._watchers.revisions().items() if job_id not in self._runner
-        }
+        watched = self._watchers.revisions(self._runner)
         if watched:
             changed, forgotten = await self._store.find_changed(watched)
             for record in changed:

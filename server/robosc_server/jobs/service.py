@@ -9,6 +9,7 @@ import grpc
 import grpc.aio
 
 from robosc_api import security
+from robosc_api.layers import LayeredServices
 from robosc_api.v1 import jobs_pb2 as pb
 from robosc_server.jobs import convert
 from robosc_server.jobs.manager import Caller, JobManager
@@ -166,20 +167,20 @@ class JobService(convert.JobServiceServicer):
         return convert.job_of(record, self._manager.waiting_before(record))
 
 
-def add_job_service(service: JobService, server: grpc.aio.Server) -> None:
-    """Add the service to a server, with serialized results and serialized submissions."""
-    convert.add_servicer(service, _SerializedAdapter(server))  # type: ignore[no-untyped-call]  # generated
+def add_job_service(service: JobService, services: LayeredServices) -> None:
+    """Add the service to those of a server, with serialized results and serialized submissions."""
+    convert.add_servicer(service, _SerializedAdapter(services))  # type: ignore[no-untyped-call]  # generated
 
 
 class _SerializedAdapter:
-    """Adapter that passes handlers on to a server, with a serializer that takes serialized messages, too.
+    """Adapter that passes handlers on to other services, with a serializer that takes serialized messages, too.
 
     Args:
-        server: Server that receives the handlers.
+        services: Services that receive the handlers.
     """
 
-    def __init__(self, server: grpc.aio.Server) -> None:
-        self._server = server
+    def __init__(self, services: LayeredServices) -> None:
+        self._services = services
 
     def add_generic_rpc_handlers(self, handlers: Any) -> None:
         """Do nothing: the registered handlers of the same methods take precedence."""
@@ -188,7 +189,7 @@ class _SerializedAdapter:
         """Register the handlers of a service."""
         changed = {name: handler._replace(response_serializer=convert.serialized) for name, handler in handlers.items()}
         changed["SubmitJob"] = changed["SubmitJob"]._replace(request_deserializer=None)
-        self._server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(service, changed),))
+        self._services.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(service, changed),))
 
 
 def _checked_id(text: str) -> str:

@@ -1,20 +1,20 @@
 """Watchers of jobs; an idle watcher takes no time.
 
 A new state is passed on at once. Progress is passed on at a limited rate, since a worker reports it ten times a second:
-a thousand watchers of one job would take half of a processor for lines that people cannot read so fast.
+a thousand watchers of one job would take a third of a processor for lines that people cannot read so fast.
 """
 
 import asyncio
-from collections.abc import Iterator
+from collections.abc import Container, Iterator
 from contextlib import contextmanager
 
 from robosc_server.clock import monotonic
 from robosc_server.store import JobRecord, JobState
 
-PROGRESS_PER_SECOND = 250
+PROGRESS_PER_SECOND = 200
 """Number of messages of progress a second to all watchers of one job, if it has more than a few."""
 
-_FEW = 25
+_FEW = 20
 """Number of watchers that get every report."""
 
 
@@ -143,10 +143,14 @@ class Watchers:
             for watch in audience.watches:
                 watch.wake()
 
-    def revisions(self) -> dict[str, int]:
-        """Return the lowest revision that a watcher knows, for each watched job."""
+    def revisions(self, known: Container[str] = ()) -> dict[str, int]:
+        """Return the lowest revision that a watcher knows, for each watched job.
+
+        Args:
+            known: Ids of jobs that are left out.
+        """
         return {
             job_id: min(watch.revision for watch in audience.watches)
             for job_id, audience in self._by_job.items()
-            if audience.watches
+            if audience.watches and job_id not in known
         }

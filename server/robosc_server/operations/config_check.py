@@ -34,7 +34,7 @@ from robosc_api.security import (
 )
 from robosc_api.security.addresses import split_address
 from robosc_api.security.listening import read
-from robosc_api.security.tokens import SOON_S, lasting_longer, time_text
+from robosc_api.security.tokens import SOON_S, TokenIndex, time_text
 from robosc_server.clock import wall_clock_s
 from robosc_server.operations.descriptors import highest_descriptor_limit, usable_connections
 from robosc_server.operations.metrics import check_metrics_address
@@ -204,15 +204,16 @@ def _tokens(settings: Settings) -> Iterator[tuple[CheckGrade, str]]:
         yield CheckGrade.WARNING, f"{settings.tokens}: {problem}"
     else:
         yield CheckGrade.OK, f"{settings.tokens}: tokens with the scope '{Scope.SYNTHESIZE}': {useful}"
+    index = TokenIndex(entries)
     for entry in entries:
         if entry.expires_s is None or entry.is_valid(now_s + SOON_S):
             continue
         verb = "expires" if entry.is_valid(now_s) else "has expired"
         words = f"{settings.tokens}: the token {entry.id} of '{entry.name}' {verb} at {time_text(entry.expires_s)}"
-        if lasting_longer(entry, entries) is None:
-            yield CheckGrade.WARNING, f"{words}: robosc-server tokens rotate {settings.tokens} {entry.name}"
-        else:
+        if index.is_replaced(entry):
             yield CheckGrade.OK, f"{words}; another one replaces it"
+        else:
+            yield CheckGrade.WARNING, f"{words}: robosc-server tokens rotate {settings.tokens} {entry.name}"
 
 
 def _signing(settings: Settings) -> Iterator[tuple[CheckGrade, str]]:

@@ -11,14 +11,14 @@ import grpc
 import grpc.aio
 import structlog
 
+from robosc_api.calls import call_under_way, peer_of, request_id
 from robosc_api.failures import reason_of
 from robosc_api.layers import Layer, behaviour_of, with_behaviour, writing
-from robosc_api.peers import peer_of
-from robosc_api.security import CALLER
+from robosc_api.security import token_name
 from robosc_api.security.host_sample import HostSample
 from robosc_server.clock import running_clock
 from robosc_server.operations.failures import abort, code_of, fault_message
-from robosc_server.operations.logs import REQUEST_ID, REQUEST_ID_HEADER, log_fault, request_id_of
+from robosc_server.operations.logs import REQUEST_ID_HEADER, log_fault, request_id_of
 from robosc_server.operations.metrics import MethodMetrics, Metrics
 from robosc_server.operations.tracing import NO_TRACING, Tracing
 from robosc_server.tasks.task import Reason, RefusedError
@@ -69,8 +69,7 @@ class CallInterceptor(Layer):
 
     def handler(self, inner: Any, details: Any) -> Any:
         """Return the handler of a call inside this layer."""
-        # The handler runs in the same task, and so sees what is set here.
-        REQUEST_ID.set(request_id_of(details.invocation_metadata))
+        call_under_way().request_id = request_id_of(details.invocation_metadata)
         if inner is None:
             self._metrics.unknown_method()
         return super().handler(inner, details)
@@ -92,7 +91,7 @@ class CallInterceptor(Layer):
             metrics.under_way += 1
             code = _OK
             try:
-                context.set_trailing_metadata(((REQUEST_ID_HEADER, REQUEST_ID.get()),))
+                context.set_trailing_metadata(((REQUEST_ID_HEADER, request_id()),))
                 if self._is_refusing:
                     _refuse(method)
                 answer = await inner(request, context)
@@ -123,11 +122,11 @@ class CallInterceptor(Layer):
     def _traced(self, inner: Any, method: str) -> Any:
         async def traced(request: Any, context: Any) -> Any:
             with self._tracing.call_span(method, context.invocation_metadata()) as span:
-                span.set_attribute("request.id", REQUEST_ID.get())
+                span.set_attribute("request.id", request_id())
                 try:
                     return await inner(request, context)
                 finally:
-                    span.set_attribute("enduser.id", CALLER.get())
+                    span.set_attribute("enduser.id", token_name())
 
         return traced
 
@@ -152,7 +151,7 @@ class CallInterceptor(Layer):
         words: dict[str, Any] = {"method": method, "code": code.name, "seconds": round(seconds, 6)}
         if reason:
             words["reason"] = reason
-        if caller := CALLER.get():
+        if caller := token_name():
             words["caller"] = caller
         if skipped:
             words["skipped"] = skipped

@@ -13,13 +13,13 @@ import sys
 import time
 import traceback
 from collections.abc import MutableMapping
-from contextvars import ContextVar
 from types import TracebackType
 from typing import Any, TextIO
 
 import msgspec
 import structlog
 
+from robosc_api.calls import request_id
 from robosc_server.operations.settings import LogFormat, LogLevel
 from robosc_server.operations.worker_output import last_part, loggable_fields
 
@@ -39,9 +39,6 @@ type _Line = MutableMapping[str, Any]
 
 REQUEST_ID_HEADER = "x-request-id"
 """Metadata key of the request id, in requests and in trailing metadata."""
-
-REQUEST_ID: ContextVar[str] = ContextVar("request_id", default="")
-"""Identifier of the call under way; empty: no call."""
 
 _REQUEST_ID_FORM = re.compile(r"[A-Za-z0-9._:/+=@-]{1,128}\Z")
 
@@ -149,7 +146,7 @@ def _code_locations(begin: TracebackType | None) -> list[str]:
 def _time_and_request(logger: Any, name: str, line: _Line) -> _Line:
     now_ns = time.time_ns()
     line["time"] = f"{_second(now_ns // 1_000_000_000)}.{now_ns // 1_000_000 % 1000:03d}Z"
-    request = REQUEST_ID.get()
+    request = request_id()
     if request and "request" not in line:
         line["request"] = request
     return line

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
+from robosc_api.calls import call_under_way, peer_of
 from robosc_api.connection_watch import Arrivals, is_health_check
-from robosc_api.layers import Layer, behaviour_of, when_call_ends, with_behaviour
-from robosc_api.peers import peer_of
-from robosc_api.security import ENTRY, caller_of, is_loopback_peer, network_of
+from robosc_api.layers import Layer, behaviour_of, with_behaviour
+from robosc_api.security import caller_of, is_loopback_peer, network_of
 from robosc_server.tasks.task import Reason, RefusedError
 
 HEALTH_CALLS = 1000
@@ -114,7 +114,8 @@ class _CallSlots:
         """
         peer = peer_of(context)
         count = self._by_caller.get(caller, 0)
-        entry = ENTRY.get()
+        call = call_under_way()
+        entry = call.entry
         limit = self._limits.per_caller if entry is None or entry.quota.calls is None else entry.quota.calls
         if count >= limit:
             self._refused(peer)
@@ -129,13 +130,13 @@ class _CallSlots:
         self.taken += 1
         # An unread response keeps the call open after the handler has returned.
         self._arrivals.begun(peer)
-        when_call_ends(partial(self._release, caller, peer))
+        call.at_end.append(partial(self._release, caller, peer))
 
     def _refused(self, peer: str) -> None:
         if not self._are_checks:
             self._arrivals.refused(peer)
 
-    def _release(self, caller: str, peer: str, task: Any) -> None:
+    def _release(self, caller: str, peer: str) -> None:
         self._arrivals.ended(peer, is_check=self._are_checks)
         self.taken -= 1
         left = self._by_caller[caller] - 1

@@ -7,7 +7,9 @@ from pathlib import Path
 
 from execution.robots import WITHOUT, supervisor
 from figures import micro
+from robosc.supervisor import Supervisor
 from robosc.targets import generate
+from robosc.targets.code.c.layout import make_layout
 from robosc_experiments.cycles.times import CYCLES, RUNS
 
 # The callbacks are those of `robosc_experiments/cycles/scripts/changing.c`, which is compiled as it is.
@@ -107,8 +109,13 @@ _OTHER = {
 
 def built(name: str, main: str, folder: Path, gcc: str) -> Path:
     """A program around the generated C of a robot."""
-    prefix = f"{name}_supervisor"
-    for path, text in generate(supervisor(name), "c99").items():
+    return program(supervisor(name), main, folder, gcc)
+
+
+def program(made: Supervisor, main: str, folder: Path, gcc: str) -> Path:
+    """A program around the generated C of a supervisor."""
+    prefix = make_layout(made).prefix
+    for path, text in generate(made, "c99").items():
         (folder / path).write_text(text, encoding="utf-8")
     (folder / "bench.c").write_text(
         (_COMMON + main).replace("@p@", prefix).replace("@P@", prefix.upper()), encoding="utf-8"

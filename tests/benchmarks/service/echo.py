@@ -41,10 +41,10 @@ def _handler(size: int) -> Any:
     return grpc.unary_unary_rpc_method_handler(answer)
 
 
-def _layers(count: int, methods: Mapping[str, int]) -> Any:
-    """The first layers of the service, with its limits."""
+def _layered(count: int, methods: Mapping[str, int]) -> Any:
+    """Return services inside the first layers of the service, with its limits."""
     from robosc_api.connection_watch import Arrivals
-    from robosc_api.layers import Layers
+    from robosc_api.layers import LayeredServices
     from robosc_api.request_timeouts import RequestTimeouts
     from robosc_api.security import Guard, Rule, Scope, token_or_host_of
     from robosc_server.operations.interceptor import CallInterceptor
@@ -64,15 +64,18 @@ def _layers(count: int, methods: Mapping[str, int]) -> Any:
         arrivals,
     )
     assert len(every) == len(LAYERS)
-    return Layers(*every[:count])
+    return LayeredServices(*every[:count], most_calls=20_000)
 
 
 async def serve(sizes: Mapping[str, int], layers: int) -> None:
     """Serve until standard input ends."""
-    interceptors = [_layers(layers, sizes)] if layers else []
-    server = grpc.aio.server(options=(("grpc.so_reuseport", 0),), interceptors=interceptors)
+    server = grpc.aio.server(options=(("grpc.so_reuseport", 0),))
+    services: Any = server
+    if layers:
+        services = _layered(layers, sizes)
+        server.add_generic_rpc_handlers((services,))
     handlers = {name: _handler(size) for name, size in sizes.items()}
-    server.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, handlers),))
+    services.add_generic_rpc_handlers((grpc.method_handlers_generic_handler(SERVICE, handlers),))
     port = server.add_insecure_port("127.0.0.1:0")
     await server.start()
     if layers:

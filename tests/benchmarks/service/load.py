@@ -9,6 +9,7 @@ import asyncio
 import contextlib
 import itertools
 import os
+import resource
 import subprocess
 import sys
 import time
@@ -41,7 +42,7 @@ WATCHERS = 1_000
 
 _SECONDS = 4.0
 _TURNS = 4
-_CONNECTIONS = 20
+_CONNECTIONS = (20, WATCHERS)
 _WARM_UP = 20
 _DISTINCT = 2_000
 _NOBODY = Credentials()
@@ -203,26 +204,32 @@ def _memory(address: str, pid: int) -> str:
 
 
 def _watchers(address: str, pid: int) -> str:
-    """Many who watch a job that goes on."""
+    """Many who watch a job that goes on, on few connections and each on an own one."""
+    columns = []
+    limits = resource.getrlimit(resource.RLIMIT_NOFILE)
+    resource.setrlimit(resource.RLIMIT_NOFILE, (limits[1], limits[1]))
     with Client(address) as client:
-        job = client.submit(Synthesize(bundle_of(long_work(9)))).job
-        before = _resident_bytes(pid)
-        rows = asyncio.run(_watched(address, pid, job.id))
-        client.cancel_job(job.id)
-    rows.insert(1, ["memory for each, kB", f"{(int(rows.pop()[1]) - before) / WATCHERS / 1e3:.1f}"])
-    return text_table(f"{WATCHERS:,} who watch a job", ["", ""], rows)
+        for connections in _CONNECTIONS:
+            job = client.submit(Synthesize(bundle_of(long_work(9)))).job
+            before = _resident_bytes(pid)
+            rows = asyncio.run(_watched(address, pid, job.id, connections))
+            client.cancel_job(job.id)
+            rows.insert(1, ["memory for each, kB", f"{(int(rows.pop()[1]) - before) / WATCHERS / 1e3:.1f}"])
+            columns.append(rows)
+    rows = [[name, *(column[place][1] for column in columns)] for place, (name, _) in enumerate(columns[0])]
+    return text_table(f"{WATCHERS:,} who watch a job", ["connections", *map(str, _CONNECTIONS)], rows)
 
 
-async def _watched(address: str, pid: int, job_id: str) -> list[list[str]]:
+async def _watched(address: str, pid: int, job_id: str, connections: int) -> list[list[str]]:
     ended: list[float] = []
     revisions: list[int] = [0] * WATCHERS
     messages = 0
-    channels = [grpc.aio.insecure_channel(address, (("robosc.bench", number),)) for number in range(_CONNECTIONS)]
+    channels = [grpc.aio.insecure_channel(address, (("robosc.bench", number),)) for number in range(connections)]
     request = jobs_pb2.WatchJobRequest(id=job_id)
 
     async def watch(place: int) -> None:
         nonlocal messages
-        stub = jobs_pb2_grpc.JobServiceStub(channels[place % _CONNECTIONS])  # type: ignore[no-untyped-call]
+        stub = jobs_pb2_grpc.JobServiceStub(channels[place % connections])  # type: ignore[no-untyped-call]
         async for response in stub.WatchJob(request):
             revisions[place] = response.job.revision
             messages += 1

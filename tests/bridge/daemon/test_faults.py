@@ -12,7 +12,7 @@ from pathlib import Path
 
 import pytest
 
-from robosc.execution.runtime.requests import Decisions
+from robosc.execution.runtime.requests import PolicyDecisions
 from robosc_bridge.daemon.loop import Key
 from robosc_bridge.daemon.robot.motion import MotionTarget
 from robosc_bridge.daemon.states import OperatorCommand, State
@@ -272,7 +272,9 @@ def test_an_exception_in_the_executor_stops_the_wheels_and_ends_the_run(
         raise Bug("in a decision")
 
     with driven(base) as bridge:
-        bridge.stopped_after(lambda: monkeypatch.setattr(Decisions, "decide", fails), STATED_S["the executor fails"])
+        bridge.stopped_after(
+            lambda: monkeypatch.setattr(PolicyDecisions, "decide", fails), STATED_S["the executor fails"]
+        )
         assert "Bug: in a decision" in bridge.ended()
         bridge.stays(WHILE_S)
 

@@ -63,7 +63,7 @@ def test_a_file_whose_strategy_does_nothing_fails_with_a_run() -> None:
 
 
 def test_too_many_positions_are_not_checked() -> None:
-    found = verify_supervisor_file(porter_supervisor(), bundle_of(PORTER), replace(LIMITS, positions=10))
+    found = verify_supervisor_file(porter_supervisor(), bundle_of(PORTER), replace(LIMITS, positions=10, work=1_000))
     assert found.goals is CheckOutcome.NOT_CHECKED
     assert (found.unchecked(), found.faults, found.has_passed) == (("goals",), (), False)
     assert found.notes == ("the certificate says 'passed' for what was not checked here: goals",)

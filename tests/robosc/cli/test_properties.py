@@ -8,7 +8,9 @@ from typing import Any
 
 import pytest
 
+import robosc
 from robosc.cli.main import main
+from support.goal_porter import PORTER
 from support.models import EMPTY, EXAMPLES
 
 ROOT = Path(__file__).parents[3]
@@ -112,7 +114,25 @@ def test_without_a_supervisor(tmp_path: Path, capsys: pytest.CaptureFixture[str]
     assert main(["verify", str(model), "--property", "AG true"]) == 1
     assert "no supervisor exists" in capsys.readouterr().err
     assert main(["verify", str(model), "--json", "--property", "AG true"]) == 1
-    assert json.loads(capsys.readouterr().out)["status"] == "empty"
+    found = json.loads(capsys.readouterr().out)
+    assert found["status"] == "empty" and found["reason"].startswith("no supervisor exists")
+    assert main(["synth", str(model), "--json"]) == 1
+    assert found["explanation"] == json.loads(capsys.readouterr().out)["explanation"] is not None
+
+
+def test_goals_that_cannot_be_reached(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    model = tmp_path / "porter.rscd"
+    model.write_text("".join(line for line in PORTER.splitlines(True) if "assume" not in line), encoding="utf-8")
+    assert main(["verify", str(model), "--property", "AG true"]) == 1
+    shown = capsys.readouterr().err
+    assert main(["verify", str(model), "--json", "--property", "AG true"]) == 1
+    found = json.loads(capsys.readouterr().out)
+    assert (found["status"], found["explanation"]) == ("model errors", None)
+    assert main(["synth", str(model), "--json"]) == 1
+    assert found["goals"] == json.loads(capsys.readouterr().out)["goals"]
+    (blamed,) = found["goals"]["blamed"]
+    assert blamed["text"] in shown
+    assert robosc.verify(model, "AG true").report == found
 
 
 def test_the_documentation(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]) -> None:

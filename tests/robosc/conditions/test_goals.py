@@ -7,7 +7,7 @@ import pytest
 from robosc.certification import make_supervisor
 from robosc.conditions.goals import assumption_text, goal_text, goals_in_words
 from robosc.conditions.rendering import in_words
-from robosc.conditions.summary import summary_json, summary_text
+from robosc.conditions.summary import strategy_lines, summary_json, summary_text
 from robosc.expressions import Binary, StateTest, Unary, VariableRead
 from robosc.expressions.text import expression_text
 from robosc.supervisor import Supervisor
@@ -91,8 +91,9 @@ def test_the_summary_tells_for_each_goal_what_is_requested_where(supervisor: Sup
       leave.request  where Base.inside
       nothing        otherwise
     for goal 3, once Door.ajar or Base.inside
-      open.request  where not Door.opening
-      nothing       otherwise
+      open.request   where not Door.opening
+      enter.request  meanwhile for others, where Caller.waiting
+      nothing        otherwise
   it assumes of the surroundings
     assumption 1, allow always eventually not Door.opening
 """
@@ -103,6 +104,7 @@ def test_the_summary_tells_for_each_goal_what_is_requested_where(supervisor: Sup
         "name": "goal 2",
         "goal": "always eventually Base.outside and not Door.opening",
         "choices": [{"event": "leave.request", "condition": "Base.inside"}],
+        "meanwhile": [],
     }
     assert found["assumptions"] == ["allow always eventually not Door.opening"]
     assert found["certificate"]["goals"] == "passed"
@@ -115,6 +117,19 @@ def test_a_condition_that_no_formula_tells_is_told_node_by_node(
     assert "where a decision diagram of 1 node, to be read from [1] on:" in summary_text(supervisor)
     (choice,) = summary_json(supervisor)["goals"][1]["choices"]  # type: ignore[index]
     assert choice["diagram"] == [{"node": 1, "cases": [{"if": "Base.inside", "then": True}], "else": False}]
+
+
+def test_a_strategy_that_never_requests_anything_is_told_as_such() -> None:
+    goals = "goal once Base.outside\n    goal once Door.shut\n}\n"
+    made = make_supervisor(bundle_of(COURIER.partition("    assume ")[0] + goals)).supervisor
+    assert made is not None
+    assert strategy_lines(made) == [
+        "the strategy never requests anything: its goals come true without that",
+        "  for goal 1, once Base.outside",
+        "    nothing  at all",
+        "  for goal 2, once Door.shut",
+        "    nothing  at all",
+    ]
 
 
 def test_without_goals_there_is_nothing_to_tell() -> None:

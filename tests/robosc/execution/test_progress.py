@@ -3,16 +3,16 @@
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
-from unittest.mock import Mock
+from unittest.mock import Mock, patch
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from robosc.event_logs import check_log, read_log
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.clock import ManualClock
-from robosc.execution.runtime.event_log import MemoryLog, json_line
+from robosc.execution.runtime.event_log import EventLog, MemoryLog, NullLog, json_line
 from robosc.execution.runtime.progress import Progress, ProgressAccount
 from robosc.execution.runtime.protocol import Aim, Description
 from robosc.execution.runtime.recorder import Recorder
@@ -35,6 +35,15 @@ class Scripted:
 
     def __init__(self) -> None:
         self.met = (False, False, False)
+
+    def situation(self) -> tuple[bool, ...]:
+        return self.met
+
+    def remembered(self) -> None:
+        pass
+
+    def recall(self, remembered: None) -> None:
+        pass
 
     def observe(self) -> tuple[bool, ...]:
         return self.met
@@ -81,9 +90,7 @@ def test_the_account_tells_what_happened(steps: list[Any]) -> None:
                 assert account.at(now_s).overdue == (("c",) if told(history, now_s)[1][2] else ())
         recorder.began_s = float(now_s)
         system.met = met
-        found_met = account.observe()
-        if found_met != account.seen:
-            account.change(found_met)
+        account.observe()
         history.append((now_s, met))
         found = account.at(now_s)
         standings, _ = told(history, now_s)
@@ -95,6 +102,48 @@ def test_the_account_tells_what_happened(steps: list[Any]) -> None:
     assert kinds == [("owed", "met")[place % 2] for place in range(len(kinds))]
     owed = sum(kind == "owed" for kind in kinds)
     assert owed - kinds.count("met") == len(account.at(now_s).overdue)
+
+
+def _account(system: Scripted, clock: ManualClock, log: EventLog) -> tuple[ProgressAccount, Recorder]:
+    recorder = Recorder(system, clock, log)  # type: ignore[arg-type]  # its state is not needed
+    return ProgressAccount(system, recorder, (), TIMEOUT_S), recorder  # type: ignore[arg-type]
+
+
+@settings(max_examples=examples(200))
+@given(
+    st.lists(
+        st.tuples(st.sampled_from((False, False, False, True)), st.tuples(*[st.booleans()] * 3)),
+        min_size=1,
+        max_size=24,
+    ),
+    st.sampled_from((2, 4096)),
+    st.sampled_from((2, 256)),
+)
+@example(
+    # The same change, another one by which the same aim is not met any more, and the first one again.
+    [
+        (False, (aim, other, True))
+        for aim, other in ((True, True), (False, True), (True, False), (False, False), (True, True), (False, True))
+    ],
+    4096,
+    256,
+)
+def test_the_account_is_the_same_whoever_looked_at_it_before(steps: list[Any], changes: int, kept: int) -> None:
+    """One is read and logged in each state, the other at the end alone, however many changes are remembered."""
+    system, clock = Scripted(), ManualClock()
+    runtime = "robosc.execution.runtime.progress"
+    with patch(f"{runtime}.MAXIMUM_CHANGES", changes), patch(f"{runtime}._MAXIMUM_OPEN", kept):
+        accounts = [_account(system, clock, log) for log in (MemoryLog(), NullLog())]
+        for number, (is_restarted, met) in enumerate(steps):
+            system.met = met
+            for account, recorder in accounts:
+                if is_restarted:
+                    account.restart()
+                recorder.began_s = float(number)
+                account.observe()
+            accounts[0][0].at(float(number))
+        left, right = (account.at(100.0) for account, _ in accounts)
+    assert left == right
 
 
 def porter(**settings: Any) -> Bench:

@@ -19,6 +19,7 @@ from support.models import bundle_of
 from support.random_controllers import random_robot
 from support.random_couriers import strategic_courier
 from support.random_goals import strategic_controller
+from support.random_waiting import strategic_waiting
 
 
 def walk(supervisor: Supervisor, dice: Random, met: Counter[str]) -> None:
@@ -79,6 +80,50 @@ def test_the_executor_issues_what_the_strategy_of_a_courier_chooses() -> None:
             walk(supervisor, Random(seed), met)
             met["robots"] += 1
     assert met["robots"] > 60 and met["requests"] > 400 and met["waits"] > 400, met
+
+
+def test_the_executor_issues_what_the_strategy_chooses_while_it_waits() -> None:
+    met: Counter[str] = Counter()
+    for seed in range(80):
+        supervisor = strategic_waiting(seed)
+        if supervisor is not None:
+            assert supervisor.strategy
+            met["meanwhile"] += any(item.is_meanwhile for mode in supervisor.strategy.modes for item in mode)
+            walk(supervisor, Random(seed), met)
+            met["robots"] += 1
+    assert min(met["robots"], met["meanwhile"]) > 30 and min(met["requests"], met["waits"]) > 400, met
+
+
+BUTTON = """robot Button {
+    component Button {
+        outgoing message press with identifier: "/press", type: none
+        outgoing message release with identifier: "/release", type: none
+        behaviour {
+            initial marked state free { on response from press goto pressed }
+            state pressed { on response from release goto free }
+        }
+    }
+    goal always eventually Button.pressed
+    assume always eventually Button.pressed
+}"""
+
+
+def test_what_is_over_before_the_turn_counts_in_the_progress_alone() -> None:
+    outcome = make_supervisor(bundle_of(BUTTON))
+    assert outcome.supervisor is not None
+    executor = Bench(InterpretedSystem(outcome.supervisor)).executor
+
+    def reached() -> tuple[int, str | None]:
+        executor.tick()
+        assert executor.progress is not None
+        return executor.progress.aims[0].times, executor.progress.approached
+
+    assert reached() == (0, "goal 1")
+    executor.receive("/press", None)
+    executor.receive("/release", None)
+    assert reached() == (1, "goal 1")
+    executor.receive("/press", None)
+    assert reached() == (2, None)
 
 
 BLOCKED = """robot Blocked {

@@ -122,7 +122,13 @@ def test_random_robots_are_denied_a_goal(record_property: Callable[[str, object]
         explanation = robosc.synthesize(robosc.load(text=random_text(Random(seed)))).explanation
         if not isinstance(explanation, GoalExplanation):
             continue
-        assert explanation.counter is not None
+        if explanation.counter is None:
+            # An assumption has to fail, so that the surroundings need not deny anything.
+            assert explanation.is_hopeless
+            with pytest.raises(NoCounterStrategyError, match="the surroundings have no counter-strategy, or one that"):
+                CounterRun(explanation)
+            met["excused"] += 1
+            continue
         run = CounterRun(explanation)
         keeps_to_the_rules(run, 40, Random(seed), len(explanation.counter.stages))
         met["played"] += 1

@@ -2,8 +2,10 @@
 
 import pytest
 
-from robosc.certification import make_supervisor
+from robosc.certification import make_supervisor, strategies
+from robosc.certification.strategies import verify_strategy
 from robosc.strategies import arena
+from robosc.verification import CheckOutcome, Limits
 from support.models import bundle_of
 
 PATROL = """robot Patrol {
@@ -54,3 +56,15 @@ def test_a_low_battery_is_one_with_a_small_reserve() -> None:
 def test_too_many_cases_count_as_independent(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(arena, "MAXIMUM_CASES", 1)
     assert codes() == ["unreachable-goal"]
+
+
+def test_a_fault_that_only_too_many_cases_show_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    supervisor = make_supervisor(bundle_of(PATROL)).supervisor
+    assert supervisor is not None and supervisor.strategy is not None
+    limits = Limits(0, 0, 10**6)
+    given = (supervisor.executable, supervisor.added, supervisor.strategy, limits)
+    assert verify_strategy(*given).outcome is CheckOutcome.PASSED
+    monkeypatch.setattr(strategies, "MAXIMUM_CASES", 1)
+    found = verify_strategy(*given)
+    assert (found.outcome, found.missed) == (CheckOutcome.NOT_CHECKED, None)
+    assert found.method == ("goals not checked: more than 0 positions, and the data of a message has more than 1 cases")

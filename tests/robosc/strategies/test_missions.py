@@ -6,7 +6,7 @@ import msgspec
 import pytest
 
 import robosc
-from robosc.automata import ExecutableSystem
+from robosc.automata import ExecutableSystem, to_automata
 from robosc.cli.simulate import mission_json
 from robosc.cli.simulation_steps import state_lines, step_lines
 from robosc.conditions.summary import strategy_lines, summary_json
@@ -16,9 +16,10 @@ from robosc.execution.interpreter import InterpretedSystem
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model, Preference
 from robosc.source import Location
-from robosc.strategies import goal_findings, layer_goal_findings
+from robosc.strategies import goal_findings, layer_goal_findings, put_off_findings
 from robosc.strategies.preferences import preferred_order
 from robosc.supervisor import Supervisor
+from robosc.synthesis import synthesize
 from support.execution import Bench
 from support.missions import courier, strategic, strategy_result
 from support.models import model_of
@@ -141,6 +142,7 @@ def test_a_detour_is_begun_where_the_way_to_a_visit_leads_through_it() -> None:
     }"""
     bench = bench_of(model_of(text))
     assert sent(bench, 8) == ["forth", "light", "forth", "back", "light", "back", "forth", "light"]
+    assert findings(model_of(text)) == ()
     # Without the requirement no detour is needed.
     bench = bench_of(model_of(text.replace("requirement light needs Base.hall", "")))
     assert sent(bench, 3) == ["light", "forth", "forth"]
@@ -184,6 +186,101 @@ def test_what_the_surroundings_may_fail_at_is_tried_again() -> None:
         assert sent(bench, 2) == ["grip"]
     bench.executor.receive("/held", None)
     assert sent(bench, 2) == ["release", "grip"]
+
+
+FLIGHT = """robot Drone {
+    interface trigger use Trigger from std_srvs
+    component Battery {
+        outgoing message voltage with identifier: "/voltage", type: boolean
+        behaviour {
+            variable low: boolean
+            on response from voltage do low := value
+            initial marked state measured { }
+        }
+    }
+    component Flight {
+        service arm with identifier: "/arm", request: none, response: none links trigger
+        service take_off with identifier: "/take_off", request: none, response: none links trigger
+        incoming message survey with identifier: "/survey", type: none
+        incoming message land with identifier: "/land", type: none
+        behaviour {
+            initial marked state grounded { on request to arm goto arming }
+            state arming { on response from arm goto armed on error from arm goto grounded }
+            state armed { on request to take_off goto climbing }
+            state climbing { on response from take_off goto flying on error from take_off goto armed }
+            state flying { on request to survey goto surveying }
+            state surveying { on request to land goto grounded }
+        }
+    }
+    requirement take_off needs !Battery.low
+    assume always eventually !Battery.low
+    assume allow Flight.arming leads to Flight.armed
+    assume allow Flight.climbing leads to Flight.flying
+    §
+}"""
+
+
+@pytest.mark.parametrize(
+    "aim",
+    [
+        "goal always eventually Flight.surveying",
+        "goal once Flight.surveying",
+        "mission m { visit Flight.surveying then Flight.grounded }",
+        "mission m { visit Flight.surveying on Battery.low from anywhere visit Flight.surveying }",
+    ],
+)
+def test_what_may_fail_is_tried_again_though_more_has_to_follow(aim: str) -> None:
+    """Success leads to a state farther from the goal than waiting for it would be."""
+    bench = bench_of(model_of(FLIGHT.replace("§", aim)))
+
+    def calls(service: str) -> list[int]:
+        return [number for kind, name, number, *_ in bench.tick(3) if kind == "call" and name == service]
+
+    for service in ("arm", "take_off"):
+        for _ in range(3):
+            [call] = calls(service)
+            bench.executor.on_call_failed(call, "it failed")
+        bench.receive("/voltage", data=True)
+        waiting = calls(service)
+        bench.receive("/voltage", data=False)
+        [call] = waiting or calls(service)
+        assert bool(waiting) is (service == "arm")
+        bench.executor.on_reply(call, None)
+    assert sent(bench, 1) == ["survey"]
+
+
+def test_luck_is_not_waited_for_where_the_robot_can_help() -> None:
+    """An empty battery excuses it for as long as it is not at its dock, and somebody may carry it away."""
+    text = """robot Sweeper {
+        component Base {
+            incoming message home with identifier: "/home", type: none
+            outgoing message at_dock with identifier: "/at_dock", type: none
+            incoming message present with identifier: "/present", type: none
+            outgoing message carried with identifier: "/carried", type: none
+            behaviour {
+                initial state away { on request to home goto homing on response from carried goto held }
+                marked state held { on request to home goto homing }
+                state homing { on response from at_dock goto docked }
+                state docked { on request to present goto ready }
+                marked state ready { }
+            }
+        }
+        component Battery {
+            outgoing message charge with identifier: "/charge", type: boolean
+            behaviour {
+                variable full: boolean
+                on response from charge do full := value and (full or Base.docked)
+                initial marked state measured { }
+            }
+        }
+        goal always eventually Base.ready or Base.held
+        assume Base.homing leads to Base.docked
+        assume allow always eventually Battery.full
+    }"""
+    bench = bench_of(model_of(text))
+    assert sent(bench, 3) == ["home"]
+    bench.receive("/at_dock")
+    assert sent(bench, 3) == ["present"]
 
 
 def test_of_requests_that_lead_nearer_the_preferred_one_is_chosen() -> None:
@@ -322,8 +419,13 @@ def findings(model: Model, deployment: Deployment = Deployment.CONTROLLER) -> tu
     )
     if deployment is Deployment.LAYER:
         return layer_goal_findings(model, places, deployment)
-    aims = ExecutableSystem(model, deployment).obligations.aims
-    return goal_findings(aims, places, strategy_result(model))
+    executable = ExecutableSystem(model, deployment)
+    aims, result = executable.obligations.aims, strategy_result(model)
+    if result.strategy is None:
+        return goal_findings(aims, places, result)
+    added = synthesize(to_automata(model, deployment)).added
+    late = check_strategy(executable, added, result.strategy).put_off
+    return (*goal_findings(aims, places, result), *put_off_findings(aims, places, result, late))
 
 
 def line(found: Diagnostic) -> int:
@@ -359,6 +461,53 @@ def test_a_visit_that_no_run_makes_is_found() -> None:
     assert [(item.code, line(item)) for item in findings(model_of(text))] == [("visit-never-made", 101)]
 
 
+_ROOMS = """robot Rooms {
+    component Base {
+        incoming message to_hall with identifier: "/hall", type: none
+        incoming message to_kitchen with identifier: "/kitchen", type: none
+        incoming message to_dock with identifier: "/dock", type: none
+        behaviour {
+            initial marked state dock { on request to to_hall goto hall }
+            marked state hall { on request to to_kitchen goto kitchen on request to to_dock goto dock }
+            marked state kitchen { on request to to_hall goto hall }
+        }
+    }
+    component Operator {
+        outgoing message begin with identifier: "/begin", type: none
+        outgoing message rest with identifier: "/rest", type: none
+        behaviour {
+            initial marked state resting { on response from begin goto working }
+            marked state working { on response from rest goto resting }
+        }
+    }
+    §
+}"""
+
+
+@pytest.mark.parametrize(
+    ("mission", "lines"),
+    [
+        ("{ visit Base.kitchen on Base.hall from anywhere visit Base.dock }", [100]),
+        # The first visit is made by the request that begins the detour.
+        ("{ visit Base.hall then Base.kitchen on Base.hall from anywhere visit Base.dock }", [101]),
+        # The surroundings could bring the detour about as well.
+        ("{ visit Base.kitchen on Base.hall or Operator.working from anywhere visit Base.dock }", [100]),
+        # The detour itself leads on.
+        ("{ visit Base.kitchen on Base.hall from anywhere visit Base.kitchen }", []),
+        ("{ visit Base.kitchen then Base.dock on Base.hall from anywhere visit Base.kitchen then Base.dock }", []),
+        ("{ visit Base.kitchen on Operator.working and Base.kitchen from anywhere visit Base.dock }", []),
+        # While the operator works, to leave the dock is to begin the detour.
+        ("{ visit Base.kitchen on Operator.working from anywhere visit Base.dock }", [100]),
+        # The robot leaves where the mission is asked for, and need not come back.
+        ("while Base.dock or Operator.working { visit Base.kitchen }", [100]),
+        ("while Operator.working { visit Base.kitchen }", []),
+    ],
+)
+def test_a_visit_that_the_robot_itself_puts_off_is_found(mission: str, lines: list[int]) -> None:
+    model = model_of(_ROOMS.replace("§", f"mission m {mission}"))
+    assert [(item.code, line(item)) for item in findings(model)] == [("visit-put-off", number) for number in lines]
+
+
 def test_in_a_layer_missions_have_no_effect() -> None:
     model = robot("kitchen", "office", prefer=("charge", "to_office"))
     (found,) = findings(model, Deployment.LAYER)
@@ -368,3 +517,18 @@ def test_in_a_layer_missions_have_no_effect() -> None:
         ("this preference has no effect, either", 60)
     ]
     assert findings(msgspec.structs.replace(model, missions=()), Deployment.LAYER) == ()
+
+
+@pytest.mark.parametrize(
+    ("count", "last"),
+    [
+        (6, "this goal has no effect, either"),
+        (7, "this goal has no effect, either (1 more is not shown)"),
+        (9, "this goal has no effect, either (3 more are not shown)"),
+    ],
+)
+def test_a_finding_says_how_many_places_it_does_not_show(count: int, last: str) -> None:
+    model = model_of(courier(*["goal always eventually Base.dock"] * count))
+    (found,) = findings(model, Deployment.LAYER)
+    assert [item.message for item in found.related] == ["this goal has no effect, either"] * 4 + [last]
+    assert [item.location.line for item in found.related] == [11, 12, 13, 14, 15]

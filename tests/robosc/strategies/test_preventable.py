@@ -1,4 +1,4 @@
-"""Assumptions that the robot can keep from coming true, and those that only the surroundings can."""
+"""Assumptions that the robot can keep from coming true, those that only the surroundings can, and those that cannot."""
 
 import pytest
 
@@ -66,3 +66,40 @@ def test_a_step_of_the_robot_after_which_nobody_can_help_is_prevented() -> None:
     text = text.replace("Dock.docked and Battery.empty leads", "Battery.charging leads")
     assert errors(text) == []
     assert errors(text.replace("{ undock, lock }", "undock")) == ["preventable-assumption"]
+
+
+def found_with(*statements: str, text: str = BATTERY) -> list[tuple[str, int]]:
+    """Return the codes of what is found about more statements, each with how many other places belong to it."""
+    found = make_supervisor(bundle_of(text.rstrip().removesuffix("}") + "\n".join((*statements, "}")))).diagnostics
+    return [
+        (item.code, len(item.related))
+        for item in found
+        if item.location is not None and item.location.line >= text.count("\n")
+    ]
+
+
+@pytest.mark.parametrize("allow", ["", "allow "])
+def test_what_cannot_come_true_excuses_no_goal(allow: str) -> None:
+    """Without the finding, a robot that does nothing would have a strategy for each of these."""
+    assume = f"assume {allow}always eventually"
+    lost = "goal always eventually Dock.away and Dock.docked"
+    assert found_with(lost, f"{assume} Battery.good and Battery.empty") == [("impossible-assumption", 0)]
+    # Each can come true for ever, and not with the other.
+    together = [("impossible-assumption", 1)]
+    assert found_with(lost, f"{assume} Battery.dead", f"{assume} Battery.good") == together
+
+
+def test_what_comes_true_without_the_goals_excuses_them_no_more() -> None:
+    free = BATTERY.replace("{ undock, lock } needs false", "undock needs true")
+    away, locked = "goal always eventually Dock.away", "assume allow always eventually Dock.locked"
+    assert found_with(away, locked, text=free) == [("impossible-assumption", 0)]
+    assert found_with(away, "assume allow Dock.locked leads to Dock.away", text=free) == [("unneeded-assumption", 0)]
+    # A goal that cannot be reached at all is the one to blame.
+    lost = "goal always eventually Dock.away and Dock.docked"
+    assert found_with(lost, "assume allow always eventually Dock.docked") == [("unreachable-goal", 0)]
+
+
+def test_a_goal_for_which_nothing_is_done_is_found() -> None:
+    goals = ("goal Battery.good and Battery.empty leads to Dock.docked", "goal once Dock.away")
+    assert found_with(*goals) == [("idle-goal", 0), ("idle-goal", 0)]
+    assert found_with("goal always eventually Dock.away") == []

@@ -1,7 +1,7 @@
 """Strategies of random robots against an explicit game, which is solved and checked another way."""
 
 from collections import Counter
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Collection, Iterable, Sequence
 from random import Random
 from typing import Any
 
@@ -27,14 +27,18 @@ from support.goal_twin import (
     Position,
     deciding,
     distances,
+    endless_requests,
     game_of,
     leading,
+    put_off,
+    taken_along,
     unfair_goal,
     values_of,
     winning_positions,
 )
 from support.random_couriers import random_courier
 from support.random_goals import wanting_robot
+from support.random_waiting import random_waiting
 
 LIMIT = 3_000
 
@@ -74,11 +78,14 @@ def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> N
         every = range(len(model.assumptions))
         result = synthesis.result(allowed=every)
         strategy = result.strategy
-        preventable = synthesis.result().preventable
-        counter = synthesis.counter(result.unreached) if result.unreached else None
+        cautious = synthesis.result()
+        preventable = cautious.preventable
+        is_denied = bool(result.unreached) and not synthesis.is_won(every, result.unreached)
+        counter = synthesis.counter(result.unreached) if is_denied else None
     is_won = game.first != LOST and game.first in won
-    assert (strategy is not None) == is_won, seed
-    if game.first != LOST:
+    in_name = is_won and is_in_name_alone(game, result, seed, met)
+    assert (strategy is not None) == (is_won and not in_name), seed
+    if game.first != LOST and not in_name:
         compare_reasons(game, owed.aims, result, result.unreached, seed, met)
         prevented = [number for number, item in enumerate(game.assumptions) if is_prevented(game, item)]
         assert list(preventable) == prevented, seed
@@ -86,19 +93,36 @@ def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> N
     met["models"] += 1
     met["positions"] += len(game.choices)
     met["won" if is_won else "lost"] += 1
-    if counter is not None and game.first != LOST:
+    if counter is not None and game.first != LOST and not in_name:
         compare_counter(game, executable, counter, result.unreached, seed, met)
     if strategy is None:
         return
     never = {executable.obligations.aims[number].name for number in result.never_made}
     assert never == {aim.name for aim in executable.obligations.aims if aim.mission is not None} - game.made, seed
     met["never made"] += bool(never)
+    idle = [
+        number
+        for number, aim in enumerate(owed.aims)
+        if aim.mission is None and all(game.holds(position, game.goals[number]) for position in game.choices)
+    ]
+    assert list(result.idle) == idle, seed
+    met["idle goals"] += bool(idle)
     met["with requests"] += any(strategy.modes)
     check = check_strategy(executable, added, strategy)
     assert check.result == "passed", (seed, check)
     decide = deciding(game, executable, strategy)
     assert unfair_goal(game, decide) is None, seed
-    compare_preferences(game, won, model, decide, seed, met)
+    late = put_off(game, [aim.name for aim in executable.obligations.aims], decide)
+    assert set(check.put_off) == late, seed
+    met["put off"] += bool(late)
+    own = deciding(game, executable, for_own_goals(strategy))
+    compare_preferences(game, won, model, own, seed, met)
+    compare_waiting(game, won, every, decide, own, seed, met)
+    if cautious.strategy is not None and model.assumptions:
+        own = deciding(game, executable, for_own_goals(cautious.strategy))
+        decide = deciding(game, executable, cautious.strategy)
+        assert unfair_goal(game, decide) is None, seed
+        compare_waiting(game, won, (), decide, own, seed, met)
     # A strategy that was damaged is judged alike: without any request, or with some forgotten, for other goals.
     dice = Random(seed)
     kept = [[item for item in mode if dice.random() < 0.6] for mode in strategy.modes]
@@ -108,6 +132,31 @@ def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> N
         found = check_strategy(executable, added, damaged)
         assert found.result == ("failed" if is_missed else "passed"), seed
         met["damaged, missed" if is_missed else "damaged, still reached"] += 1
+
+
+def is_in_name_alone(game: Game, result: StrategyResult, seed: int, met: Counter[str]) -> bool:
+    """Return True if not all goals and assumptions can come true; check what is said of them then."""
+    goals, assumptions = range(len(game.goals)), range(len(game.assumptions))
+    if not assumptions or game.can_meet_again_and_again(goals, assumptions):
+        assert not result.impossible and not result.unreached, seed
+        return False
+    is_alone = not game.can_meet_again_and_again((), assumptions)
+    assert bool(result.impossible) != bool(result.unreached), seed
+    assert result.is_impossible_alone == is_alone, seed
+    others = () if is_alone else goals
+    for item in (None, *result.unreached, *result.impossible):
+        items = {*result.unreached, *result.impossible} - {item}
+        asked = (items, ()) if result.unreached else (others, items)
+        assert not items or game.can_meet_again_and_again(*asked) is (item is not None), seed
+    kept = "goals" if result.unreached else "assumptions"
+    assert not result.unreached or result.is_hopeless, seed
+    met[f"impossible {kept}"] += 1
+    return True
+
+
+def for_own_goals(strategy: Strategy) -> Strategy:
+    """Return a strategy without what its modes request for others."""
+    return Strategy(tuple(tuple(item for item in mode if not item.is_meanwhile) for mode in strategy.modes))
 
 
 def is_prevented(game: Game, assumption: Item) -> bool:
@@ -128,14 +177,14 @@ def compare_preferences(
     owed = game.assumptions
     pairs = [(first, second) for item in model.preferences for first in item.preferred for second in item.others]
     for mode in range(len(game.goals)) if pairs else ():
-        far, last_resort = distances(game, won, mode)
+        known = distances(game, won, mode)
         for position in won:
             request, number = decide(position, mode)
             if request is None or number != mode:
                 continue
             choices = game.choices[position]
-            nearer = {name.removesuffix(".request") for name in leading(game, far, last_resort, position, mode)}
-            met["last resort"] += position in last_resort
+            nearer = {name.removesuffix(".request") for name in leading(game, known, position, mode)}
+            met["last resort"] += position in known.last_resort
             chosen = request.removesuffix(".request")
             if chosen not in nearer:
                 # It helps the surroundings with an assumption that they cannot make true alone.
@@ -148,6 +197,24 @@ def compare_preferences(
                 is_refined = first == chosen and second in nearer and requests.index(second) < requests.index(first)
                 met["preferred to an earlier one"] += is_refined
                 met["not preferred, as it leads nowhere"] += second == chosen and f"{first}.request" in choices
+
+
+def compare_waiting(
+    game: Game, won: set[Position], allowed: Collection[int], decide: Decide, own: Decide, seed: int, met: Counter[str]
+) -> None:
+    """Check what is requested for other goals where the mode requests nothing by itself."""
+    assert endless_requests(game, decide) is None, seed
+    known = [distances(game, won, mode) for mode in range(len(game.goals))]
+    for mode in range(len(game.goals)):
+        for position in won:
+            if game.holds(position, game.goals[mode]):
+                continue
+            request, alone = decide(position, mode)[0], own(position, mode)[0]
+            if alone is None and game.assumptions:
+                alone = taken_along(game, known, allowed, own, position, mode)
+                met["meanwhile"] += alone is not None
+                met["waiting for all"] += alone is None
+            assert request == alone, (seed, position, mode)
 
 
 def compare_reasons(
@@ -223,10 +290,19 @@ def test_random_couriers_agree(first: int, record_property: Callable[[str, objec
         compare(random_courier(seed), seed, "auto", met)
     for name, count in sorted(met.items()):
         record_property(name, count)
-    assert met["never made"] > 3, met
+    assert met["never made"] > 3 and met["put off"] > 2, met
     assert met["with requests"] > 30 and met["lost"] > 20 and met["damaged, missed"] > 30, met
     assert min(met["preferred to an earlier one"], met["not preferred, as it leads nowhere"]) > 30, met
     assert min(met["last resort"], met["helping"]) > 10, met
+
+
+def test_random_robots_with_much_to_do_at_a_time_agree(record_property: Callable[[str, object], None]) -> None:
+    met: Counter[str] = Counter()
+    for seed in range(160):
+        compare(random_waiting(seed), seed, "auto", met)
+    for name, count in sorted(met.items()):
+        record_property(name, count)
+    assert min(met["meanwhile"], met["waiting for all"]) > 1_000 and min(met["won"], met["lost"]) > 30, met
 
 
 def test_engines_agree() -> None:

@@ -82,3 +82,11 @@ async def test_no_timer_outlives_the_last_watcher(loop: HeldLoop) -> None:
         assert len(timers(loop)) == 1
     assert not timers(loop)
     assert watchers.revisions() == {}
+
+
+def test_jobs_of_this_server_are_asked_for_no_revisions() -> None:
+    watchers = Watchers()
+    with watchers.watch(JOB) as one, watchers.watch(JOB), watchers.watch("b" * 32) as other:
+        one.revision, other.revision = 5, 7
+        assert watchers.revisions() == {JOB: 0, "b" * 32: 7}
+        assert watchers.revisions({JOB}) == {"b" * 32: 7}

@@ -13,7 +13,6 @@ from opentelemetry.sdk.trace.export.in_memory_span_exporter import InMemorySpanE
 
 from robosc_api.security import Guard, Rule, Scope, TokenFile, make_token
 from robosc_server.operations.interceptor import CallInterceptor
-from robosc_server.operations.logs import REQUEST_ID
 from robosc_server.operations.metrics import Metrics
 from robosc_server.operations.settings import LogLevel
 from robosc_server.operations.tracing import OtlpTracing
@@ -25,7 +24,7 @@ from support.waiting import PATIENCE_S, limited, until
 def outcome(request: bytes, metrics: Metrics | None = None, unary: Any = answer, **more: Any) -> Ended:
     async def run() -> Ended:
         calls = CallInterceptor(metrics or Metrics("1"))
-        async with small_server(interceptors=[calls], unary=unary) as (channel, _):
+        async with small_server(layers=[calls], unary=unary) as (channel, _):
             ended = await call(channel, request, **more)
             await until(lambda: not calls.under_way())
             assert isinstance(ended, Ended)
@@ -168,7 +167,6 @@ async def test_a_call_that_is_cancelled_where_its_deadline_passes_has_reached_it
         await loop.passed(1.0 if given_s is None or left_s is None else given_s - left_s)
         raise asyncio.CancelledError
 
-    REQUEST_ID.set("")
     with logged() as log, pytest.raises(asyncio.CancelledError):
         handler = CallInterceptor(Metrics("1")).wrap(grpc.unary_unary_rpc_method_handler(stuck), f"/{SERVICE}/Unary")
         await handler.unary_unary(b"", CancelledContext(left_s))
@@ -178,7 +176,7 @@ async def test_a_call_that_is_cancelled_where_its_deadline_passes_has_reached_it
 async def test_a_caller_that_goes_away_is_counted_and_no_longer_under_way() -> None:
     metrics = Metrics("1")
     calls = CallInterceptor(metrics)
-    async with small_server(interceptors=[calls], unary=answer) as (channel, _):
+    async with small_server(layers=[calls], unary=answer) as (channel, _):
         method: Any = channel.unary_unary(f"/{SERVICE}/Unary")
         made = method(b"stuck")
         await until(lambda: calls.under_way() == 1)
@@ -205,7 +203,7 @@ def test_streams_of_either_kind_and_a_generator_is_closed_with_its_call() -> Non
 
     async def run(handler: Any) -> None:
         calls = CallInterceptor(Metrics("1"))
-        async with small_server(interceptors=[calls], stream=handler) as (channel, _):
+        async with small_server(layers=[calls], stream=handler) as (channel, _):
             made: Any = channel.unary_stream(f"/{SERVICE}/Stream")
             responses = made(b"")
             assert [response async for response in responses] == [b"0", b"1", b"2"]
@@ -224,7 +222,7 @@ def test_streams_of_either_kind_and_a_generator_is_closed_with_its_call() -> Non
 
 async def test_methods_that_there_are_not_are_counted_without_their_names() -> None:
     metrics = Metrics("1")
-    async with small_server(interceptors=[CallInterceptor(metrics)], unary=answer) as (channel, _):
+    async with small_server(layers=[CallInterceptor(metrics)], unary=answer) as (channel, _):
         made: Any = channel.unary_unary(f"/{MARKER}/Unary")
         with pytest.raises(grpc.aio.AioRpcError):
             await made(b"")
@@ -241,7 +239,7 @@ def test_what_a_guard_refuses_is_logged_with_a_reason_and_whom_it_lets_in_by_nam
     async def run() -> list[Ended]:
         guard = Guard({f"/{SERVICE}/Unary": Rule(frozenset({Scope.SYNTHESIZE}))}, TokenFile(file))
         calls = CallInterceptor(Metrics("1"))
-        async with small_server(interceptors=[calls, guard], unary=answer) as (channel, _):
+        async with small_server(layers=[calls, guard], unary=answer) as (channel, _):
             return [
                 await call(channel),
                 await call(channel, metadata=[("authorization", f"Bearer {token}x")]),
@@ -270,7 +268,7 @@ async def test_a_call_is_a_span_that_continues_its_callers_trace_and_holds_no_me
             return await answer(request, context)
 
     calls = CallInterceptor(Metrics("1"), tracing)
-    async with small_server(interceptors=[calls], unary=inside) as (channel, _):
+    async with small_server(layers=[calls], unary=inside) as (channel, _):
         await call(channel, metadata=[("traceparent", f"00-{trace}-{parent}-01")])
         await call(channel, b"fault", metadata=[("x-request-id", "mine")])
     tracing.close()

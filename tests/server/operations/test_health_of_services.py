@@ -23,7 +23,7 @@ SERVICES = {"robosc.Works": ("workers",), "robosc.Keeps": ("store", "workers")}
 
 
 def with_health(health: Health) -> Any:
-    return lambda server: health_pb2_grpc.add_HealthServicer_to_server(health, server)
+    return lambda services: health_pb2_grpc.add_HealthServicer_to_server(health, services)
 
 
 async def status(channel: Any, service: str = "") -> Any:
@@ -111,7 +111,7 @@ async def test_a_watcher_that_takes_nothing_keeps_nobody_from_the_truth() -> Non
         with_health(health)(server)
         ports.append(server.add_insecure_port("127.0.0.1:0"))
 
-    async with small_server(setup=listen) as (channel, server):
+    async with small_server(listen=listen) as (channel, server):
         _, writer = await asyncio.open_connection("127.0.0.1", ports[0])
         writer.write(watch_without_taking("robosc.Works"))
         await watching.wait()
@@ -177,7 +177,7 @@ async def test_draining_says_no_first_then_refuses_and_lets_calls_end() -> None:
         return b"done"
 
     calls = CallInterceptor(Metrics("1"))
-    async with small_server(interceptors=[calls], unary=slow, setup=with_health(health)) as (channel, server):
+    async with small_server(layers=[calls], unary=slow, setup=with_health(health)) as (channel, server):
         under_way = asyncio.create_task(call(channel))
         await seen.wait()
         ending = asyncio.create_task(drain(server, health, calls, PATIENCE_S))
@@ -215,7 +215,7 @@ async def test_a_large_answer_that_was_sent_is_waited_for(loop: HeldLoop) -> Non
     def listen(server: grpc.aio.Server) -> None:
         ports.append(server.add_insecure_port("127.0.0.1:0"))
 
-    async with small_server(interceptors=[calls], unary=large, setup=listen) as (_, server):
+    async with small_server(layers=[calls], unary=large, listen=listen) as (_, server):
         # More than is taken over the line before the client reads: the handler is long done by then.
         options = [("grpc.http2.lookahead_bytes", 65535), ("grpc.http2.bdp_probe", 0)]
         async with grpc.aio.insecure_channel(f"127.0.0.1:{ports[0]}", options) as slow:
@@ -258,7 +258,7 @@ def test_what_does_not_end_is_cancelled_and_what_is_idle_is_not_waited_for() -> 
             return b""
 
         calls, health = CallInterceptor(Metrics("1")), Health({})
-        async with small_server(interceptors=[calls], unary=stuck) as (channel, server):
+        async with small_server(layers=[calls], unary=stuck) as (channel, server):
             under_way = asyncio.create_task(call(channel))
             await until(lambda: calls.under_way() > 0)
             ending = asyncio.create_task(drain(server, health, calls, seconds, idle))

@@ -11,9 +11,9 @@ import grpc
 import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 
+from robosc_api.calls import begin_call
 from robosc_api.connection_watch import Arrivals, CallsSince
 from robosc_api.failures import reason_of
-from robosc_api.layers import Layers
 from robosc_api.request_timeouts import RequestTimeouts
 from robosc_api.security import Quota, Scope, make_token
 from robosc_api.v1 import jobs_pb2, jobs_pb2_grpc, synthesis_pb2_grpc
@@ -164,6 +164,12 @@ class Call:
         return {}
 
 
+def begin(handler: Any, context: Call) -> None:
+    """Begin a call of a handler."""
+    begin_call()
+    handler.unary_unary(None, context)
+
+
 @pytest.mark.parametrize("limits", [CallLimits(9, 1), CallLimits(1, 9)], ids=["of the caller", "of the server"])
 async def test_refused_calls_explain_the_bytes_of_their_connection_and_health_checks_do_not(limits: CallLimits) -> None:
     arrivals = Arrivals()
@@ -171,10 +177,10 @@ async def test_refused_calls_explain_the_bytes_of_their_connection_and_health_ch
     handler: Any = grpc.unary_unary_rpc_method_handler(lambda request, context: None)
     for method in (GET_VERSION, HEALTH):
         layered = calls.wrap(handler, method)
-        layered.unary_unary(None, Call("2001:db8::1"))
+        begin(layered, Call("2001:db8::1"))
         for _ in range(3):
             with pytest.raises(RefusedError):
-                layered.unary_unary(None, Call("2001:db8::1"))
+                begin(layered, Call("2001:db8::1"))
     peer = "ipv6:[2001:db8::1]:1"
     assert arrivals.take() == CallsSince(ended={peer: 3}, open={peer: 2})
 
@@ -183,16 +189,16 @@ async def test_nobody_from_elsewhere_takes_the_places_of_this_machines_health_ch
     calls = OpenCalls(CallLimits(1, 1), health=CallLimits(3, 1))
     layered = calls.wrap(grpc.unary_unary_rpc_method_handler(lambda request, context: None), HEALTH)
     # One machine with many addresses of its network, then others.
-    layered.unary_unary(None, Call("2001:db8::1"))
+    begin(layered, Call("2001:db8::1"))
     with pytest.raises(RefusedError) as refused:
-        layered.unary_unary(None, Call("2001:db8::2"))
+        begin(layered, Call("2001:db8::2"))
     assert refused.value.reason is Reason.QUOTA_EXCEEDED
     for number in range(1, 3):
-        layered.unary_unary(None, Call(f"2001:db8:{number}::"))
+        begin(layered, Call(f"2001:db8:{number}::"))
     with pytest.raises(RefusedError) as refused:
-        layered.unary_unary(None, Call("2001:db8:9::"))
+        begin(layered, Call("2001:db8:9::"))
     assert refused.value.reason is Reason.SERVER_BUSY
-    layered.unary_unary(None, Call("::1"))
+    begin(layered, Call("::1"))
 
 
 def test_calls_that_are_over_give_their_places_back(small: str, all_are_free: Callable[[], bool]) -> None:
@@ -254,8 +260,8 @@ def test_a_token_says_how_many(tmp_path: Path) -> None:
 
 
 async def test_a_call_leaves_nothing_to_the_garbage_collector() -> None:
-    layers = Layers(CallInterceptor(Metrics("1")), OpenCalls(CallLimits(9, 9)), RequestTimeouts(PATIENCE_S))
-    async with small_server(interceptors=[layers], unary=answer) as (channel, _):
+    layers = (CallInterceptor(Metrics("1")), OpenCalls(CallLimits(9, 9)), RequestTimeouts(PATIENCE_S))
+    async with small_server(layers=layers, unary=answer) as (channel, _):
         await call(channel)
         gc.collect()
         gc.set_debug(gc.DEBUG_SAVEALL)

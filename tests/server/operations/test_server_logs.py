@@ -10,8 +10,9 @@ import structlog
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robosc_api.calls import CALL, Call
 from robosc_server.operations.failures import public_failure
-from robosc_server.operations.logs import REQUEST_ID, log_fault, request_id_of
+from robosc_server.operations.logs import log_fault, request_id_of
 from robosc_server.operations.settings import LogFormat, LogLevel
 from robosc_server.tasks.task import Failure, Reason
 from robosc_server.workers.exit_reasons import ProcessExit, exit_description
@@ -35,13 +36,15 @@ def raised() -> ValueError:
 @pytest.mark.parametrize("form", list(LogFormat))
 def test_lines_of_others_go_the_same_way(form: LogFormat) -> None:
     with logged(LogLevel.INFO, form) as log:
-        token = REQUEST_ID.set("this-request")
+        call = Call()
+        call.request_id = "this-request"
+        token = CALL.set(call)
         try:
             logging.getLogger("others.part").warning("%s of %s", "some", "words")
             structlog.get_logger().info("ours", number=3)
             logging.getLogger("others.part").debug("too little")
         finally:
-            REQUEST_ID.reset(token)
+            CALL.reset(token)
     first, second = log.text.splitlines()
     if form is LogFormat.JSON:
         line = json.loads(first)

@@ -5,12 +5,14 @@ Nothing in them is random, and every number is one that a float of 32 bits holds
 
 import math
 from collections.abc import Callable, Generator, Sequence
+from dataclasses import replace
 from typing import Any
 
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from support.equivalence.observation import Issued, Observation
 from support.equivalence.python_targets import reference
+from support.equivalence.random_scenarios import node_settings
 from support.equivalence.scenario import Action, Scenario
 from support.generated import example_supervisor
 
@@ -239,8 +241,75 @@ def _person_follower() -> Run:
         issued = yield coming
 
 
+def _odometry(at: tuple[float, float], heading: int, speed: float, turn: float) -> Action:
+    # Sine and cosine of half the angle, as far as short binary fractions are these.
+    z, w = ((0.0, 1.0), (0.75, 0.75), (1.0, 0.0), (-0.75, 0.75))[heading]
+    pose = {"position": {"x": at[0], "y": at[1]}, "orientation": {"z": z, "w": w}}
+    twist = {"linear": {"x": speed}, "angular": {"z": turn}}
+    return _message("/odom", {"pose": {"pose": pose}, "twist": {"twist": twist}})
+
+
+def _courier() -> Run:
+    """Makes rounds through a house; is called before, during and after a visit; a door opens late; the battery drains.
+
+    Whatever it asks for takes some periods. Once nothing happens for so long that an assumption counts as owed.
+    """
+    at, heading, velocity = (0.0, 0.0), 0, (0.0, 0.0)
+    turning, turn = 0, 0
+    due: dict[str, int] = {}
+    doors = 0
+    orders = {5: "attic", 6: "office", 40: "kitchen", 46: "lab", 150: "lab", 156: "kitchen"}
+    voltage, docked = 12.0, 0
+    issued = yield []
+    for step in range(COURIER_PERIODS):
+        coming = []
+        velocity = _velocity([item for item in issued if item[1] in ("forward", "/cmd_vel")], velocity)
+        for kind, name, _ in issued:
+            if kind != "publish":
+                continue
+            if name.startswith("turn"):
+                turning, turn = 3, {"turn_left": 1, "turn_right": 3, "turn_around": 2}[name]
+            elif name == "open_door":
+                doors += 1
+                due["/door/opened"] = 14 if doors == 2 else 4
+            elif name == "unlock":
+                due["/tray/closed"] = 5
+        if velocity[0]:
+            dx, dy = ((0.5, 0.0), (0.0, 0.5), (-0.5, 0.0), (0.0, -0.5))[heading]
+            at = (at[0] + dx, at[1] + dy)
+        elif turning:
+            turning -= 1
+            if not turning:
+                heading = (heading + turn) % 4
+                coming.append(_message("/rotate_done"))
+        for topic in list(due):
+            due[topic] -= 1
+            if not due[topic]:
+                del due[topic]
+                coming.append(_message(topic))
+        docked = docked + 1 if at == (0.0, 0.0) else 0
+        if step in (90, 91):
+            voltage = 11.0
+        elif voltage < 12.0 and docked > 12:
+            voltage = 12.5
+        if step % 10 == 1:
+            coming.append(_message("/battery_state", {"voltage": voltage}))
+        if velocity[0] or turning or step % 4 == 0:
+            coming.append(_odometry(at, heading, velocity[0], 0.25 if turning else 0.0))
+        if step in orders:
+            coming.append(_message("/order", orders[step]))
+        if doors == 2 and due.get("/door/opened") == 7:
+            coming.append(Action("wait", seconds=40.0))
+        issued = yield coming
+
+
+COURIER_PERIODS = 250
+"""Periods of the courier: some rounds, with a way to the dock in between."""
+
+
 WORLDS: dict[str, Callable[[], Run]] = {
     "ball_pusher": _ball_pusher,
+    "courier": _courier,
     "line_follower": _line_follower,
     "line_follower_layer": _supervised_line_follower,
     "maze_solver": _maze_solver,
@@ -279,3 +348,21 @@ def live(robot: str) -> tuple[Scenario, list[Observation]]:
             actions.append(action)
             seen.append(target.do(action))
             issued += seen[-1].issued
+
+
+def live_by_messages(robot: str) -> Scenario:
+    """Let an example robot without services and actions live whose node decides by itself whenever a message comes."""
+    supervisor = robot_supervisor(robot)
+    target = reference(supervisor)
+    scenario = Scenario((), node_settings(supervisor.model, None))
+    world = WORLDS[robot]()
+    next(world)
+    actions: list[Action] = []
+    issued = target.start(scenario).issued
+    while True:
+        try:
+            coming = [action for action in world.send(issued) if action.do == "message"]
+        except StopIteration:
+            return replace(scenario, actions=tuple(actions))
+        actions += coming
+        issued = tuple(item for action in coming for item in target.do(action).issued)

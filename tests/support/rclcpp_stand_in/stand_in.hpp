@@ -17,7 +17,8 @@
 //   end                           the context ends, as by a signal to a container
 //
 // DATA depends on the type: the value of `data`, the ranges of a scan, `success` and `message` of a reply, `sequence`,
-// x, y and z of a point, four parts of a test_msgs/NestedMessage.
+// x, y and z of a point, the voltage of a battery, of odometry x, y, z and w of its orientation, speed and turn, four parts
+// of a test_msgs/NestedMessage.
 
 #pragma once
 
@@ -49,6 +50,8 @@ STAND_IN_HAS(HasRanges, ranges)
 STAND_IN_HAS(HasSuccess, success)
 STAND_IN_HAS(HasSequence, sequence)
 STAND_IN_HAS(HasPoint, z)
+STAND_IN_HAS(HasVoltage, voltage)
+STAND_IN_HAS(HasOdometry, child_frame_id)
 STAND_IN_HAS(HasNested, nested_different_pkg)
 
 template <class T>
@@ -83,6 +86,13 @@ M parsed(std::istream& in)
         read_list(in, message.sequence);
     } else if constexpr (HasPoint<M>::value) {
         in >> message.x >> message.y >> message.z;
+    } else if constexpr (HasVoltage<M>::value) {
+        in >> message.voltage;
+    } else if constexpr (HasOdometry<M>::value) {
+        auto& pose = message.pose.pose;
+        auto& twist = message.twist.twist;
+        in >> pose.position.x >> pose.position.y >> pose.orientation.z >> pose.orientation.w >> twist.linear.x
+            >> twist.angular.z;
     } else if constexpr (HasNested<M>::value) {
         int number = 0;
         in >> message.nested_field.bool_value >> number >> message.nested_field.float32_value

@@ -25,6 +25,7 @@ from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.supervisor import Supervisor
 from robosc.targets.code.c.layer import request_declarations
 from robosc.targets.code.c.layout import Layout, data_that_comes, event_data, width
+from robosc.targets.code.c.observation import remembered_places
 from robosc.targets.code.c.provide import request_field, request_struct
 from robosc.targets.code.c.received import unknown_name
 from robosc.targets.code.c.text import comment, declared, pointer_to, safe
@@ -347,8 +348,7 @@ def _state(layout: Layout) -> list[str]:
         if item.kind in CALLED_KINDS:
             body.append(f"uint8_t {layout.locations[communication_plant_name(item)]}; /* {item.kind} {item.name} */")
     if layout.supervisor.strategy is not None:
-        places = layout.executable.obligations.places
-        body += [f"bool {layout.variables[MEMORY, place.name][0]}; /* {place.name} */" for place in places]
+        body += [f"bool {layout.variables[MEMORY, name][0]}; /* {name} */" for name in remembered_places(layout)]
         aims = layout.executable.obligations.aims
         body.append(f"{width(len(aims))} {layout.mode}; /* number of what is approached, of {counted(aims)} */")
     return [

@@ -3,19 +3,20 @@
 from robosc.automata.goal_memory import MEMORY
 from robosc.supervisor import Strategy
 from robosc.targets.code.c.conditions import CConditions
-from robosc.targets.code.c.naming import CNamer
+from robosc.targets.code.c.layout import width
+from robosc.targets.code.c.observation import IS_SEEN, observation, remembered_places
 from robosc.targets.code.c.statements import unused
 from robosc.targets.code.c.text import comment
 from robosc.targets.code.c.unit import Reading, Unit
 from robosc.targets.code.expressions import FALSE_CODE, integer, variable
 from robosc.targets.code.statements import Assign, Statement
-from robosc.targets.code.strategy import choosing, observing, seen
+from robosc.targets.code.strategy import choosing
 
 
 def forgotten(unit: Unit) -> list[Statement]:
     """The assignments by which nothing is remembered of goals and missions."""
     scope, layout = Reading(unit), unit.layout
-    places = (scope.variable_place(MEMORY, place.name) for place in layout.executable.obligations.places)
+    places = (scope.variable_place(MEMORY, name) for name in remembered_places(layout))
     return [*(Assign(place, FALSE_CODE) for place in places), Assign(variable(f"s->{layout.mode}"), integer(0))]
 
 
@@ -27,32 +28,27 @@ def strategy_functions(unit: Unit, conditions: CConditions, strategy: Strategy) 
         conditions: Writer of its conditions.
         strategy: The strategy.
     """
-    executable, scope, mode = unit.layout.executable, Reading(unit), f"s->{unit.layout.mode}"
+    executable, mode = unit.layout.executable, f"s->{unit.layout.mode}"
     count = len(strategy.modes)
-    taken = observing(executable, scope, CNamer(frozenset({"s", "seen"})))
-    judged = (Assign(variable(f"seen[{number}]"), code) for number, code in enumerate(seen(executable, scope)))
-    head = "static void observe_for_strategy(state_t *s, bool *seen)"
-    found = [unit.definition(head, [*unused("s"), *taken, *judged])]
+    found = [IS_SEEN, *observation(unit)]
     for number, aim in enumerate(executable.obligations.aims):
         body = [*unused("s"), *choosing(executable, strategy, number, conditions, integer(-1))]
         words = comment(f"the request that approaches {aim.name}, or -1 to wait")
         found.append([*words, *unit.definition(f"static int approach_{number + 1}(const state_t *s)", body)])
-    following = f"{mode} + 1 < {count} ? {mode} + 1 : 0"
     lines = [
-        "/* The request that the strategy chooses in a stable state, or -1 to wait; `approached`: the aim in turn. */",
-        "static int choose_by_strategy(state_t *s, const bool *seen, int *approached)",
+        "/* The request that the strategy chooses, or -1 to wait; `approached`: the aim in turn, -1: all are met. */",
+        "static int choose_by_strategy(state_t *s, const uint32_t *seen, int *approached)",
         "{",
-        f"    for (int tried = 0; tried < {count}; tried++) {{",
-        f"        *approached = (int){mode};",
-        f"        if (!seen[{mode}]) {{",
-        "            break;",
-        "        }",
-        f"        {mode} = ({following});" if count > 1 else f"        {mode} = 0;",
+        f"    int aim = (int){mode};",
+        f"    for (int tried = 1; tried < {count} && is_seen(seen, aim); tried++) {{",
+        f"        aim = aim + 1 < {count} ? aim + 1 : 0;",
         "    }",
-        "    if (seen[*approached]) {",
+        "    *approached = is_seen(seen, aim) ? -1 : aim;",
+        "    if (*approached < 0) {",
         "        return -1;",
         "    }",
-        "    switch (*approached) {",
+        f"    {mode} = ({width(count)})aim;",
+        "    switch (aim) {",
     ]
     for number in range(count):
         lines += [f"    case {number}:", f"        return approach_{number + 1}(s);"]

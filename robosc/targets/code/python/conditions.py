@@ -1,5 +1,7 @@
 """Generated methods that say whether a controllable event is allowed now, and which requirements hold."""
 
+from collections.abc import Iterable
+
 from robosc.automata import System
 from robosc.supervisor import DecisionNode
 from robosc.targets.code.conditions import Condition, Conditions, Diagrams
@@ -70,6 +72,17 @@ class PythonConditions(PythonDiagrams, Conditions):
         """The method that says for each top-level conjunct of the requirements whether it holds."""
         words = f"Return for each top-level conjunct of the requirements on {communication} whether it holds."
         return self._tuple_method("conjuncts", communication, words, self.conjuncts(communication))
+
+    def read_by(self, words: Iterable[str]) -> set[str]:
+        """Return some words, with all that those of them which are methods read and call."""
+        found: set[str] = set()
+        to_do = list(words)
+        while to_do:
+            word = to_do.pop()
+            if word not in found:
+                found.add(word)
+                to_do += self.reads.get(word, ())
+        return found
 
     def _tuple_method(self, purpose: str, subject: str, words: str, items: list[Condition]) -> list[str]:
         lines = [line for said, code in items for line in [*comment(said), f"{code_text(code)},"]]

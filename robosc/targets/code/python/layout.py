@@ -23,10 +23,13 @@ PROTOCOL_NAMES = (
     "observe",
     "provide",
     "read",
+    "recall",
     "receive",
+    "remembered",
     "requirements",
     "restart",
     "signature",
+    "situation",
     "state",
     "step",
 )

@@ -1,17 +1,19 @@
 """Generated methods of a strategy: its memory of goals and missions, and its choices."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 
 from robosc.supervisor import Strategy
-from robosc.targets.code.expressions import FALSE_CODE, Code, Sort, literal
+from robosc.targets.code.expressions import FALSE_CODE, Code, Sort, literal, variable, words_of
 from robosc.targets.code.python.expressions import code_text
 from robosc.targets.code.python.naming import PythonNamer
 from robosc.targets.code.python.statements import method
 from robosc.targets.code.python.writer import Writer
+from robosc.targets.code.statements import Assign, Return, codes
 from robosc.targets.code.strategy import choosing, observing, seen
 from robosc.targets.text import indent
 
 _NOTHING = literal("None", Sort.INTEGER)
+_SITUATION = "Return all of the state that what is observed and chosen depends on."
 _OBSERVE = "Take in a stable state; return what is met, and where missions are."
 
 
@@ -34,10 +36,14 @@ def strategy_methods(writer: Writer, strategy: Strategy) -> list[list[str]]:
     """Return the methods of a strategy."""
     executable, scope = writer.layout.executable, writer.scope
     count = len(strategy.modes)
+    taken, judged = observing(executable, scope, PythonNamer()), seen(executable, scope)
+    choices = [choosing(executable, strategy, number, writer.conditions, _NOTHING) for number in range(count)]
     methods = [
+        _situation(writer, codes([*taken, *(item for choice in choices for item in choice)]), judged),
+        *_memory(writer),
         [
-            *method("observe", _OBSERVE, observing(executable, scope, PythonNamer())),
-            *indent([f"seen = self._seen = {_tuple(seen(executable, scope))}", "return seen"]),
+            *method("observe", _OBSERVE, taken),
+            *indent([f"seen = self._seen = {_tuple(judged)}", "return seen"]),
         ],
         f'''\
 def choose(self):
@@ -50,10 +56,34 @@ def choose(self):
         self.mode = (mode + 1) % {count}
     return None'''.splitlines(),
     ]
-    for number, aim in enumerate(executable.obligations.aims):
-        body = choosing(executable, strategy, number, writer.conditions, _NOTHING)
-        methods.append(method(f"_approach_{number + 1}", f"Return the request that approaches {aim.name}.", body))
+    for number, (aim, body) in enumerate(zip(executable.obligations.aims, choices, strict=True), start=1):
+        methods.append(method(f"_approach_{number}", f"Return the request that approaches {aim.name}.", body))
     return methods
+
+
+def _situation(writer: Writer, statements: Iterable[Code], judged: Iterable[Code]) -> list[str]:
+    """Return the method that gives all of the state that goals and the strategy depend on."""
+    layout = writer.layout
+    read = writer.conditions.read_by(words_of([*statements, *judged]))
+    attributes = [*layout.locations.values(), *(name for name, _ in layout.variables.values())]
+    parts = [variable(f"self.{name}") for name in attributes if f"self.{name}" in read]
+    return method("situation", _SITUATION, [Return(variable(_tuple(parts)))])
+
+
+def _memory(writer: Writer) -> list[list[str]]:
+    """Return the methods that give and take what is remembered."""
+    places = ["self.mode", *(f"self.{attribute}" for attribute in writer.layout.memory.values())]
+    everything = _tuple([variable(place) for place in places])
+    remembered = variable("remembered")
+    return [
+        method("remembered", "Return what is remembered of goals and missions.", [Return(variable(everything))]),
+        method(
+            "recall",
+            "Remember what remembered() has returned.",
+            [Assign(variable(everything), remembered)],
+            [remembered],
+        ),
+    ]
 
 
 def _tuple(items: Sequence[Code]) -> str:

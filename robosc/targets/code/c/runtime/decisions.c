@@ -117,18 +117,34 @@ static bool issue_one_of(robot_t *r, bool *candidates, int *issued)
     }
 }
 
+/* Whether a request is enabled, and no goal of its action is open. */
+static bool may_be_issued(const robot_t *r, int request)
+{
+#if ROBOT_ACTION_COUNT > 0
+    if (REQUESTS[request].action >= 0 && r->goals[REQUESTS[request].action].is_open) {
+        return false;
+    }
+#endif
+    return is_allowed(&r->state, REQUESTS[request].event);
+}
+
 static void find_enabled(robot_t *r)
 {
     for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-        r->is_enabled[request] = is_allowed(&r->state, REQUESTS[request].event);
-#if ROBOT_ACTION_COUNT > 0
-        if (REQUESTS[request].action >= 0 && r->goals[REQUESTS[request].action].is_open) {
-            r->is_enabled[request] = false;
-        }
-#endif
+        r->is_enabled[request] = may_be_issued(r, request);
     }
     r->is_enabled_known = true;
 }
+
+#if ROBOT_TOPIC_COUNT > 0
+/* True if the message of a request ends a release that waits. */
+static bool is_ending(const robot_t *r, int request)
+{
+    const int topic = REQUESTS[request].topic;
+    return topic >= 0 && r->acting[topic].is_waiting && r->acting[topic].request != request;
+}
+
+#endif
 
 static uint64_t next_deadline(const robot_t *r);
 
@@ -136,26 +152,67 @@ static uint64_t next_deadline(const robot_t *r);
 /* The request that the strategy chooses, or -1 to wait. */
 static int choose_strategically(robot_t *r)
 {
-    int mode = 0;
-    const int chosen = choose_by_strategy(&r->state, r->seen, &mode);
-    const int approached = r->is_complete ? -1 : mode;
-    r->chosen = chosen < 0 ? -1 : (int)REQUESTS[chosen].communication;
-    if (!r->has_decided || approached != r->approached) {
-        r->has_decided = true;
+    int approached = 0;
+    const int chosen = choose_by_strategy(&r->state, r->seen, &approached);
+    r->chosen = chosen;
+    if (approached != r->approached) {
         r->approached = approached;
         note(r, ROBOT_LOG_APPROACH, approached);
     }
-    return chosen;
+    return chosen >= 0 && may_be_issued(r, chosen) ? chosen : -1;
+}
+
+/* One decision by the strategy: it is asked once in each stable state, and of the requests, the one that it chooses
+   alone is asked whether it is enabled. */
+static bool decide_strategically(robot_t *r)
+{
+    bool is_issued = false;
+    int request = r->candidate;
+    if (!r->is_enabled_known) {
+        request = r->candidate = choose_strategically(r);
+        r->is_enabled_known = true;
+    }
+#if ROBOT_TOPIC_COUNT > 0
+    if (is_any_waiting(r)) {
+        if (request >= 0 && is_ending(r, request)) {
+            if (!issue(r, request, &is_issued)) {
+                return false;
+            }
+            if (is_issued) {
+                return true;
+            }
+            request = -1;
+        }
+        /* The strategy chooses something else, or nothing: then no message comes that the releases wait for. */
+        if (!release_waiting(r)) {
+            return false;
+        }
+    }
+#endif
+    if (request < 0) {
+        return true;
+    }
+    if (!issue(r, request, &is_issued)) {
+        return false;
+    }
+    if (is_issued && REQUESTS[request].topic < 0) {
+        r->deadline_us = next_deadline(r);
+    }
+    return true;
 }
 
 #endif
-
 /* One decision. */
 static bool decide(robot_t *r)
 {
     bool enabled[ROBOT_REQUEST_COUNT];
     bool candidates[ROBOT_REQUEST_COUNT];
     int issued = -1;
+#if ROBOT_HAS_STRATEGY
+    if (r->settings.policy == ROBOT_POLICY_STRATEGY) {
+        return decide_strategically(r);
+    }
+#endif
     if (!r->is_enabled_known) {
         find_enabled(r);
     }
@@ -163,33 +220,16 @@ static bool decide(robot_t *r)
         enabled[request] = r->is_enabled[request];
         candidates[request] = enabled[request];
     }
-#if ROBOT_HAS_STRATEGY
-    if (r->settings.policy == ROBOT_POLICY_STRATEGY) {
-        const int chosen = choose_strategically(r);
-        for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-            candidates[request] = enabled[request] && request == chosen;
-        }
-    }
-#endif
 #if ROBOT_TOPIC_COUNT > 0
     if (is_any_waiting(r)) {
         bool others[ROBOT_REQUEST_COUNT];
         for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-            const int topic = REQUESTS[request].topic;
-            const bool is_ending
-                = topic >= 0 && r->acting[topic].is_waiting && r->acting[topic].request != request;
-            others[request] = candidates[request] && !is_ending;
-            candidates[request] = candidates[request] && is_ending;
+            others[request] = candidates[request] && !is_ending(r, request);
+            candidates[request] = candidates[request] && is_ending(r, request);
         }
         if (!issue_one_of(r, candidates, &issued)) {
             return false;
         }
-#if ROBOT_HAS_STRATEGY
-        /* A strategy may choose something else, or nothing: then no message comes that the releases wait for. */
-        if (issued < 0 && r->settings.policy == ROBOT_POLICY_STRATEGY && !release_waiting(r)) {
-            return false;
-        }
-#endif
         if (issued < 0 && !issue_one_of(r, others, &issued)) {
             return false;
         }

@@ -184,7 +184,6 @@ typedef struct {
 } robot_mission_t;
 
 typedef struct {
-    bool is_reported;
     uint32_t count;
     uint64_t since_us;
 } robot_item_t;
@@ -278,12 +277,12 @@ typedef struct {
 #endif
 #if ROBOT_HAS_STRATEGY
     robot_item_t items[ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT];
-    bool seen[ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT + ROBOT_VISIT_COUNT + ROBOT_MISSION_COUNT];
+    uint32_t seen[(ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT + ROBOT_VISIT_COUNT + ROBOT_MISSION_COUNT + 31) / 32];
+    uint32_t reported[(ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT + 31) / 32];
     bool has_observed;
-    bool is_complete;
-    bool has_decided;
     int approached;
     int chosen;
+    int candidate;
 #endif
     robot_acting_t acting[ROBOT_TOPIC_COUNT + 1];
     bool is_restless[ROBOT_TOPIC_COUNT + 1];

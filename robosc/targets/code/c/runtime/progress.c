@@ -1,12 +1,39 @@
-/* Progress of the strategy. What is seen in a stable state: for each aim, then each assumption, whether it is met; for
-   each visit whether its mission or detour is at it; for each mission whether every visit of its own is true. */
+/* Progress of the strategy. What is seen in a stable state, a bit each: for each aim, then each assumption, whether it
+   is met; for each visit whether its mission or detour is at it; for each mission whether every visit of its own is
+   true. */
 
-enum { ITEM_COUNT = ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT, SEEN_COUNT = ITEM_COUNT + ROBOT_VISIT_COUNT + ROBOT_MISSION_COUNT };
+enum {
+    ITEM_COUNT = ROBOT_AIM_COUNT + ROBOT_ASSUMPTION_COUNT,
+    ITEM_WORDS = (ITEM_COUNT + 31) / 32,
+    SEEN_COUNT = ITEM_COUNT + ROBOT_VISIT_COUNT + ROBOT_MISSION_COUNT,
+    SEEN_WORDS = (SEEN_COUNT + 31) / 32,
+    NOTHING_DECIDED = -2 /* instead of the aim that is approached */
+};
+
+/* The bits of a word that belong to the first ones, `count` of them. */
+static uint32_t first_bits(int count, int word)
+{
+    const int left = count - 32 * word;
+    return left >= 32 ? UINT32_MAX : left <= 0 ? 0 : (UINT32_C(1) << left) - 1;
+}
+
+/* Number of the lowest bit that is set; there is one. */
+static int lowest_bit(uint32_t bits)
+{
+#ifdef __GNUC__
+    return __builtin_ctzl(bits);
+#else
+    int number = 0;
+    while ((bits >> number & 1U) == 0) {
+        number++;
+    }
+    return number;
+#endif
+}
 
 static bool is_owed_unreported(const robot_t *r, int number)
 {
-    const robot_item_t *item = &r->items[number];
-    return number >= ROBOT_AIM_COUNT && r->has_observed && !r->seen[number] && !item->is_reported;
+    return number >= ROBOT_AIM_COUNT && r->has_observed && !is_seen(r->seen, number) && !is_seen(r->reported, number);
 }
 
 /* Time at which the next assumption is to be reported as owed for too long. */
@@ -24,25 +51,13 @@ static uint64_t progress_deadline(const robot_t *r)
     return next;
 }
 
-static void become_met(robot_t *r, int number)
-{
-    robot_item_t *item = &r->items[number];
-    item->count++;
-    if (number < ROBOT_AIM_COUNT) {
-        note(r, ROBOT_LOG_REACHED, number);
-    } else if (item->is_reported) {
-        item->is_reported = false;
-        note(r, ROBOT_LOG_MET, number - ROBOT_AIM_COUNT);
-    }
-}
-
 #if ROBOT_MISSION_COUNT > 0
 /* Number of the visit that a tour is at, from 0 on, or -1. */
-static int tour_place(const bool *seen, int tour)
+static int tour_place(const uint32_t *seen, int tour)
 {
-    const bool *here = &seen[ITEM_COUNT - (ROBOT_AIM_COUNT - ROBOT_VISIT_COUNT) + TOURS[tour].first];
+    const int here = ITEM_COUNT - (ROBOT_AIM_COUNT - ROBOT_VISIT_COUNT) + TOURS[tour].first;
     for (int visit = 0; visit < TOURS[tour].visits; visit++) {
-        if (here[visit]) {
+        if (is_seen(seen, here + visit)) {
             return visit;
         }
     }
@@ -50,9 +65,9 @@ static int tour_place(const bool *seen, int tour)
 }
 
 /* True if every visit of a mission's own is true. */
-static bool is_round(const bool *seen, int mission)
+static bool is_round(const uint32_t *seen, int mission)
 {
-    return seen[ITEM_COUNT + ROBOT_VISIT_COUNT + mission];
+    return is_seen(seen, ITEM_COUNT + ROBOT_VISIT_COUNT + mission);
 }
 
 static void make_visits(robot_t *r, int tour, int first, int made)
@@ -65,7 +80,7 @@ static void make_visits(robot_t *r, int tour, int first, int made)
 }
 
 /* Count the visits that a mission and its detours make between the stable state before and this one. */
-static void move_mission(robot_t *r, const bool *seen, int mission)
+static void move_mission(robot_t *r, const uint32_t *seen, int mission)
 {
     const int own = MISSIONS[mission].tour;
     const int place = tour_place(seen, own);
@@ -107,45 +122,82 @@ static bool is_made(const robot_t *r, int number)
 }
 
 #endif
-/* Take in a stable state. */
+/* Note what is reached or met again, bits of a word. */
+static void note_met(robot_t *r, int word, uint32_t met)
+{
+    for (; met != 0; met &= met - 1) {
+        const int number = 32 * word + lowest_bit(met);
+        if (number < ROBOT_AIM_COUNT) {
+            note(r, ROBOT_LOG_REACHED, number);
+        } else if (is_seen(r->reported, number)) {
+            r->reported[word] &= ~(met & (0 - met));
+            note(r, ROBOT_LOG_MET, number - ROBOT_AIM_COUNT);
+        }
+    }
+}
+
+/* Begin the account in the first stable state: what is met there was not reached. */
+static void begin_progress(robot_t *r, const uint32_t *seen)
+{
+    uint64_t due_us = 0;
+    for (int number = 0; number < ITEM_COUNT; number++) {
+        r->items[number].since_us = r->now_us;
+    }
+    memcpy(r->seen, seen, sizeof r->seen);
+    r->has_observed = true;
+    due_us = progress_deadline(r);
+    r->deadline_us = due_us < r->deadline_us ? due_us : r->deadline_us;
+}
+
+/* Take in a stable state. The loops go over what changes alone: the cycle time of the controller. */
 static void observe_progress(robot_t *r)
 {
-    bool seen[SEEN_COUNT];
-    bool is_complete = true;
-    uint64_t due_us = 0;
-    observe_for_strategy(&r->state, seen);
-    for (int number = 0; number < ITEM_COUNT; number++) {
-        if (!seen[number]) {
-            if (!r->has_observed || r->seen[number]) {
-                r->items[number].since_us = r->now_us;
-            }
-        } else if (r->has_observed && !r->seen[number] && ITEMS[number].mission == NULL) {
-            become_met(r, number);
+    uint32_t seen[SEEN_WORDS] = {0};
+    observe_for_strategy(&r->state, r->seen, seen);
+    if (!r->has_observed) {
+        begin_progress(r, seen);
+        return;
+    }
+    for (int word = 0; word < ITEM_WORDS; word++) {
+        const uint32_t aims = first_bits(ROBOT_AIM_COUNT, word);
+        const uint32_t items = first_bits(ITEM_COUNT, word);
+        /* Visits are made as their missions move on. */
+        const uint32_t visits = aims & ~first_bits(ROBOT_AIM_COUNT - ROBOT_VISIT_COUNT, word);
+        const uint32_t unmet = r->seen[word] & ~seen[word] & items;
+        const uint32_t met = seen[word] & ~r->seen[word] & items & ~visits;
+        for (uint32_t left = unmet; left != 0; left &= left - 1) {
+            r->items[32 * word + lowest_bit(left)].since_us = r->now_us;
         }
-        is_complete = is_complete && (seen[number] || number >= ROBOT_AIM_COUNT);
+        if ((unmet & ~aims) != 0 && r->settings.assumption_timeout_us > 0) {
+            /* One that was to be reported earlier may be met by now: that costs a look at the time. */
+            const uint64_t due_us = later(r->now_us, r->settings.assumption_timeout_us);
+            r->deadline_us = due_us < r->deadline_us ? due_us : r->deadline_us;
+        }
+        for (uint32_t left = met; left != 0; left &= left - 1) {
+            r->items[32 * word + lowest_bit(left)].count++;
+        }
+        if (r->callbacks.log != NULL || r->reported[word] != 0) {
+            note_met(r, word, met);
+        }
     }
 #if ROBOT_MISSION_COUNT > 0
-    for (int mission = 0; mission < ROBOT_MISSION_COUNT && r->has_observed; mission++) {
-        move_mission(r, seen, mission);
+    if (memcmp(seen, r->seen, sizeof seen) != 0) {
+        for (int mission = 0; mission < ROBOT_MISSION_COUNT; mission++) {
+            move_mission(r, seen, mission);
+        }
     }
 #endif
     memcpy(r->seen, seen, sizeof seen);
-    r->has_observed = true;
-    r->is_complete = is_complete;
-    due_us = progress_deadline(r);
-    if (due_us < r->deadline_us) {
-        r->deadline_us = due_us;
-    }
 }
 
 /* Report each assumption that is owed for too long by now, once. */
 static void expire_progress(robot_t *r)
 {
     for (int number = ROBOT_AIM_COUNT; number < ITEM_COUNT; number++) {
-        robot_item_t *item = &r->items[number];
+        const robot_item_t *item = &r->items[number];
         if (r->settings.assumption_timeout_us > 0 && is_owed_unreported(r, number)
             && r->now_us >= later(item->since_us, r->settings.assumption_timeout_us)) {
-            item->is_reported = true;
+            r->reported[number / 32] |= UINT32_C(1) << number % 32;
             note(r, ROBOT_LOG_OWED, number - ROBOT_AIM_COUNT);
         }
     }
@@ -154,12 +206,12 @@ static void expire_progress(robot_t *r)
 static void forget_progress(robot_t *r)
 {
     memset(r->items, 0, sizeof r->items);
-    memset(r->seen, 0, sizeof r->seen);
+    memcpy(r->seen, NOTHING_OWED, sizeof r->seen);
+    memset(r->reported, 0, sizeof r->reported);
     r->has_observed = false;
-    r->is_complete = false;
-    r->has_decided = false;
-    r->approached = -1;
+    r->approached = NOTHING_DECIDED;
     r->chosen = -1;
+    r->candidate = -1;
 }
 
 robot_standing_t robot_standing(const robot_t *r, int number, uint64_t now_us)
@@ -170,14 +222,14 @@ robot_standing_t robot_standing(const robot_t *r, int number, uint64_t now_us)
     standing.name = ITEMS[number].name;
     standing.words = ITEMS[number].words;
     standing.mission = ITEMS[number].mission;
-    standing.is_met = r->seen[number];
+    standing.is_met = r->has_observed && is_seen(r->seen, number);
 #if ROBOT_MISSION_COUNT > 0
     if (standing.mission != NULL) {
-        standing.is_met = is_made(r, number);
+        standing.is_met = r->has_observed && is_made(r, number);
     }
 #endif
-    standing.is_unmet = r->has_observed && !r->seen[number];
-    standing.is_overdue = standing.is_unmet && item->is_reported;
+    standing.is_unmet = r->has_observed && !is_seen(r->seen, number);
+    standing.is_overdue = standing.is_unmet && is_seen(r->reported, number);
     standing.count = item->count;
     standing.unmet_us = standing.is_unmet && now_us > item->since_us ? now_us - item->since_us : 0;
     return standing;
@@ -190,8 +242,8 @@ robot_mission_t robot_mission(const robot_t *r, int number)
 #if ROBOT_MISSION_COUNT > 0
     const int own = MISSIONS[number].tour;
     found.name = MISSIONS[number].name;
-    found.visit = tour_place(r->seen, own) + 1;
-    found.is_round = is_round(r->seen, number);
+    found.visit = r->has_observed ? tour_place(r->seen, own) + 1 : 0;
+    found.is_round = r->has_observed && is_round(r->seen, number);
     found.rounds = r->items[TOURS[own].first + TOURS[own].visits - 1].count;
     found.detours = MISSIONS[number].detours;
 #else
@@ -204,7 +256,7 @@ robot_mission_t robot_mission(const robot_t *r, int number)
 int robot_detour(const robot_t *r, int mission, int number)
 {
 #if ROBOT_MISSION_COUNT > 0
-    return tour_place(r->seen, MISSIONS[mission].tour + 1 + number) + 1;
+    return r->has_observed ? tour_place(r->seen, MISSIONS[mission].tour + 1 + number) + 1 : 0;
 #else
     (void)r;
     (void)mission;
@@ -215,10 +267,10 @@ int robot_detour(const robot_t *r, int mission, int number)
 
 int robot_approached(const robot_t *r)
 {
-    return r->approached;
+    return r->approached < 0 ? -1 : r->approached;
 }
 
 int robot_chosen(const robot_t *r)
 {
-    return r->chosen;
+    return r->chosen < 0 ? -1 : (int)REQUESTS[r->chosen].communication;
 }

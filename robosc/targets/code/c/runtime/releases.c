@@ -80,6 +80,7 @@ static bool release_marked(robot_t *r, bool *is_marked)
 static bool judge_releases(robot_t *r, int issuing)
 {
     bool is_now[ROBOT_TOPIC_COUNT] = {false};
+    bool is_any = false;
     for (int topic = 0; topic < ROBOT_TOPIC_COUNT; topic++) {
         robot_acting_t *acting = &r->acting[topic];
         if (acting->request >= 0) {
@@ -96,10 +97,11 @@ static bool judge_releases(robot_t *r, int issuing)
                     is_now[topic] = !acting->is_waiting;
                 }
 #endif
+                is_any = is_any || is_now[topic];
             }
         }
     }
-    return release_marked(r, is_now);
+    return !is_any || release_marked(r, is_now);
 }
 
 #if !ROBOT_IS_LAYER

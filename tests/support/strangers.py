@@ -10,7 +10,7 @@ from typing import Any
 DATA, HEADERS, RST_STREAM, SETTINGS, PING = 0, 1, 3, 4, 6
 ACKNOWLEDGED, END_OF_STREAM, END_OF_HEADERS = 1, 1, 4
 
-_PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
+PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 _PATIENCE_S = 30.0
 _FRAME_BYTES = 16384
 
@@ -35,7 +35,7 @@ class Stranger:
         self.line = socket.create_connection((host, int(port)), source_address=(source, 0))
         payload = b"".join(struct.pack(">HI", number, value) for number, value in (settings or {}).items())
         # At once: a server may end a connection that has begun and says nothing.
-        self._send(_PREFACE + frame(SETTINGS, 0, 0, payload))
+        self._send(PREFACE + frame(SETTINGS, 0, 0, payload))
         self.is_open = True
         self.frames: list[tuple[int, int, bytes]] = []
         self._thread = threading.Thread(target=self._answer)

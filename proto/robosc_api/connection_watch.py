@@ -11,6 +11,10 @@ Calls of admitted callers that end without a request, because gRPC refuses one t
 used up, bring bytes as well. They differ from calls that are reset in that they are answered: the bytes that a
 connection has been sent (`tcpi_bytes_acked`) show how many of them were.
 
+A host whose connections were closed connects again at once, and what it sends until the next look, gRPC takes: calls
+that wait are handed to handlers, also when their connection has gone. After some floods, the kernel therefore drops a
+host's attempts to connect for some seconds (`connection_filter.py`).
+
 `Ledger` decides, without sockets and time; `ConnectionWatch` counts, in a thread of its own, and closes. Calls pay for
 two entries in tables. Without the kernel's counts (outside of Linux), connections are only kept by gRPC's own limits.
 """
@@ -37,6 +41,7 @@ from typing import Any, NamedTuple, Self
 from urllib.parse import unquote
 
 from robosc_api.calls import call_under_way, peer_of
+from robosc_api.connection_filter import drop_new_connections
 from robosc_api.layers import Layer, behaviour_of, with_behaviour
 
 _log = logging.getLogger(__name__)
@@ -85,6 +90,9 @@ _BUSY_S = 0.02
 _WARNING_S = 10.0
 """Time between two warnings about closed connections, in seconds."""
 
+_NAMED_HOSTS = 5
+"""Hosts that a log line names at most."""
+
 _TRIM = getattr(ctypes.CDLL(None), "malloc_trim", None) if sys.platform == "linux" else None
 
 type Peer = tuple[str, int]
@@ -123,6 +131,11 @@ class ConnectionLimits:
         unasked_bytes: Bytes that all connections together may have received since their last requests.
         slack_bytes: Bytes that a connection may receive besides requests.
         resets: Calls since its last request that a connection may end before they have a request or an answer.
+        strikes: Connections of a host that are closed as floods within some ten seconds before the host is barred.
+        newcomers: New connections without a request that a host may make at once before it is barred.
+        newcomers_a_s: Rate at which they are forgotten.
+        barred_s: Time for which a barred host can make no new connection, in seconds: its next attempt after that
+            succeeds.
         slack_bytes_a_s: Rate at which received bytes are forgotten: pings of a long watch are no flood.
         first_request_s: Time for the first request of a connection, in seconds.
         suspicion_s: Time for which a flood makes other connections of its host suspect, in seconds: those without a
@@ -134,6 +147,10 @@ class ConnectionLimits:
     unasked_bytes: int = 96 * 2**20
     slack_bytes: int = 256 * 2**10
     resets: int = 2000
+    strikes: int = 3
+    newcomers: int = 500
+    newcomers_a_s: float = 100.0
+    barred_s: float = 5.0
     slack_bytes_a_s: float = 4096.0
     first_request_s: float = 30.0
     suspicion_s: float = 60.0
@@ -152,6 +169,25 @@ class CallsSince[P]:
     asked: frozenset[P] = frozenset()
     ended: Mapping[P, int] = field(default_factory=dict)
     open: Mapping[P, int] = field(default_factory=dict)
+
+
+_STRIKES_A_S = 0.2
+"""Rate at which strikes are forgotten."""
+
+
+@dataclass(slots=True)
+class _Host:
+    """Conduct of a host.
+
+    Attributes:
+        strikes: Closed floods that are not forgotten.
+        newcomers: New connections without a request that are not forgotten.
+        barred_until_s: Time until which it is barred.
+    """
+
+    strikes: float = 0.0
+    newcomers: float = 0.0
+    barred_until_s: float = 0.0
 
 
 @dataclass(slots=True)
@@ -204,6 +240,9 @@ class Ledger:
         self._limits = limits
         self._accounts: dict[Peer, _Account] = {}
         self._suspect_until_s: dict[str, float] = {}
+        self._hosts: dict[str, _Host] = {}
+        # Floods that were closed and have not gone yet: each is one strike.
+        self._shut: set[Peer] = set()
         self._last_s: float | None = None
 
     def look(self, traffic: Mapping[Peer, Traffic], calls: CallsSince[Peer], now_s: float) -> dict[Peer, CloseReason]:
@@ -215,8 +254,11 @@ class Ledger:
             now_s: Current time, in seconds of a monotonic clock.
         """
         accounts = self._accounts
-        forgotten = 0.0 if self._last_s is None else (now_s - self._last_s) * self._limits.slack_bytes_a_s
+        passed_s = 0.0 if self._last_s is None else now_s - self._last_s
+        forgotten = passed_s * self._limits.slack_bytes_a_s
         self._last_s = now_s
+        self._forget(passed_s, now_s)
+        self._shut &= traffic.keys()
         for gone in accounts.keys() - traffic.keys():
             del accounts[gone]
         open_calls = calls.open
@@ -229,10 +271,16 @@ class Ledger:
                 account.asked_s, account.explained, account.owed = now_s, bytes_of_peer.received, 0
             else:
                 account.explain(bytes_of_peer, calls.ended.get(peer, 0), 0.0 if is_new else forgotten)
+                if is_new and peer not in self._shut:
+                    self._hosts.setdefault(peer[0], _Host()).newcomers += 1
             account.unasked = bytes_of_peer.received - account.explained
             account.acknowledged = bytes_of_peer.acknowledged
         closed = self._flooding(open_calls, now_s) | self._silent(open_calls, now_s)
         closed |= self._unused(open_calls, closed)
+        for host in self._hosts.values():
+            if host.strikes >= self._limits.strikes or host.newcomers > self._limits.newcomers:
+                host.barred_until_s = now_s + self._limits.barred_s
+                host.strikes = host.newcomers = 0.0
         for peer in closed:
             del accounts[peer]
         return closed
@@ -241,6 +289,21 @@ class Ledger:
     def is_alert(self) -> bool:
         """True if some host is suspect."""
         return bool(self._suspect_until_s)
+
+    @property
+    def barred(self) -> frozenset[str]:
+        """Hosts that can make no new connections for now."""
+        return frozenset(name for name, host in self._hosts.items() if host.barred_until_s)
+
+    def _forget(self, passed_s: float, now_s: float) -> None:
+        """Forget what hosts have done, by and by."""
+        for name, host in list(self._hosts.items()):
+            host.strikes = max(host.strikes - passed_s * _STRIKES_A_S, 0.0)
+            host.newcomers = max(host.newcomers - passed_s * self._limits.newcomers_a_s, 0.0)
+            if host.barred_until_s <= now_s:
+                host.barred_until_s = 0.0
+                if not host.strikes and not host.newcomers:
+                    del self._hosts[name]
 
     def _flooding(self, open_calls: Mapping[Peer, int], now_s: float) -> dict[Peer, CloseReason]:
         """Connections that have received more than requests can have, the worst first."""
@@ -269,8 +332,12 @@ class Ledger:
                     total -= account.unasked
                     if total <= limits.unasked_bytes / 2:
                         break
-        for host, _ in closed:
+        for peer in closed:
+            host = peer[0]
             suspects[host] = now_s + limits.suspicion_s
+            if peer not in self._shut:
+                self._shut.add(peer)
+                self._hosts.setdefault(host, _Host()).strikes += 1
         return closed
 
     def _silent(self, open_calls: Mapping[Peer, int], now_s: float) -> dict[Peer, CloseReason]:
@@ -456,6 +523,7 @@ class ConnectionWatch:
         limits: Limits of connections.
         arrivals: Layer of the server.
         share: Share of a core that looking takes at most.
+        bars_hosts: True to keep new connections of a host away for a while after floods of it. They are then late.
         returns_memory: True to return the memory that floods have taken to the system at once. Meanwhile, threads of
             this process that need memory may have to wait.
         clock: Seconds of a monotonic clock.
@@ -471,6 +539,7 @@ class ConnectionWatch:
         arrivals: Arrivals,
         *,
         share: float = SHARE,
+        bars_hosts: bool = False,
         returns_memory: bool = True,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -478,6 +547,8 @@ class ConnectionWatch:
         self._sockets = _Sockets(port)
         self._arrivals = arrivals
         self._share = share
+        self._bars_hosts = bars_hosts
+        self._barred: frozenset[str] = frozenset()
         self._returns_memory = returns_memory
         self._clock = clock
         self._warned_s = self._failed_s = float("-inf")
@@ -501,6 +572,8 @@ class ConnectionWatch:
         self._end.set()
         if self._thread.is_alive():
             self._thread.join()
+        if self._barred:
+            self._bar(frozenset())
 
     def look(self) -> None:
         """Look at all connections once, and close those beyond the limits."""
@@ -513,12 +586,22 @@ class ConnectionWatch:
                 self.closed[reason] += 1
                 self._unreported[reason] += 1
                 self._last[reason] = peer
+        if self._bars_hosts and self._ledger.barred != self._barred:
+            self._bar(self._ledger.barred)
         if self._unreported and now_s - self._warned_s >= _WARNING_S:
             self._warned_s = now_s
             for reason, count in self._unreported.items():
                 host, port = self._last[reason]
                 _log.warning("closed connections: %d: %s; the last one: %s port %d", count, reason, host, port)
             self._unreported.clear()
+
+    def _bar(self, hosts: frozenset[str]) -> None:
+        """Keep new connections of these hosts away, and of no others."""
+        if hosts - self._barred:
+            _log.warning("after floods, new connections are late from %s", ", ".join(sorted(hosts)[:_NAMED_HOSTS]))
+        self._barred = hosts
+        if not self._sockets.bar(hosts):
+            _log.warning("the kernel takes no filter of connections: hosts that flood connect again at once")
 
     def _run(self) -> None:
         pace = LookPace(self._share)
@@ -591,6 +674,31 @@ class _Sockets:
                     copy.shutdown(socket.SHUT_RDWR)
                     return True
         return False
+
+    def bar(self, hosts: frozenset[str]) -> bool:
+        """Keep new connections of these hosts away, and of no others; False: the kernel does not."""
+        is_done = True
+        for descriptor in _descriptors():
+            try:
+                if not stat.S_ISSOCK(os.fstat(descriptor).st_mode):
+                    continue
+                copy = socket.socket(fileno=os.dup(descriptor))
+            except OSError:
+                continue  # It has gone.
+            with copy:
+                if self._is_listener(copy):
+                    try:
+                        drop_new_connections(copy, hosts)
+                    except OSError:
+                        is_done = False
+        return is_done
+
+    def _is_listener(self, line: socket.socket) -> bool:
+        return (
+            line.family in (socket.AF_INET, socket.AF_INET6)
+            and line.getsockopt(socket.SOL_SOCKET, socket.SO_ACCEPTCONN) == 1
+            and line.getsockname()[1] == self._port
+        )
 
     def _peer(self, descriptor: int) -> Peer | None:
         """Return the other end of a connection of our port; None: it is something else."""

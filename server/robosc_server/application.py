@@ -256,7 +256,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     await server.start()
     if settings.socket is None:
         limits = ConnectionLimits(connections=connections, request_bytes=request_limits.submission_bytes)
-        watch = stack.enter_context(ConnectionWatch(split_address(address)[1], limits, arrivals))
+        watch = stack.enter_context(ConnectionWatch(split_address(address)[1], limits, arrivals, bars_hosts=True))
         metrics.set_sources(closed=lambda: watch.closed)
     stack.push_async_callback(end)
     return address

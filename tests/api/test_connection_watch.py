@@ -1,6 +1,8 @@
 """Tests of the watch over connections: its decisions on numbers, and a real server that is flooded."""
 
 import asyncio
+import select
+import socket
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from threading import Semaphore
@@ -120,6 +122,79 @@ def test_too_many_connections_cost_the_host_with_the_most_those_that_are_not_use
     closed = look(ledger, received, (), {many[0]: 1}, 1.0)
     assert len(closed) == 2
     assert set(closed) <= set(many[2:])
+
+
+def test_a_host_is_barred_for_a_while_after_some_floods_and_no_other_host_is() -> None:
+    ledger = Ledger(LIMITS)
+    for port in (1, 2):
+        assert look(ledger, {("10.0.0.2", port): 5000, A: 50}, (), {}, 0.0)
+        assert ledger.barred == frozenset()
+    assert look(ledger, {("10.0.0.2", 3): 5000, A: 50}, (), {}, 0.0)
+    assert ledger.barred == {"10.0.0.2"}
+    look(ledger, {A: 50}, (), {}, 4.9)
+    assert ledger.barred == {"10.0.0.2"}
+    look(ledger, {A: 50}, (), {}, 5.0)
+    assert ledger.barred == frozenset()
+
+
+def test_floods_that_are_long_ago_bar_no_host() -> None:
+    ledger = Ledger(LIMITS)
+    for number in range(10):
+        assert look(ledger, {("10.0.0.2", number): 5000}, (), {}, number * 5.0)
+        assert ledger.barred == frozenset()
+
+
+def test_a_flood_that_is_closed_and_has_not_gone_yet_is_one() -> None:
+    ledger = Ledger(LIMITS)
+    for number in range(10):
+        assert look(ledger, {B: 5000 + number}, (), {}, 0.0)
+        assert ledger.barred == frozenset()
+
+
+def test_connections_that_are_closed_for_other_reasons_bar_no_host() -> None:
+    ledger = Ledger(LIMITS)
+    many = {("10.0.0.9", port): 10 for port in range(6)}
+    look(ledger, many, (), {}, 0.0)
+    assert len(look(ledger, many, (), {}, 30.0)) == 6
+    assert ledger.barred == frozenset()
+
+
+def test_new_connections_by_the_hundred_that_ask_nothing_bar_their_host() -> None:
+    def barred(count: int, *, asking: bool = False) -> frozenset[str]:
+        ledger = Ledger(ConnectionLimits(newcomers=100, newcomers_a_s=10.0))
+        new = dict.fromkeys([("10.0.0.9", port) for port in range(count)], 50)
+        look(ledger, new, list(new) if asking else (), {}, 0.0)
+        return ledger.barred
+
+    assert barred(100) == frozenset()
+    assert barred(101) == {"10.0.0.9"}
+    assert barred(1000, asking=True) == frozenset()
+
+
+def test_idle_connections_are_new_once() -> None:
+    ledger = Ledger(ConnectionLimits(newcomers=100, newcomers_a_s=0.0))
+    for number in range(10):
+        look(ledger, {("10.0.0.9", port): 50 for port in range(60)}, (), {}, number * 0.1)
+        assert ledger.barred == frozenset()
+
+
+def test_clients_that_connect_for_each_call_bar_no_host() -> None:
+    ledger = Ledger(ConnectionLimits(newcomers=100, newcomers_a_s=10.0))
+    for number in range(1000):
+        # One each tenth of a second, whose request comes a look later.
+        peer = ("10.0.0.9", number)
+        look(ledger, {peer: 50}, (), {peer: 1}, number * 0.1)
+        look(ledger, {peer: 900}, [peer], {peer: 1}, number * 0.1 + 0.05)
+        assert ledger.barred == frozenset()
+
+
+def test_a_busy_client_is_neither_closed_nor_barred() -> None:
+    ledger = Ledger(ConnectionLimits())
+    for number in range(1, 1000):
+        # Each tenth of a second: 500 calls, a hundred of which end without a request, and some are answered.
+        received, acknowledged = {A: number * 100_000}, {A: number * 400 * ANSWER}
+        assert look(ledger, received, [A], {A: 50}, number * 0.1, {A: 500}, acknowledged) == {}
+    assert ledger.barred == frozenset()
 
 
 KIB, MIB = 2**10, 2**20
@@ -261,6 +336,45 @@ def test_calls_that_are_reset_at_once_are_cut_off() -> None:
             assert watch.closed.total() >= 1
 
     asyncio.run(flooded())
+
+
+def is_late(port: int, source: str) -> bool:
+    """True if an attempt to connect gets no answer at once; on one machine, each answer comes at once."""
+    with socket.socket() as line:
+        line.bind((source, 0))
+        line.setblocking(False)
+        if line.connect_ex(("127.0.0.1", port)) == 0:
+            return False
+        # On loopback, the answer has come before the call returns.
+        return not select.select((), (line,), (), 0)[1]
+
+
+@needs_counts
+def test_a_host_that_floods_again_and_again_connects_late_and_present_connections_go_on(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    now_s = [0.0]
+
+    async def flooded() -> None:
+        arrivals = Arrivals()
+        async with watched_server(arrivals) as (channel, port):
+            assert (await call(channel, b"before")).answer == b"before"
+            limits = ConnectionLimits(request_bytes=2**20)
+            watch = ConnectionWatch(port, limits, arrivals, bars_hosts=True, clock=lambda: now_s[0])
+            for _ in range(3):
+                assert not is_late(port, "127.0.0.1")
+                await asyncio.to_thread(endless_headers, port, watch.look)
+            assert is_late(port, "127.0.0.1")
+            assert not is_late(port, "127.0.0.2")
+            assert (await call(channel, b"after")).answer == b"after"
+            now_s[0] = 6.0
+            await asyncio.to_thread(watch.look)
+            assert not is_late(port, "127.0.0.1")
+
+    asyncio.run(flooded())
+    assert [record.getMessage() for record in caplog.records if "late" in record.getMessage()] == [
+        "after floods, new connections are late from 127.0.0.1"
+    ]
 
 
 @needs_counts

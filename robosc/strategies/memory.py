@@ -150,7 +150,7 @@ def _in_order(parts: Sequence[_Part]) -> Iterator[_Part]:
     while left:
         ready = [part for part in left if all(part is other or other.read.isdisjoint(part.names) for other in left)]
         if not ready:
-            # They decide about each other.
+            # The parts that are left decide about each other.
             yield reduce(_Part.with_all_of, left)
             return
         yield from ready

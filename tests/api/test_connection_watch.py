@@ -1,6 +1,7 @@
 """Tests of the watch over connections: its decisions on numbers, and a real server that is flooded."""
 
 import asyncio
+from collections import Counter
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from threading import Semaphore
@@ -27,7 +28,7 @@ from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.request_timeouts import RequestTimeouts
 from support.floods import MOST_BYTES, endless_headers, resets
 from support.small_server import SERVICE, call, small_server
-from support.waiting import PATIENCE_S
+from support.waiting import PATIENCE_S, until
 
 LIMITS = ConnectionLimits(
     connections=8,
@@ -250,6 +251,33 @@ def test_requests_that_are_too_large_are_refused_each_and_their_connection_stays
     asyncio.run(refused())
 
 
+async def test_a_call_is_open_for_its_connection_until_it_has_ended() -> None:
+    arrivals = Arrivals()
+    is_open, may_end = asyncio.Event(), asyncio.Event()
+
+    async def waiting(request: bytes, context: Any) -> bytes:
+        is_open.set()
+        await may_end.wait()
+        return request
+
+    async with small_server(layers=(Outermost(), CallsByConnection(arrivals)), unary=waiting) as (channel, _):
+        made = asyncio.create_task(call(channel))
+        await is_open.wait()
+        (count,) = arrivals.take().open.values()
+        assert count == 1
+        may_end.set()
+        await made
+        ended: Counter[str] = Counter()
+
+        def is_over() -> bool:
+            now = arrivals.take()
+            ended.update(now.ended)
+            return not now.open
+
+        await until(is_over)
+        assert ended.total() == 1
+
+
 @needs_counts
 def test_calls_that_are_reset_at_once_are_cut_off() -> None:
     async def flooded() -> None:
@@ -365,8 +393,13 @@ def test_failures_of_the_watch_are_logged_now_and_then(
         raise RuntimeError("broken")
 
     monkeypatch.setattr(ConnectionWatch, "look", failing)
+    # Time goes on by looks alone, so the processor time that they take must not put off the next one.
+    ended: list[float] = []
+    monkeypatch.setattr(LookPace, "looked", lambda pace, took_s, processor_s: ended.append(took_s))
     with ConnectionWatch(1, LIMITS, Arrivals(), clock=lambda: now_s[-1]):
         for _ in range(6):
             assert looks.acquire(timeout=PATIENCE_S)
+    # The pace is told of each of them, though it failed.
+    assert len(ended) == len(now_s) - 1
     lines = [record.getMessage() for record in caplog.records]
     assert lines == [f"watching the connections failed ({count} times since the last such line)" for count in (1, 4)]

@@ -64,7 +64,7 @@ HOPS = (
     Hop(LOOP, "robosc.execution.runtime.runner:Runner.receive", "an event of the model: its state is another"),
     Hop(
         LOOP,
-        "robosc.execution.runtime.requests:Decisions.decide",
+        "robosc.execution.runtime.requests:PolicyDecisions.decide",
         f"chooses a request; by `every: period`, up to {_PERIOD} later",
     ),
     Hop(LOOP, "robosc_bridge.daemon.robot.adapter:RobotAdapter.publish", "a message for the drive"),

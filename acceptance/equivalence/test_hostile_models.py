@@ -106,7 +106,9 @@ def _listening_on(topics: list[str]) -> Supervisor:
 @pytest.mark.parametrize("target", TARGETS)
 def test_a_topic_may_be_called_anything_or_is_refused_in_one_line(target: str, tmp_path: Path) -> None:
     canary = tmp_path / "canary"
-    topics = [text for text in payloads(canary) if 0 < len(text) < MAXIMUM_IDENTIFIER]
+    # A name with characters that cannot be seen is refused before any target; what such a text does is tried without.
+    seen = ("".join(char if char.isprintable() else " " for char in text).strip() for text in payloads(canary))
+    topics = [text for text in seen if 0 < len(text) < MAXIMUM_IDENTIFIER]
     try:
         files = generate(_listening_on(topics), target)
     except UnsupportedModelError:

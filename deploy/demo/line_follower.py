@@ -25,6 +25,7 @@ from robosc_experiments.domains import own_domain
 
 ROOT = Path(__file__).resolve().parents[2]
 MODEL = ROOT / "examples" / "line_follower" / "line_follower.rscd"
+MAINTAINER = "A Robot's Owner <owner@example.org>"
 START_LIMIT_S = 30.0
 RUN_LIMIT_S = 60.0
 STOP_LIMIT_S = 5.0
@@ -149,7 +150,8 @@ def run(folder: Path, model_path: Path) -> list[str]:
         model = os.path.relpath(model_path)
         supervisor, package = folder / "line_follower.rsup", folder / "package"
         run_client(["synth", model, "--server", address, "-o", str(supervisor)], environment)
-        run_client(["generate", model, "--server", address, "--target", "ros2", "-o", str(package)], environment)
+        generation = ["generate", model, "--server", address, "--target", "ros2", "-o", str(package)]
+        run_client([*generation, "--maintainer", MAINTAINER], environment)
         (name,) = [path.parent.name for path in package.glob("*/node.py")]
         log, record = folder / "events", folder / "robot.jsonl"
         node = stack.enter_context(

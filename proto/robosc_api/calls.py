@@ -35,7 +35,6 @@ class Call:
         """Call the functions that wait for the end."""
         for function in self.at_end:
             function()
-        self.at_end.clear()
 
 
 CALL: ContextVar[Call | None] = ContextVar("call", default=None)

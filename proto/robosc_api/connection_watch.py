@@ -515,6 +515,11 @@ class LookPace:
         self._took_s, self._processor_s = took_s, processor_s
 
 
+def _bars_none(host: str) -> bool:
+    """Return False for every host."""
+    return False
+
+
 class ConnectionWatch:
     """Thread that closes connections beyond the limits, inside the context.
 
@@ -523,7 +528,8 @@ class ConnectionWatch:
         limits: Limits of connections.
         arrivals: Layer of the server.
         share: Share of a core that looking takes at most.
-        bars_hosts: True to keep new connections of a host away for a while after floods of it. They are then late.
+        bars: Function that returns True for a host whose new connections may be kept away for a while after floods of
+            it. They are then late.
         returns_memory: True to return the memory that floods have taken to the system at once. Meanwhile, threads of
             this process that need memory may have to wait.
         clock: Seconds of a monotonic clock.
@@ -539,7 +545,7 @@ class ConnectionWatch:
         arrivals: Arrivals,
         *,
         share: float = SHARE,
-        bars_hosts: bool = False,
+        bars: Callable[[str], bool] = _bars_none,
         returns_memory: bool = True,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
@@ -547,7 +553,7 @@ class ConnectionWatch:
         self._sockets = _Sockets(port)
         self._arrivals = arrivals
         self._share = share
-        self._bars_hosts = bars_hosts
+        self._bars = bars
         self._barred: frozenset[str] = frozenset()
         self._returns_memory = returns_memory
         self._clock = clock
@@ -586,8 +592,9 @@ class ConnectionWatch:
                 self.closed[reason] += 1
                 self._unreported[reason] += 1
                 self._last[reason] = peer
-        if self._bars_hosts and self._ledger.barred != self._barred:
-            self._bar(self._ledger.barred)
+        barred = frozenset(filter(self._bars, self._ledger.barred))
+        if barred != self._barred:
+            self._bar(barred)
         if self._unreported and now_s - self._warned_s >= _WARNING_S:
             self._warned_s = now_s
             for reason, count in self._unreported.items():

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from robosc.automata.executable import ExecutableSystem
 from robosc.automata.state import subjects
 from robosc.controller_properties import Controller, MissedGoal, check_strategy
-from robosc.controller_properties.messages import PossibleData, choices_together
+from robosc.controller_properties.messages import MAXIMUM_CASES, PossibleData, choices_together
 from robosc.model.structure import EventKind
 from robosc.supervisor import AddedCondition, Strategy
 from robosc.supervisor.predicates import state_predicate, state_predicates
@@ -21,11 +21,8 @@ if TYPE_CHECKING:
 
 BY_POSITION = "goals position by position"
 
-FEW = 10
-"""Part of all positions up to which they are looked at one by one before sets of them are tried, without missions."""
-
-MAXIMUM_CASES = 256
-"""Cases of the data of one message beyond which the data of its events counts as independent."""
+_FIRST_DIVISOR = 10
+"""Divisor of the limit of positions: without missions, so many are looked at before sets of positions are tried."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -72,14 +69,13 @@ def verify_strategy(
     Raises:
         SynthesisCancelled: `should_stop` became true.
     """
-    # Visits that are put off are found position by position alone.
-    few = limits.positions if executable.model.missions else limits.positions // FEW
+    # Visits that are put off are found only position by position, so that robots with missions get the whole limit.
+    few = limits.positions if executable.model.missions else limits.positions // _FIRST_DIVISOR
     found = check_strategy(executable, added, strategy, limit=few, controller=controller, should_stop=should_stop)
     if found.result != "not checked":
         return GoalCheck(CheckOutcome(found.result), BY_POSITION, found.missed, found.put_off)
     reason = f"more than {few} positions" if found.positions >= few else "data with many values"
     missed = None
-    # Most strategies are small: who only looks at positions one by one need not load what works on sets of them.
     if limits.work:
         check, is_exact = verify_on_sets(
             executable,
@@ -133,6 +129,7 @@ def verify_on_sets(
     Raises:
         SynthesisCancelled: `should_stop` became true.
     """
+    # Most strategies are small: the library of decision diagrams is loaded only where it is needed.
     from robosc.verification.symbolic import verify_strategy_symbolically
 
     system = executable.remembering_automata

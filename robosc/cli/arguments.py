@@ -182,10 +182,10 @@ def add_verify_limit_argument(parser: argparse.ArgumentParser, name: str, defaul
         type=_natural,
         default=default,
         metavar="N",
-        help="verify up to N states one by one, recompute the supervisor up to N/4 states of the system without it, "
-        "search symbolically beyond, with 25 N nodes of work, also the positions under a strategy that are more than "
-        "N/100 (N/10 with missions), and where that is too much up to N/10 of them; what takes more is 'not checked' "
-        "(default: %(default)s)",
+        help="verify up to N states one by one, and larger systems symbolically with at most 25 N nodes; recompute the "
+        "supervisor up to N/4 states of the system without it. Of a strategy, check up to N/100 positions (with "
+        "missions N/10) one by one, and more of them symbolically with at most 25 N nodes, or else up to N/10 one by "
+        "one. What takes more is 'not checked' (default: %(default)s)",
     )
 
 

@@ -184,7 +184,7 @@ class _Formulas:
     def _best(self, found: list[Expression]) -> int:
         """Return the operands of the shortest of some formulas; as many as any may have if there are none."""
         best = self._least(found) if found else max(OPERANDS, self._limit)
-        # Formulas longer than that are of no use; a larger limit is not that of the caller.
+        # A limit below _WIDE is that of the caller, who has no use for longer formulas.
         return min(best, self._limit) if self._limit < _WIDE else best
 
     def _least(self, found: list[Expression]) -> int:

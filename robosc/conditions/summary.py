@@ -189,7 +189,7 @@ def strategy_lines(supervisor: Supervisor) -> list[str]:
     what = goals_and_visits(supervisor)
     lines = [f"the strategy approaches its {what} in turn; it requests the first that applies"]
     if not any(goal.choices or goal.meanwhile for goal in goals):
-        lines = [f"the strategy never requests anything: its {what} come true without that"]
+        lines = [f"the strategy never requests anything: nothing has to be requested for its {what}"]
     for goal in goals:
         lines += [f"  {row}" for row in _wrapped(f"for {goal.name}, {goal.text}")]
         rows: list[tuple[str, list[str]]] = []

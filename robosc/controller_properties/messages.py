@@ -42,6 +42,9 @@ from robosc.model.typed import constant_value
 MAXIMUM_CHOICES = 20_000
 """Maximum number of combinations of terms' values; beyond it the data of events counts as independent."""
 
+MAXIMUM_CASES = 256
+"""Cases of a message's data beyond which searches on sets of states take the data of its events as independent."""
+
 
 @dataclass(frozen=True, slots=True)
 class PossibleData:

@@ -52,7 +52,7 @@ class CounterRun(Run):
         explanation: Explanation why the goals of a model cannot be reached: the `explanation` of its synthesis.
 
     Raises:
-        NoCounterStrategyError: The counter-strategy is too large, or a server has sent the explanation.
+        NoCounterStrategyError: There is none, it is too large, or a server has sent the explanation.
     """
 
     def __init__(self, explanation: GoalExplanation) -> None:

@@ -252,7 +252,8 @@ class Run(ManualRun):
         self._system.observe()
         self._reached = self._system.reached()
         number = self._system.choose()
-        # Events that come one by one can lead where no message does, and no strategy is made for that.
+        # Events of one message that are taken one by one can lead where no whole message does. The strategy knows
+        # nothing about such states, and its choice need not be enabled.
         if number is not None and self._system.enabled(self._requests.events[number]):
             self._chosen = self._requests.events[number]
         pairs = zip(self._reached, before or [False] * len(self._reached), strict=True)

@@ -15,7 +15,7 @@ from typing import Any
 
 from robosc.automata import ExecutableSystem, System
 from robosc.automata.goal_memory import Cancel, Obligations
-from robosc.controller_properties.messages import PossibleData, choices_together
+from robosc.controller_properties.messages import MAXIMUM_CASES, PossibleData, choices_together
 from robosc.expressions import Expression
 from robosc.model.structure import EventKind
 from robosc.strategies.memory import ObservedMemory
@@ -28,9 +28,6 @@ from robosc.synthesis.fixed_point import FixedPoint, Problem, safe_states
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.nodes import implies
 from robosc.synthesis.transitions import Steps, transition_of
-
-MAXIMUM_CASES = 256
-"""Cases of a message's data beyond which the data of its events counts as independent."""
 
 _REMEMBERED = 8
 """Predicates of which it is remembered from where moves lead into them."""
@@ -138,7 +135,7 @@ class ControllerArena:
         self._ends_alike = all(steps.is_deterministic for _, steps in self._silent)
         self._stable = reachable & ~encoding.any_of(first for first, _ in self._silent)
         """Stable states, with any memory."""
-        self.positions = self._stable & self._memory.can_be
+        self.positions = self._stable & self._memory.possible
         self.observed = self.positions
         for place in owed.places:
             before, after = encoder.holds(place.read), encoder.holds(place.update)
@@ -152,7 +149,7 @@ class ControllerArena:
         self.requests = tuple(event for event in executable.requests if event in self._steps)
         """Events of requests, in source order."""
         self._possible = {event: self._stable & self._enabled(event) for event in self.requests}
-        # Moves of which there are no pairs are looked at event by event.
+        # Moves without pairs are looked at event by event.
         self._next = self._next_variables()
         self._observed_next = self._memory.updates_of(self._next)
         self._turns: dict[str, Pairs] = {}
@@ -178,7 +175,7 @@ class ControllerArena:
             return
         for event in self.requests:
             steps, turn = self._steps[event], Pairs(self._manager, self._next)
-            # Data may decide what a request leads to: then all data has to lead to the same, which pairs do not show.
+            # Requests whose data decides where they lead must lead into a predicate with all data: pairs do not tell.
             if steps.is_deterministic and turn.add(self._possible[event] & steps.some(ending)):
                 self._turns[event] = turn
                 self._turn.join(turn)
@@ -206,7 +203,7 @@ class ControllerArena:
         ]
 
     def _carrying(self, event: str, options: Sequence[PossibleData]) -> Steps:
-        """The steps of an event with some data."""
+        """Return the steps of an event with some data."""
         inputs = self._encoding.inputs_of(event)
         data = self._manager.false
         for option in options:
@@ -257,7 +254,7 @@ class ControllerArena:
                 return arrived
         found = None
         for other, arrived in reversed(self._arrived):
-            # Steps that may lead to what predicates are together may lead to one of them, and the other way round.
+            # Steps that may lead into a union may lead into one of its parts, and the other way round.
             if implies(self._manager, other, predicate):
                 found = arrived | self._newly_arriving(predicate & ~other)
                 break
@@ -315,7 +312,7 @@ class ControllerArena:
         return found & self._otherwise_surrounded(predicate) if self._other_cases else found
 
     def _otherwise_surrounded(self, predicate: Any) -> Any:
-        """Return the positions from which those batches lead into a predicate that there are no pairs of."""
+        """Return the positions from which the batches without pairs lead into a predicate."""
         arriving = self.arriving(predicate)
         found, bad = self.positions, ~arriving
         for number in reversed(range(len(self._surrounded))):
@@ -380,7 +377,7 @@ class ControllerArena:
             found = found | (steps.plant & steps.some(predicate))
         return found
 
-    def met(self) -> Any:
+    def reachable_positions(self) -> Any:
         """Return the positions that moves of both sides can lead to, each with the memory that it can have there.
 
         Of each mission and each detour, the memory is exact; where their stages are very many together, combinations of
@@ -388,11 +385,11 @@ class ControllerArena:
         """
         found = self.positions
         for forgotten in self._memory.apart():
-            found = found & self._met_without(forgotten)
+            found = found & self._reachable_without(forgotten)
         return found
 
-    def _met_without(self, forgotten: Collection[str]) -> Any:
-        """Return the stable states that are met, as they are observed, with any value of some of the memory."""
+    def _reachable_without(self, forgotten: Collection[str]) -> Any:
+        """Return the stable states that can be reached, as they are observed, with any value of some of the memory."""
         start = self._memory.forgetting(self._settled(self.start), forgotten)
         found = fresh = self._memory.after(start, forgotten)
         while fresh != self._manager.false:
@@ -401,13 +398,13 @@ class ControllerArena:
             found = found | fresh
         return found
 
-    def unobserved(self, met: Any) -> Any:
-        """Return the stable states that the first position and moves from others lead to, with the memory before.
+    def unobserved(self, reachable: Any) -> Any:
+        """Return the stable states that the executor begins in and that moves lead to, with the memory before.
 
         Args:
-            met: The positions that can be met.
+            reachable: The positions in which moves begin.
         """
-        return self._settled(self.start) | self._ends(met)
+        return self._settled(self.start) | self._ends(reachable)
 
     def _ends(self, positions: Any) -> Any:
         """Return the stable states in which moves from positions end, with the memory before."""

@@ -47,7 +47,7 @@ def goal_findings(
             Diagnostic(
                 Severity.WARNING,
                 "idle-goal",
-                "nothing is ever done for this goal: it is true whenever the controller decides",
+                "this goal is true whenever the controller decides, so nothing is ever done for it",
                 _place(places, aims[number]),
                 "Compare it with what can happen, such as its numbers with the ranges of variables, or remove it.",
             )

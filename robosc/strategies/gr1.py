@@ -160,7 +160,7 @@ def approach_in_earnest(
     failing = [~item for item in assumptions] or [false]
     calm = winning if interrupted is None else winning & ~interrupted
     # An assumption that only an interruption makes true is not worth waiting for.
-    hopeful = [~item & _leading(arena, item & calm, calm, check_stop) for item in assumptions] or [false]
+    hopeful = [~item & leading(arena, item & calm, calm, check_stop) for item in assumptions] or [false]
     search = _EarnestSearch(arena, failing, winning, false, check_stop)
     reached = goal & arena.turn(winning)
     found: list[Approach] = []
@@ -182,8 +182,15 @@ def approach_in_earnest(
         found.append(step)
 
 
-def _leading(arena: TwoSidedArena, found: Any, within: Any, check_stop: Callable[[], object]) -> Any:
-    """Return the positions from which moves of both sides can lead to some, without leaving others."""
+def leading(arena: TwoSidedArena, found: Any, within: Any, check_stop: Callable[[], object]) -> Any:
+    """Return the positions from which moves of both sides can lead to some positions, without leaving a bound.
+
+    Args:
+        arena: The game.
+        found: The positions to get to.
+        within: Positions that moves begin in: those that are not to be left.
+        check_stop: Function called before each step; it may end the work with an error.
+    """
     before = None
     while found != before:
         check_stop()
@@ -323,6 +330,6 @@ class _EarnestSearch(_Search):
         while staying != bound:
             bound = self._waiting(progress, failing, staying)
             inside = bound & within & ~progress
-            led = _leading(self.arena, inside & near, inside, self.check_stop)
+            led = leading(self.arena, inside & near, inside, self.check_stop)
             staying = led | (bound & ~inside)
         return staying

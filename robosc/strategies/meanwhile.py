@@ -14,33 +14,10 @@ many requests are taken along.
 """
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
 
 from robosc.strategies.arena import ControllerArena
-from robosc.strategies.gr1 import Approach
-
-Requests = dict[str, Any]
-"""For each request the positions in which it is chosen."""
-
-
-@dataclass(frozen=True, slots=True)
-class ModeGame:
-    """A mode of the strategy, on positions.
-
-    Attributes:
-        goal: Positions in which its goal is true.
-        interrupted: Positions in which its visit is not asked for.
-        steps: Steps towards the goal, the nearest first.
-        chosen: Choices of the mode by itself.
-        nearer: The part of them by which the controller gets nearer to the goal, and does not interrupt a visit.
-    """
-
-    goal: Any
-    interrupted: Any
-    steps: Sequence[Approach]
-    chosen: Requests
-    nearer: Requests
+from robosc.strategies.modes import ModeGame, Requests
 
 
 class Meanwhile:
@@ -50,8 +27,8 @@ class Meanwhile:
         arena: The game.
         modes: All modes.
         waiting: For each mode the positions in which it requests nothing by itself.
-        places: Numbers of the assumptions, in the order in which they are waited for: of several that can be waited for
-            in a position, the first counts.
+        awaited: Numbers of the assumptions, in the order in which they are waited for: of several that can be waited
+            for in a position, the first counts.
         near: For some assumptions, the positions that are not to be left while they are waited for.
         false: The predicate that is true nowhere.
     """
@@ -61,33 +38,33 @@ class Meanwhile:
         arena: ControllerArena,
         modes: Sequence[ModeGame],
         waiting: Sequence[Any],
-        places: Sequence[int],
+        awaited: Sequence[int],
         near: Mapping[int, Any],
         false: Any,
     ) -> None:
         self._arena = arena
         self._modes = modes
-        self._places = places
+        self._awaited = awaited
         self._near = near
         self._false = false
         wanted: Requests = {}
         for mode in modes:
-            for event, nearer in mode.nearer.items():
-                wanted[event] = wanted.get(event, false) | nearer
+            for event, approaching in mode.approaching.items():
+                wanted[event] = wanted.get(event, false) | approaching
         self._staying = [
-            {event: self._stays(mode, event, here & nearer) for event, nearer in wanted.items()}
+            {event: self._stays(mode, event, here & where) for event, where in wanted.items()}
             for mode, here in zip(modes, waiting, strict=True)
         ]
         """For each mode the positions in which it can take a request along without any loss."""
         self._harmless = dict.fromkeys(wanted, false)
-        """For each request the positions in which some mode can."""
+        """For each request the positions in which some mode can take it along."""
         for staying in self._staying:
             for event, here in staying.items():
                 self._harmless[event] = self._harmless[event] | here
         self._keeping: dict[tuple[int, str], Any] = {}
 
     def of(self, number: int) -> Requests:
-        """Return what a mode requests for others.
+        """Return what a mode requests for others, each request with the positions in which it does.
 
         Args:
             number: Number of the mode.
@@ -95,17 +72,16 @@ class Meanwhile:
         found: Requests = {}
         left = dict(self._staying[number])
         count = len(self._modes)
-        for place in (item % count for item in range(number + 1, number + count)):
-            mode = self._modes[place]
-            for event, nearer in mode.nearer.items():
-                here = left[event] & nearer
+        for other in (item % count for item in range(number + 1, number + count)):
+            for event, approaching in self._modes[other].approaching.items():
+                here = left[event] & approaching
                 if here != self._false:
                     found[event] = found.get(event, self._false) | here
                     left = {item: within & ~here for item, within in left.items()}
             # Goals whose turn comes later must not lead farther from this one.
             for event, within in left.items():
                 if within != self._false:
-                    left[event] = within & self._keeps(place, event)
+                    left[event] = within & self._keeps(other, event)
         return found
 
     def _stays(self, mode: ModeGame, event: str, here: Any) -> Any:
@@ -115,13 +91,13 @@ class Meanwhile:
             return found
         for step in mode.steps:
             fresh = here & step.positions & ~step.nearer
-            for place in self._places:
-                within = step.waiting[place] & ~mode.interrupted
-                if place in self._near:
-                    within = within & self._near[place]
+            for assumption in self._awaited:
+                within = step.waiting[assumption] & ~mode.interrupted
+                if assumption in self._near:
+                    within = within & self._near[assumption]
                 if (fresh & within) != self._false:
                     found = found | (fresh & within & self._arena.choice(event, within))
-                fresh = fresh & ~step.waiting[place]
+                fresh = fresh & ~step.waiting[assumption]
         return found
 
     def _keeps(self, number: int, event: str) -> Any:

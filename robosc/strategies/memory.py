@@ -52,6 +52,7 @@ class ObservedMemory:
 
     Attributes:
         updates: For the variable of each place, the predicate that it is true once a state is observed.
+        possible: Predicate that of the places of each tour at most one is true.
     """
 
     def __init__(self, encoding: Encoding, owed: Obligations) -> None:
@@ -66,10 +67,9 @@ class ObservedMemory:
         parts = [self._part(item, is_tour=False) for item in singles]
         parts += [self._part(item, is_tour=True) for item in tours if item]
         self._parts = tuple(_in_order(parts))
-        self.can_be = encoding.all_of(
+        self.possible = encoding.all_of(
             encoding.any_of(value for _, value in part.cases) for part in self._parts if part.is_tour
         )
-        """Predicate that of the places of each tour at most one is true."""
 
     def _part(self, names: tuple[str, ...], *, is_tour: bool) -> _Part:
         every = self._encoding.all_of(~self._manager.var(name) for name in names)
@@ -150,7 +150,7 @@ def _in_order(parts: Sequence[_Part]) -> Iterator[_Part]:
     while left:
         ready = [part for part in left if all(part is other or other.read.isdisjoint(part.names) for other in left)]
         if not ready:
-            # They decide about each other.
+            # The parts that are left decide about each other.
             yield reduce(_Part.with_all_of, left)
             return
         yield from ready

@@ -5,17 +5,17 @@ goal or visit of a mission is approached; once it is true the next one in turn i
 goal: that the mission is not at it any more.
 """
 
-from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import product
 from typing import Any
 
 from robosc.automata import ExecutableSystem
 from robosc.automata.goal_memory import holds
 from robosc.strategies.arena import ControllerArena
 from robosc.strategies.counter_strategy import CounterStage, CounterStrategy, oppose
-from robosc.strategies.gr1 import Approach, Solution, approach_in_earnest, solve
-from robosc.strategies.meanwhile import Meanwhile, ModeGame, Requests
+from robosc.strategies.gr1 import Approach, Solution, approach_in_earnest, leading, solve
+from robosc.strategies.meanwhile import Meanwhile
+from robosc.strategies.modes import Modes, Requests
 from robosc.strategies.preferences import preferred_order
 from robosc.supervisor import AddedCondition, Choice, DecisionDiagram, Strategy
 from robosc.synthesis.changes import changed_subjects
@@ -124,7 +124,7 @@ class StrategySynthesis:
         is_won = is_won and not unreached and not impossible
         preventable = self.preventable(allowed)
         unneeded = self._unneeded(solution) if is_won else ()
-        met = self.arena.met() if is_won else self.false
+        reachable = self.arena.reachable_positions() if is_won else self.false
         near = {item: self._left_to_surroundings(self.assumptions[item]) for item in allowed} if is_won else {}
         if is_won:
             earnest = self._in_earnest(solution.winning, near)
@@ -136,14 +136,14 @@ class StrategySynthesis:
             visits = [steps for number, steps in earnest.items() if self._aims[number].interruption is not None]
             unneeded = tuple(item for item in unneeded if not any(self._rely(steps, item) for steps in visits))
         return StrategyResult(
-            strategy=self._strategy(solution, near, met) if is_won and not preventable else None,
+            strategy=self._strategy(solution, near, reachable) if is_won and not preventable else None,
             unreached=unreached,
             is_hopeless=bool(unreached) and not self.can_be_reached(unreached),
             preventable=preventable,
             impossible=impossible,
             is_impossible_alone=is_alone,
-            idle=self._idle(met) if is_won else (),
-            never_made=self._never_made(met) if is_won else (),
+            idle=self._idle(reachable) if is_won else (),
+            never_made=self._never_made(reachable) if is_won else (),
             unneeded=unneeded,
             positions=self._count(self.arena.positions),
             winning=self._count(solution.winning),
@@ -245,15 +245,14 @@ class StrategySynthesis:
         others = () if is_alone else goals
         return (), _fewest(assumptions, lambda fewer: not self.can_come_true(fewer, others)), is_alone
 
-    def _idle(self, met: Any) -> tuple[int, ...]:
-        """Return the goals that are true in every position that can be met.
+    def _idle(self, reachable: Any) -> tuple[int, ...]:
+        """Return the goals that are true in every position that can be reached.
 
         Args:
-            met: The positions that can be met.
+            reachable: The positions that can be reached.
         """
-        met = met & self.arena.positions
         goals = (number for number, item in enumerate(self._aims) if item.mission is None)
-        return tuple(number for number in goals if met & ~self.goals[number] == self.false)
+        return tuple(number for number in goals if reachable & ~self.goals[number] == self.false)
 
     def is_won_at_once(self, goals: Sequence[int]) -> bool:
         """Return True if goals could be reached if it counted that a request can make them true for a moment.
@@ -285,12 +284,7 @@ class StrategySynthesis:
         while found != before:
             before = found
             for item in wanted:
-                near = found & item & self.arena.together(found)
-                wider = None
-                while near != wider:
-                    wider = near
-                    near = near | (found & self.arena.together(near))
-                found = near
+                found = leading(self.arena, found & item & self.arena.together(found), found, self._monitor.check_stop)
         return found
 
     def _unneeded(self, solution: Solution) -> tuple[int, ...]:
@@ -347,16 +341,13 @@ class StrategySynthesis:
                 prevented = self._solved([assumption], [self._manager.false]).winning
                 possible = self._possible([assumption])
                 prevented = prevented | self.arena.turn(self.arena.positions & ~possible)
-                if self._is_met(prevented & possible):
+                if self._is_reachable(prevented & possible):
                     found.append(item)
         return tuple(found)
 
-    def _is_met(self, predicate: Any) -> bool:
+    def _is_reachable(self, predicate: Any) -> bool:
         """Return True if moves of both sides can lead from the first position into a predicate."""
-        found, before = predicate, None
-        while found != before:
-            before = found
-            found = found | self.arena.together(found)
+        found = leading(self.arena, predicate, self.arena.positions, self._monitor.check_stop)
         return bool(self.arena.start & self.arena.arriving(found) != self._manager.false)
 
     def _count(self, predicate: Any) -> int:
@@ -384,16 +375,16 @@ class StrategySynthesis:
             if near or interruption is not None
         }
 
-    def _never_made(self, met: Any) -> tuple[int, ...]:
+    def _never_made(self, reachable: Any) -> tuple[int, ...]:
         """Return the visits that neither side can bring about, though the supervisor allows all that it does.
 
         Args:
-            met: The positions that can be met.
+            reachable: The positions that can be reached.
         """
         tours = self._tours
         if not tours:
             return ()
-        arrived, visits = self.arena.unobserved(met), []
+        arrived, visits = self.arena.unobserved(reachable), []
         for tour in tours:
             here = [self.arena.condition(stage.here) for stage in tour.stages]
             passed = [self.arena.condition(stage.is_passed) for stage in tour.stages]
@@ -408,13 +399,22 @@ class StrategySynthesis:
         first = len(self._aims) - len(visits)
         return tuple(first + number for number, is_made in enumerate(visits) if not is_made)
 
-    def _strategy(self, solution: Solution, near: Mapping[int, Any], met: Any) -> Strategy:
+    def _strategy(self, solution: Solution, near: Mapping[int, Any], reachable: Any) -> Strategy:
+        """Return the strategy that a solution makes.
+
+        Args:
+            solution: The solution.
+            near: For each assumption that the robot may keep from coming true, the positions from which the
+                surroundings alone can make it true.
+            reachable: The positions that can be reached.
+        """
         simplifier = Simplifier(self._encoding, self._seconds)
-        modes = [self._mode(solution, number, near) for number in range(len(self.goals))]
+        games = Modes(self.arena, self._aims, self._requests, near, self.false)
+        modes = [games.mode(number, self.goals[number], steps) for number, steps in enumerate(solution.approaches)]
         # Assumptions that the strategy helps with come first where several can be waited for.
-        places = (*near, *(item for item in range(len(self.assumptions)) if item not in near))
-        own = [self._choices(mode.chosen, solution.winning & met & ~mode.goal, simplifier) for mode in modes]
-        meanwhile = Meanwhile(self.arena, modes, [left for _, left in own], places, near, self.false)
+        awaited = (*near, *(item for item in range(len(self.assumptions)) if item not in near))
+        own = [self._choices(mode.chosen, solution.winning & reachable & ~mode.goal, simplifier) for mode in modes]
+        meanwhile = Meanwhile(self.arena, modes, [left for _, left in own], awaited, near, self.false)
         found = []
         for number, (choices, left) in enumerate(own):
             others, _ = self._choices(meanwhile.of(number), left, simplifier, is_meanwhile=True)
@@ -428,73 +428,6 @@ class StrategySynthesis:
             before = found
             found = found | self.arena.responses(found)
         return found
-
-    def _helping(self, approach: Approach, number: int, place: int, near: Any) -> Iterator[tuple[str, Any]]:
-        """Yield requests, each with positions in which it helps the surroundings to make an assumption true.
-
-        While the assumption fails the controller may do whatever stays where it can wait for it. It does what leads to
-        where the surroundings have their part to do, such as calling a service once more.
-
-        Args:
-            approach: Step towards a goal.
-            number: Number of the goal.
-            place: Number of the assumption.
-            near: Positions from which the surroundings alone can make it true.
-        """
-        everywhere, interruption = approach.waiting[place], self._aims[number].interruption
-        calm = everywhere if interruption is None else everywhere & ~self.arena.condition(interruption)
-        # Luck, and then interruptions, are waited for only where nothing else helps.
-        ways = [(calm & ~approach.progress, near), (calm, near | approach.progress)]
-        if interruption is not None:
-            ways.append((everywhere, near))
-        found = self._manager.false
-        for staying, wanted in ways:
-            found, before = found | (staying & wanted), None
-            while found != before:
-                before = found
-                closer = staying & self.arena.responses(found) & ~found
-                if closer != self._manager.false:
-                    found = found | closer
-                    continue
-                for event in self._requests:
-                    helped = staying & ~found & self.arena.choice(event, before)
-                    if helped != self._manager.false:
-                        yield event, helped
-                        found = found | helped
-
-    def _mode(self, solution: Solution, number: int, near: Mapping[int, Any]) -> ModeGame:
-        """Return the mode that approaches a goal.
-
-        Args:
-            solution: The solution.
-            number: Number of the goal.
-            near: For each assumption that the robot may keep from coming true, the positions from which the
-                surroundings alone can make it true.
-        """
-        chosen: Requests = {}
-        nearer: Requests = {}
-        decided = self.goals[number]
-        for approach in solution.approaches[number]:
-            here = approach.positions & ~approach.nearer
-            # The first half of several parts is that without interruptions.
-            calm = max(1, len(approach.onwards) // 2)
-            for (place, target), event in product(enumerate(approach.onwards), self._requests):
-                found = here & ~decided & self.arena.choice(event, target)
-                if found != self._manager.false:
-                    chosen[event] = chosen.get(event, self._manager.false) | found
-                    decided = decided | found
-                    if place < calm:
-                        nearer[event] = nearer.get(event, self._manager.false) | found
-            for place, positions in near.items():
-                for event, helped in self._helping(approach, number, place, positions):
-                    found = here & ~decided & helped
-                    chosen[event] = chosen.get(event, self._manager.false) | found
-                    decided = decided | found
-                # An assumption that is waited for is waited for until it comes, or progress is made.
-                here = here & ~approach.waiting[place]
-        interruption = self._aims[number].interruption
-        interrupted = self.false if interruption is None else self.arena.condition(interruption)
-        return ModeGame(self.goals[number], interrupted, solution.approaches[number], chosen, nearer)
 
     def _choices(
         self, chosen: Requests, care: Any, simplifier: Simplifier, *, is_meanwhile: bool = False

@@ -17,7 +17,7 @@ from robosc_api.layers import LayeredServices
 from robosc_api.malformed import MalformedRequests
 from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts
 from robosc_api.security import Guard, Rule, Scope, SecurityError, TokenFile, add_port, caller_of, token_or_host_of
-from robosc_api.security.addresses import split_address
+from robosc_api.security.addresses import is_loopback_host, split_address
 from robosc_server.clock import wall_clock_s
 from robosc_server.jobs import (
     JOB_METHODS,
@@ -256,7 +256,7 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     await server.start()
     if settings.socket is None:
         limits = ConnectionLimits(connections=connections, request_bytes=request_limits.submission_bytes)
-        watch = stack.enter_context(ConnectionWatch(split_address(address)[1], limits, arrivals, bars_hosts=True))
+        watch = stack.enter_context(ConnectionWatch(split_address(address)[1], limits, arrivals, bars=_is_elsewhere))
         metrics.set_sources(closed=lambda: watch.closed)
     stack.push_async_callback(end)
     return address
@@ -287,6 +287,11 @@ def _options(settings: Settings, request_bytes: int, connections: int) -> list[t
         # window of a message that is read grows to its size all the same.
         ("grpc.http2.bdp_probe", 0),
     ]
+
+
+def _is_elsewhere(host: str) -> bool:
+    """Return True for the host of another machine: the programs of this one share its address."""
+    return not is_loopback_host(host)
 
 
 def _every_callers_key(key: str, caller: str) -> str:

@@ -1,6 +1,5 @@
 """Tests of the kernel's filter of new connections, on real sockets of this machine."""
 
-import select
 import socket
 from collections.abc import Iterator, Sequence
 
@@ -8,17 +7,9 @@ import pytest
 
 from robosc_api.connection_filter import drop_new_connections
 from robosc_api.connection_watch import can_watch
+from support.late_connections import is_late
 
 pytestmark = pytest.mark.skipif(not can_watch(), reason="this system has no filters of packets")
-
-
-def is_late(listener: socket.socket, to: str, source: str) -> bool:
-    """True if an attempt to connect is dropped; on one machine, the answer has come before the call returns."""
-    with socket.socket(socket.AF_INET6 if ":" in to else socket.AF_INET) as line:
-        line.bind((source, 0))
-        line.setblocking(False)
-        line.connect_ex((to, listener.getsockname()[1]))
-        return not select.select((), (line,), (), 0)[1]
 
 
 @pytest.fixture(name="listener")
@@ -44,8 +35,9 @@ def test_new_connections_of_some_hosts_are_dropped(
     listener: socket.socket, hosts: Sequence[str], expected: tuple[bool, ...]
 ) -> None:
     drop_new_connections(listener, hosts)
-    ends = (("127.0.0.1", "127.0.0.1"), ("127.0.0.1", "127.0.0.2"), ("::1", "::1"))
-    assert tuple(is_late(listener, *end) for end in ends) == expected
+    port = listener.getsockname()[1]
+    ends = (("127.0.0.1", "127.0.0.1"), ("127.0.0.2", "127.0.0.1"), ("::1", "::1"))
+    assert tuple(is_late(port, *end) for end in ends) == expected
 
 
 def test_a_present_connection_goes_on_and_a_filter_is_replaced_and_removed(listener: socket.socket) -> None:
@@ -55,8 +47,9 @@ def test_a_present_connection_goes_on_and_a_filter_is_replaced_and_removed(liste
             drop_new_connections(listener, ["127.0.0.1"])
             line.sendall(b"word")
             assert accepted.recv(4) == b"word"
+    port = listener.getsockname()[1]
     drop_new_connections(listener, ["127.0.0.2"])
-    assert not is_late(listener, "127.0.0.1", "127.0.0.1")
+    assert not is_late(port, "127.0.0.1")
     drop_new_connections(listener, [])
     drop_new_connections(listener, [])
-    assert not is_late(listener, "127.0.0.1", "127.0.0.2")
+    assert not is_late(port, "127.0.0.2")

@@ -1,8 +1,7 @@
 """Tests of the watch over connections: its decisions on numbers, and a real server that is flooded."""
 
 import asyncio
-import select
-import socket
+from collections import Counter
 from collections.abc import AsyncIterator, Mapping, Sequence
 from contextlib import asynccontextmanager
 from threading import Semaphore
@@ -28,8 +27,9 @@ from robosc_api.connection_watch import (
 from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.request_timeouts import RequestTimeouts
 from support.floods import MOST_BYTES, endless_headers, resets
+from support.late_connections import is_late
 from support.small_server import SERVICE, call, small_server
-from support.waiting import PATIENCE_S
+from support.waiting import PATIENCE_S, until
 
 LIMITS = ConnectionLimits(
     connections=8,
@@ -325,6 +325,33 @@ def test_requests_that_are_too_large_are_refused_each_and_their_connection_stays
     asyncio.run(refused())
 
 
+async def test_a_call_is_open_for_its_connection_until_it_has_ended() -> None:
+    arrivals = Arrivals()
+    is_open, may_end = asyncio.Event(), asyncio.Event()
+
+    async def waiting(request: bytes, context: Any) -> bytes:
+        is_open.set()
+        await may_end.wait()
+        return request
+
+    async with small_server(layers=(Outermost(), CallsByConnection(arrivals)), unary=waiting) as (channel, _):
+        made = asyncio.create_task(call(channel))
+        await is_open.wait()
+        (count,) = arrivals.take().open.values()
+        assert count == 1
+        may_end.set()
+        await made
+        ended: Counter[str] = Counter()
+
+        def is_over() -> bool:
+            now = arrivals.take()
+            ended.update(now.ended)
+            return not now.open
+
+        await until(is_over)
+        assert ended.total() == 1
+
+
 @needs_counts
 def test_calls_that_are_reset_at_once_are_cut_off() -> None:
     async def flooded() -> None:
@@ -338,17 +365,6 @@ def test_calls_that_are_reset_at_once_are_cut_off() -> None:
     asyncio.run(flooded())
 
 
-def is_late(port: int, source: str) -> bool:
-    """True if an attempt to connect gets no answer at once; on one machine, each answer comes at once."""
-    with socket.socket() as line:
-        line.bind((source, 0))
-        line.setblocking(False)
-        if line.connect_ex(("127.0.0.1", port)) == 0:
-            return False
-        # On loopback, the answer has come before the call returns.
-        return not select.select((), (line,), (), 0)[1]
-
-
 @needs_counts
 def test_a_host_that_floods_again_and_again_connects_late_and_present_connections_go_on(
     caplog: pytest.LogCaptureFixture,
@@ -360,7 +376,7 @@ def test_a_host_that_floods_again_and_again_connects_late_and_present_connection
         async with watched_server(arrivals) as (channel, port):
             assert (await call(channel, b"before")).answer == b"before"
             limits = ConnectionLimits(request_bytes=2**20)
-            watch = ConnectionWatch(port, limits, arrivals, bars_hosts=True, clock=lambda: now_s[0])
+            watch = ConnectionWatch(port, limits, arrivals, bars=lambda host: True, clock=lambda: now_s[0])
             for _ in range(3):
                 assert not is_late(port, "127.0.0.1")
                 await asyncio.to_thread(endless_headers, port, watch.look)
@@ -479,8 +495,13 @@ def test_failures_of_the_watch_are_logged_now_and_then(
         raise RuntimeError("broken")
 
     monkeypatch.setattr(ConnectionWatch, "look", failing)
+    # Time goes on by looks alone, so the processor time that they take must not put off the next one.
+    ended: list[float] = []
+    monkeypatch.setattr(LookPace, "looked", lambda pace, took_s, processor_s: ended.append(took_s))
     with ConnectionWatch(1, LIMITS, Arrivals(), clock=lambda: now_s[-1]):
         for _ in range(6):
             assert looks.acquire(timeout=PATIENCE_S)
+    # The pace is told of each of them, though it failed.
+    assert len(ended) == len(now_s) - 1
     lines = [record.getMessage() for record in caplog.records]
     assert lines == [f"watching the connections failed ({count} times since the last such line)" for count in (1, 4)]

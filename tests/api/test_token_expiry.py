@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 
 from robosc_api.security import Quota, Scope, SecurityError, TokenFile, add_tokens_arguments, make_token, run_tokens
@@ -113,6 +113,40 @@ def test_the_log_says_once_that_a_token_expires_soon(
     assert count() == 1
 
 
+def test_each_token_is_reported_as_soon_as_it_is_due_wherever_it_stands(
+    file: Path, clock: Clock, caplog: pytest.LogCaptureFixture
+) -> None:
+    days = {"a": 40, "b": 20, "c": 30}
+    write(file, *(make_token(name, (Scope.SYNTHESIZE,), expires_s=NOW_S + n * DAY_S)[1] for name, n in days.items()))
+    tokens = tokens_of(file, clock)
+    found = []
+    for day in range(40):
+        caplog.clear()
+        clock.now_s = float(NOW_S + day * DAY_S)
+        assert len(tokens.entries) == 3
+        found += [(name, day) for name in days if f"of '{name}' expires" in caplog.text]
+    soon = int(SOON_S / DAY_S)
+    assert found == [("b", 20 - soon), ("c", 30 - soon), ("a", 40 - soon)]
+
+
+def test_a_token_that_was_taken_out_and_comes_back_is_reported_again(
+    file: Path, clock: Clock, caplog: pytest.LogCaptureFixture
+) -> None:
+    other = make_token("other", (Scope.SYNTHESIZE,))[1]
+    token, line = make_token("laptop", (Scope.SYNTHESIZE,), expires_s=NOW_S + DAY_S)
+    write(file, other, line)
+    tokens = tokens_of(file, clock)
+    for now_s, words in ((NOW_S, "of 'laptop' expires"), (NOW_S + DAY_S, "and is still used")):
+        clock.now_s = float(now_s)
+        tokens.find_expired(token)
+        assert caplog.text.count(words) == 1
+        for lines in ((other,), (other, line)):
+            write(file, *lines)
+            clock.now_s += 1
+            tokens.find_expired(token)
+        assert caplog.text.count(words) == 2
+
+
 def test_a_token_that_another_one_replaces_is_reported_by_nobody(
     file: Path, clock: Clock, caplog: pytest.LogCaptureFixture
 ) -> None:
@@ -155,6 +189,7 @@ def test_a_line_says_all_of_a_token(entry: Entry) -> None:
 
 
 @given(st.lists(ENTRIES, max_size=12, unique_by=lambda entry: entry.digest))
+@example([Entry("a", frozenset((Scope.ADMIN,)), 63 * "0" + digit, Quota(), int(digit)) for digit in "132"])
 def test_an_index_finds_what_going_through_all_tokens_finds(entries: list[Entry]) -> None:
     index = TokenIndex(entries)
     for entry in entries:

@@ -139,6 +139,23 @@ async def test_who_reads_nothing_is_sent_nothing_more() -> None:
     assert sender.unread_bytes == 0
 
 
+async def test_all_callers_together_fill_the_room_and_no_more() -> None:
+    sender = ResultSender(5 * SIZE, 2 * SIZE)
+    calls = [Call(f"192.0.2.{number}") for number in range(3)]
+    for call in calls[:2]:
+        await call.reserve(sender, SIZE)
+    with pytest.raises(RefusedError) as refused:
+        await calls[2].reserve(sender, SIZE)
+    assert refused.value.reason is Reason.SERVER_BUSY
+    for call in calls[:2]:
+        await call.end()
+    # A single result may be larger than the limits.
+    await calls[2].reserve(sender, 6 * SIZE)
+    assert sender.unread_bytes == 6 * SIZE
+    await calls[2].end()
+    assert sender.unread_bytes == 0
+
+
 @pytest.mark.parametrize("is_stream", [False, True])
 async def test_a_large_result_leaves_nothing_to_the_garbage_collector(is_stream: bool) -> None:
     sender = ResultSender(100 * SIZE, 100 * SIZE)

@@ -177,12 +177,12 @@ class _Mission(NamedTuple):
 
     :ivar name: Its name.
     :ivar tours: Its own tour, then those of its detours.
-    :ivar round: Place in what is seen of whether every visit of its own is true.
+    :ivar whole_round: Place in what is seen of whether every visit of its own is true.
     """
 
     name: str
     tours: Tuple[_Tour, ...]
-    round: int
+    whole_round: int
 
 
 def _missions(description: Description) -> Tuple[_Mission, ...]:
@@ -490,9 +490,10 @@ class ProgressAccount:
         made = self._made()
         standings = [self._standing(number, now_s, made) for number in self._numbers]
         approached, chosen = self._approached, self._chosen
+        count = self._count
         return Progress(
-            aims=tuple(standings[: self._count]),
-            assumptions=tuple(standings[self._count :]),
+            aims=tuple(standings[:count]),
+            assumptions=tuple(standings[count:]),
             overdue=tuple(
                 self._items[number].name for number in self._owed() if number in self._reported
             ),
@@ -518,7 +519,7 @@ class ProgressAccount:
         return MissionStanding(
             mission.name,
             0 if visit is None else visit + 1,
-            self.seen[mission.round],
+            self.seen[mission.whole_round],
             self._counts[own.first + own.visits - 1],
             tuple(0 if place is None else place + 1 for place in detours),
         )
@@ -528,7 +529,7 @@ class ProgressAccount:
         made: Set[int] = set()
         for mission in self._missions if self.seen else ():
             for tour in mission.tours:
-                is_round = tour is mission.tours[0] and self.seen[mission.round]
+                is_round = tour is mission.tours[0] and self.seen[mission.whole_round]
                 number = tour.visits if is_round else _place(tour, self.seen) or 0
                 made.update(range(tour.first, tour.first + number))
         return made
@@ -542,8 +543,8 @@ class ProgressAccount:
                 # Not asked for: its detours have been given up, too.
                 continue
             # All visits were made at once where every one was true already.
-            if not before[mission.round]:
-                was, is_round = _place(own, before) or 0, seen[mission.round]
+            if not before[mission.whole_round]:
+                was, is_round = _place(own, before) or 0, seen[mission.whole_round]
                 yield from _tour_made(own, was, own.visits if is_round else place - was)
             for tour in mission.tours[1:]:
                 begun, now = _place(tour, before), _place(tour, seen)
@@ -565,5 +566,5 @@ class ProgressAccount:
 
     def _owed(self) -> List[int]:
         """Return the numbers of the assumptions that are owed."""
-        seen = self.seen
-        return [number for number in self._numbers[self._count :] if seen and not seen[number]]
+        seen, count = self.seen, self._count
+        return [number for number in self._numbers[count:] if seen and not seen[number]]

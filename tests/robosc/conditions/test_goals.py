@@ -124,7 +124,7 @@ def test_a_strategy_that_never_requests_anything_is_told_as_such() -> None:
     made = make_supervisor(bundle_of(COURIER.partition("    assume ")[0] + goals)).supervisor
     assert made is not None
     assert strategy_lines(made) == [
-        "the strategy never requests anything: its goals come true without that",
+        "the strategy never requests anything: nothing has to be requested for its goals",
         "  for goal 1, once Base.outside",
         "    nothing  at all",
         "  for goal 2, once Door.shut",

@@ -1,6 +1,6 @@
 """Progress of a strategy, against a plain account of what happened, and on a robot whose door does not open."""
 
-from itertools import pairwise
+from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
 from unittest.mock import Mock, patch
@@ -144,6 +144,29 @@ def test_the_account_is_the_same_whoever_looked_at_it_before(steps: list[Any], c
             accounts[0][0].at(float(number))
         left, right = (account.at(100.0) for account, _ in accounts)
     assert left == right
+
+
+def changes_kept(account: ProgressAccount) -> int:
+    """Return the number of changes that an account keeps, of which others may lead to further ones."""
+    queue = [account._memory, *account._memories.values()]
+    found = set[int]()
+    for memory in queue:
+        for change in memory.known.values():
+            if id(change) not in found:
+                found.add(id(change))
+                queue.append(change.after)
+    return len(found)
+
+
+def test_the_table_of_changes_grows_up_to_its_limit_and_no_further() -> None:
+    system = Scripted()
+    with patch("robosc.execution.runtime.progress.MAXIMUM_CHANGES", 8):
+        account, _ = _account(system, ManualClock(), NullLog())
+        seen = list(product((False, True), repeat=3))
+        for before, after in 2 * list(product(seen, repeat=2)):
+            for system.met in (before, after):  # type: ignore[assignment]  # three of them
+                account.observe()
+        assert changes_kept(account) == 8
 
 
 def porter(**settings: Any) -> Bench:

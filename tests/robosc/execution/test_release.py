@@ -2,7 +2,10 @@
 
 import pytest
 
+from robosc.execution.interpreter import InterpretedSystem
 from support.execution import Bench, Sent, bench, example_system
+from support.missions import strategic
+from support.models import model_of
 
 HEAD = """
   interface twist use Twist from geometry_msgs
@@ -209,6 +212,56 @@ def test_a_release_that_waits_goes_out_when_nothing_else_can_end_it() -> None:
     # The line is back before the decision: halt is no longer enabled, and the old message was due.
     assert b.receive("/line/correction", 0.5) == [ZERO]
     assert [sent[1:] for sent in b.tick()] == [("move", {"linear": {"x": 0.15}, "angular": {"z": 0.5}})]
+
+
+GOING = f"""
+robot Going {{ {HEAD}
+  component Sensor {{
+    outgoing message clear with type: boolean
+    behaviour {{
+      variable is_clear: boolean = true
+      on response from clear do is_clear := value
+      initial marked state awake {{ }}
+    }}
+  }}
+  component Platform {{
+    incoming message move with identifier: "/cmd_vel", type: Twist links twist
+    incoming message halt with identifier: "/cmd_vel", type: Twist links twist
+    outgoing message arrived with type: none
+    behaviour {{
+      initial marked state here {{ on request to move goto going }}
+      marked state going {{ on response from arrived goto there on request to halt }}
+      marked state there {{ on request to halt goto here }}
+    }}
+  }}
+  requirement move needs Sensor.is_clear
+  provide move with {{ linear: {{ x: 0.5 }} }}
+  provide halt with {{ linear: {{ x: 0.0 }} }}
+  goal always eventually Platform.there
+  goal always eventually Platform.here
+  assume always eventually !Platform.going and Sensor.is_clear
+}}
+"""
+
+
+def test_a_release_does_not_wait_for_what_a_strategy_does_not_choose() -> None:
+    b = Bench(InterpretedSystem(strategic(model_of(GOING))))
+    assert b.tick(2) == [MOVE]
+    assert b.receive("clear", False) == []
+    # The strategy waits for the arrival, though halt is enabled.
+    assert b.tick() == [ZERO]
+    assert b.tick(2) == []
+    assert b.receive("arrived") == []
+    assert [sent[1] for sent in b.tick()] == ["halt"]
+
+
+def test_a_release_ends_by_the_message_that_a_strategy_chooses() -> None:
+    b = Bench(InterpretedSystem(strategic(model_of(GOING))))
+    assert b.tick() == [MOVE]
+    assert b.receive("arrived") == []
+    assert b.receive("clear", False) == []
+    assert [sent[:2] for sent in b.tick()] == [("publish", "halt")]
+    assert b.entries("release") == []
 
 
 def test_the_layer_example_as_a_controller_releases_at_once() -> None:

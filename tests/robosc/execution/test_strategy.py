@@ -15,7 +15,8 @@ from robosc.expressions import Value
 from robosc.supervisor import Supervisor
 from support.controller_twin import World
 from support.execution import Bench
-from support.models import bundle_of
+from support.missions import strategic
+from support.models import bundle_of, model_of
 from support.random_controllers import random_robot
 from support.random_couriers import strategic_courier
 from support.random_goals import strategic_controller
@@ -145,6 +146,67 @@ def test_goals_are_noted_also_where_no_request_is_enabled(monkeypatch: pytest.Mo
     bench.executor.tick()
     assert system.enabled_requests() == ()
     assert decisions.call_count == 1
+
+
+def test_a_request_that_is_not_enabled_is_never_issued(monkeypatch: pytest.MonkeyPatch) -> None:
+    outcome = make_supervisor(bundle_of(BLOCKED))
+    assert outcome.supervisor is not None
+    system = InterpretedSystem(outcome.supervisor)
+    bench = Bench(system)
+    monkeypatch.setattr(system, "choose", lambda: 0)
+    assert bench.tick(2) == []
+    assert (bench.events, bench.executor.counters.faults) == ([], 0)
+
+
+WALKER = """robot Walker {
+    interface walk use Walk from walking
+    component Base {
+        action move with request: none, response: none, feedback: none links walk
+        behaviour {
+            initial marked state start { on request to move goto moving }
+            marked state moving {
+                on response from move goto there
+                on error from move goto start
+                on cancel to move goto start
+            }
+            marked state there { }
+        }
+    }
+    component Person {
+        outgoing message near with identifier: "/near", type: none
+        outgoing message far with identifier: "/far", type: none
+        behaviour {
+            initial marked state away { on response from near goto close }
+            marked state close { on response from far goto away }
+        }
+    }
+    requirement move needs Person.away
+    goal always eventually Base.there
+    assume allow always eventually Base.there
+}"""
+
+
+def walker() -> Bench:
+    bench = Bench(InterpretedSystem(strategic(model_of(WALKER))), action_timeout_s=1.0)
+    assert bench.tick() == [("goal", "move", 1, None)]
+    return bench
+
+
+def test_a_goal_is_not_sent_again_before_the_cancelled_one_has_ended() -> None:
+    bench = walker()
+    bench.executor.on_goal_accepted(1)
+    assert bench.receive("/near") == [("cancel", "move", 1)]
+    assert bench.receive("/far") == []
+    assert bench.tick(3) == []
+    bench.executor.on_goal_ended(1, "cancelled")
+    assert bench.tick() == [("goal", "move", 2, None)]
+
+
+def test_a_goal_that_a_strategy_sends_has_a_timeout_from_then_on() -> None:
+    bench = walker()
+    bench.clock.advance(1.0)
+    bench.executor.watch()
+    assert bench.events[:2] == ["move.request", "move.error"]
 
 
 def test_a_strategy_that_is_not_there_is_refused() -> None:

@@ -119,11 +119,11 @@ def test_tours_that_are_followed_apart_have_the_same_visits(monkeypatch: pytest.
         executable = ExecutableSystem(model, Deployment.CONTROLLER)
         with place_of(executable) as place:
             synthesis = StrategySynthesis(executable, added, place)
-            exact = synthesis.arena.met()
+            exact = synthesis.arena.reachable_positions()
             expected = synthesis.result(range(len(model.assumptions))).never_made
             with monkeypatch.context() as patch:
                 patch.setattr(memory, "MAXIMUM_TOGETHER", 1)
-                apart = synthesis.arena.met()
+                apart = synthesis.arena.reachable_positions()
                 result = synthesis.result(range(len(model.assumptions)))
             assert exact & ~apart == synthesis.false, seed
             assert result.never_made == expected, seed
@@ -138,6 +138,6 @@ def test_long_detours_are_followed_one_by_one() -> None:
         synthesis = StrategySynthesis(executable, (), place)
         assert len(list(ObservedMemory(place.encoding, executable.obligations).apart())) == 2
         # The exact positions take more nodes, and many more on the way.
-        assert synthesis.arena.met().dag_size < 1_000
+        assert synthesis.arena.reachable_positions().dag_size < 1_000
         result = synthesis.result()
     assert result.strategy is not None and result.winning == result.positions == 7 * 2**3 * 3 * 13**3

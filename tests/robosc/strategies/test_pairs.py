@@ -40,11 +40,11 @@ def compare(robot: Robot, seed: int, engine: str, patch: pytest.MonkeyPatch) -> 
         sizes = tuple(map(paired, arenas))
         first, *others = arenas
         assert not paired(first)
-        met = first.met()
+        reachable = first.reachable_positions()
         manager = place.encoding.manager
         for other in others:
-            assert other.met() == met, seed
-            assert other.unobserved(met) == first.unobserved(met), seed
+            assert other.reachable_positions() == reachable, seed
+            assert other.unobserved(reachable) == first.unobserved(reachable), seed
         predicates = [first.positions, manager.false, *(first.condition(item.condition) for item in owed.aims)]
         for _ in range(6):
             cube = manager.true
@@ -60,7 +60,7 @@ def compare(robot: Robot, seed: int, engine: str, patch: pytest.MonkeyPatch) -> 
                 if event is not None:
                     assert other.choice(event, predicate) == first.choice(event, predicate), seed
         # A manager must not end before its predicates.
-        del arenas, first, others, met, predicates, cube, predicate, other
+        del arenas, first, others, reachable, predicates, cube, predicate, other
     return sizes
 
 

@@ -68,6 +68,17 @@ def test_a_step_of_the_robot_after_which_nobody_can_help_is_prevented() -> None:
     assert errors(text.replace("{ undock, lock }", "undock")) == ["preventable-assumption"]
 
 
+def test_findings_say_if_the_goals_keep_assumptions_from_coming_true() -> None:
+    free = BATTERY.replace("{ undock, lock } needs false", "undock needs true").rstrip().removesuffix("}")
+    away, assume = "goal always eventually Dock.away", "assume allow always eventually"
+    for condition, when in (("Dock.locked", "while the goals do"), ("Dock.locked and Dock.away", "whatever happens")):
+        found = make_supervisor(bundle_of(f"{free}{away}\n{assume} {condition}\n}}")).diagnostics
+        messages = [item.message for item in found if item.code == "impossible-assumption"]
+        assert messages == [
+            f"this assumption cannot come true again and again, {when}: every goal would be reached in name alone"
+        ]
+
+
 def found_with(*statements: str, text: str = BATTERY) -> list[tuple[str, int]]:
     """Return the codes of what is found about more statements, each with how many other places belong to it."""
     found = make_supervisor(bundle_of(text.rstrip().removesuffix("}") + "\n".join((*statements, "}")))).diagnostics

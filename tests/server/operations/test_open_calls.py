@@ -21,7 +21,7 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server import application
 from robosc_server.operations.interceptor import CallInterceptor
 from robosc_server.operations.metrics import Metrics
-from robosc_server.operations.open_calls import HEALTH_CALLS_PER_CALLER, CallLimits, OpenCalls
+from robosc_server.operations.open_calls import HEALTH_CALLS, HEALTH_CALLS_PER_CALLER, CallLimits, OpenCalls
 from robosc_server.tasks.task import Reason, RefusedError
 from support.job_workers import StartedWorkers
 from support.service import served
@@ -199,6 +199,19 @@ async def test_nobody_from_elsewhere_takes_the_places_of_this_machines_health_ch
         begin(layered, Call("2001:db8:9::"))
     assert refused.value.reason is Reason.SERVER_BUSY
     begin(layered, Call("::1"))
+
+
+def test_calls_that_a_server_refuses_are_bounded_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(application, "_REFUSED_CALLS", -2 * HEALTH_CALLS)
+    with looked_into(open_calls=3, open_calls_per_caller=3) as (address, all_are_free):
+        with strangers(address, 1) as (one,):
+            # One more than there are places for: when it is refused, the others have theirs.
+            hold(one, 4)
+            assert eventually(lambda: one.ended == 1)
+            words = "the server has too many calls to refuse; try again later"
+            assert refusal(address) == ("SERVER_BUSY", words)
+        assert all_are_free()
+        assert is_answered(address)
 
 
 def test_calls_that_are_over_give_their_places_back(small: str, all_are_free: Callable[[], bool]) -> None:

@@ -41,7 +41,7 @@ class _Judged(NamedTuple):
 
     @property
     def bit(self) -> int:
-        """Its bit in its word."""
+        """Bit of it in its word."""
         return 1 << self.number % _WORD
 
     @property

@@ -94,7 +94,8 @@ class Explanation:
 
 def document(explanation: Explanation | EmptyExplanation) -> dict[str, Any]:
     """An explanation as JSON values: objects with the names of the attributes."""
-    result: dict[str, Any] = msgspec.to_builtins(explanation)
+    # Not `to_builtins`, which leaves tuples as they are: a report that was sent has lists.
+    result: dict[str, Any] = msgspec.json.decode(msgspec.json.encode(explanation))
     return result
 
 

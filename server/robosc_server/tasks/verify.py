@@ -5,6 +5,7 @@ from typing import Any
 
 from robosc.automata import to_automata
 from robosc.certification.file_report import file_verification_json, has_passed, malformed_json
+from robosc.certification.reasons import reasons_json
 from robosc.certification.supervisor_file import FileVerification, verify_supervisor_file
 from robosc.errors import InvalidSupervisorError, LanguageError, UnsupportedModelError
 from robosc.json_documents import diagnostics_json, json_text
@@ -94,7 +95,7 @@ def _verify_synthesized(request: pb.VerifyRequest, maximum_nodes: int, on_report
     made = SynthesisAttempt().make(request, maximum_nodes, on_report, allow_livelock=True)
     if made.supervisor is not None:
         return _verdicts(request, made.supervisor, maximum_nodes, on_report)
-    document = {"status": str(made.status), "reason": made.reason, **diagnostics_json(made.diagnostics)}
+    document = {"status": str(made.status), **reasons_json(made), **diagnostics_json(made.diagnostics)}
     return _result(pb.VERIFICATION_STATUS_NO_SUPERVISOR, document, reason=made.reason, diagnostics=made.diagnostics)
 
 

@@ -12,7 +12,8 @@ from grpc_health.v1 import health_pb2_grpc
 from grpc_reflection.v1alpha import reflection, reflection_pb2_grpc
 
 from robosc import __version__
-from robosc_api.connection_watch import Arrivals, ConnectionLimits, ConnectionWatch
+from robosc_api.connection_ledger import ConnectionLimits
+from robosc_api.connection_watch import Arrivals, ConnectionWatch
 from robosc_api.layers import LayeredServices
 from robosc_api.malformed import MalformedRequests
 from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts

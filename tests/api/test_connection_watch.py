@@ -10,20 +10,8 @@ from typing import Any
 import grpc
 import pytest
 
-from robosc_api.connection_watch import (
-    Arrivals,
-    CallsByConnection,
-    CallsSince,
-    CloseReason,
-    ConnectionLimits,
-    ConnectionWatch,
-    Ledger,
-    LookPace,
-    Peer,
-    Traffic,
-    address_of,
-    can_watch,
-)
+from robosc_api.connection_ledger import CallsSince, CloseReason, ConnectionLimits, Ledger, Peer, Traffic
+from robosc_api.connection_watch import Arrivals, CallsByConnection, ConnectionWatch, LookPace, address_of, can_watch
 from robosc_api.layers import Layer, behaviour_of, with_behaviour
 from robosc_api.request_timeouts import RequestTimeouts
 from support.floods import MOST_BYTES, endless_headers, resets

@@ -14,7 +14,8 @@ import grpc.aio
 from grpc_health.v1 import health, health_pb2_grpc
 from grpc_reflection.v1alpha import reflection, reflection_pb2_grpc
 
-from robosc_api.connection_watch import Arrivals, CallsByConnection, ConnectionLimits, ConnectionWatch
+from robosc_api.connection_ledger import ConnectionLimits
+from robosc_api.connection_watch import Arrivals, CallsByConnection, ConnectionWatch
 from robosc_api.layers import LayeredServices
 from robosc_api.malformed import MalformedRequests
 from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts

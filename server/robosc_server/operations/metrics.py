@@ -24,7 +24,7 @@ from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, Histo
 from prometheus_client.registry import Collector
 from prometheus_client.utils import floatToGoString
 
-from robosc_api.connection_watch import CloseReason
+from robosc_api.connection_ledger import CloseReason
 from robosc_api.metrics_server import MetricsServer
 from robosc_api.security import SecurityError, is_loopback_host, joined
 from robosc_api.security.addresses import split_address

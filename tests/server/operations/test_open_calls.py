@@ -12,7 +12,8 @@ import pytest
 from grpc_health.v1 import health_pb2, health_pb2_grpc
 
 from robosc_api.calls import begin_call
-from robosc_api.connection_watch import Arrivals, CallsSince
+from robosc_api.connection_ledger import CallsSince
+from robosc_api.connection_watch import Arrivals
 from robosc_api.failures import reason_of
 from robosc_api.request_timeouts import RequestTimeouts
 from robosc_api.security import Quota, Scope, make_token

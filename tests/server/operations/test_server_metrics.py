@@ -10,7 +10,7 @@ import grpc
 import pytest
 from prometheus_client.parser import text_string_to_metric_families
 
-from robosc_api.connection_watch import CloseReason
+from robosc_api.connection_ledger import CloseReason
 from robosc_api.security import SecurityError
 from robosc_server.jobs import JOB_METHODS, JOB_SERVICE_NAME
 from robosc_server.operations import metrics as metrics_module

@@ -40,6 +40,7 @@ from robosc_server.operations.metrics import Metrics, MetricsEndpoint, check_met
 from robosc_server.operations.open_calls import HEALTH_CALLS, CallLimits, OpenCalls
 from robosc_server.operations.quotas import Quotas
 from robosc_server.operations.settings import Confinement, Settings
+from robosc_server.operations.thread_scheduling import batched_threads
 from robosc_server.operations.tracing import TracingError, open_tracing
 from robosc_server.result_sender import ResultSender
 from robosc_server.signing import SigningError, read_signing_key, signed
@@ -167,7 +168,9 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         malformed,
         most_calls=settings.open_calls + 2 * HEALTH_CALLS + _REFUSED_CALLS,
     )
-    server = grpc.aio.server(None, (layered,), options=_options(settings, request_limits.submission_bytes, connections))
+    options = _options(settings, request_limits.submission_bytes, connections)
+    with batched_threads():
+        server = grpc.aio.server(None, (layered,), options=options)
     address = add_port(server, settings.address, settings.security)
     stack.push_async_callback(stop, server)
     store = await asyncio.to_thread(open_store, settings.state_dir, settings.database_url)

@@ -13,6 +13,10 @@ if TYPE_CHECKING:
     from robosc_api.security.tokens import Entry
 
 
+REQUEST_ID_HEADER = "x-request-id"
+"""Metadata with the identifier of a call: of its caller, who may choose it, and of the answer to one that failed."""
+
+
 class Call:
     """Call of a server of grpc.aio.
 

@@ -7,26 +7,26 @@ from google.protobuf import any_pb2, duration_pb2
 from google.rpc import error_details_pb2, status_pb2
 from grpc_status import rpc_status
 
+from robosc_api.calls import REQUEST_ID_HEADER, request_id
+
 DOMAIN = "robosc"
 """Domain of google.rpc.ErrorInfo."""
 
 type Metadata = tuple[tuple[str, str | bytes], ...]
 
 
-def failure_metadata(
-    code: grpc.StatusCode, message: str, reason: str, retry_after_s: float | None = None, context: Any = None
-) -> Metadata:
-    """Return the trailing metadata of a failed call.
+def failure_metadata(code: grpc.StatusCode, message: str, reason: str, retry_after_s: float | None = None) -> Metadata:
+    """Return the trailing metadata of a failed call, with its identifier if it is under way and has one.
 
     Args:
         code: Its status code.
         message: One sentence for the caller.
         reason: Identifier of the cause in capital letters.
         retry_after_s: Seconds after which the call may be retried; None: no retry, or unknown.
-        context: Context of the call (of grpc.aio), whose trailing metadata is kept; None: none.
     """
     details = [_packed(error_details_pb2.ErrorInfo(reason=reason, domain=DOMAIN))]
-    trailing: Metadata = () if context is None else tuple(context.trailing_metadata() or ())
+    identifier = request_id()
+    trailing: Metadata = ((REQUEST_ID_HEADER, identifier),) if identifier else ()
     if retry_after_s is not None:
         delay = duration_pb2.Duration()
         delay.FromNanoseconds(round(retry_after_s * 1e9))

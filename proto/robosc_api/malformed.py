@@ -95,4 +95,4 @@ def _checked_each(answer: Callable[[Any, Any], Any]) -> Callable[[Any, Any], Awa
 
 
 async def _refuse(context: Any) -> None:
-    await context.abort(_CODE, _MESSAGE, failure_metadata(_CODE, _MESSAGE, "MALFORMED_REQUEST", context=context))
+    await context.abort(_CODE, _MESSAGE, failure_metadata(_CODE, _MESSAGE, "MALFORMED_REQUEST"))

@@ -167,4 +167,4 @@ class _Timeout:
 
 
 async def _abort(context: Any, message: str) -> None:
-    await context.abort(_CODE, message, failure_metadata(_CODE, message, "MALFORMED_REQUEST", context=context))
+    await context.abort(_CODE, message, failure_metadata(_CODE, message, "MALFORMED_REQUEST"))

@@ -19,9 +19,6 @@ def test_the_interceptor_costs_little(record_property: Any) -> None:
     import time
 
     class Context:
-        def set_trailing_metadata(self, metadata: Any) -> None:
-            self.metadata = metadata
-
         def code(self) -> None:
             return None
 

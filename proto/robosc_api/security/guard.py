@@ -163,7 +163,7 @@ def _token_of(metadata: Any) -> str | None:
 
 async def _abort(context: Any, refusal: _Refusal) -> None:
     code, message, reason = refusal.code, refusal.message, refusal.reason or refusal.code.name
-    await context.abort(code, message, failure_metadata(code, message, reason, context=context))
+    await context.abort(code, message, failure_metadata(code, message, reason))
 
 
 def _for_this_machine(answer: Callable[[Any, Any], Awaitable[Any]]) -> Callable[[Any, Any], Awaitable[Any]]:

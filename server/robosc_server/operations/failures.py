@@ -48,7 +48,7 @@ async def abort(context: Any, error: RefusedError) -> NoReturn:
     code = code_of(error.reason)
     # The metadata has the message twice, and clients accept 8 KiB: longer metadata would lose the reason as well.
     message = error.message.encode("utf-8", "replace")[:MAXIMUM_MESSAGE_BYTES].decode("utf-8", "ignore")
-    metadata = failure_metadata(code, message, error.reason, error.retry_after_s, context)
+    metadata = failure_metadata(code, message, error.reason, error.retry_after_s)
     await context.abort(code, message, metadata)
     raise AssertionError("unreachable: abort raises")
 

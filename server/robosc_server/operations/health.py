@@ -115,7 +115,7 @@ class Health(health_pb2_grpc.HealthServicer):  # type: ignore[misc]  # untyped
         is_serving = self.is_serving(request.service)
         if is_serving is None:
             code, message = grpc.StatusCode.NOT_FOUND, "this server has no such service"
-            await context.abort(code, message, failure_metadata(code, message, "NO_SUCH_SERVICE", context=context))
+            await context.abort(code, message, failure_metadata(code, message, "NO_SUCH_SERVICE"))
         return _Response(status=_status(is_serving))
 
     async def Watch(self, request: Any, context: Any) -> None:  # noqa: N802

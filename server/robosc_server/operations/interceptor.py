@@ -18,7 +18,7 @@ from robosc_api.security import token_name
 from robosc_api.security.host_sample import HostSample
 from robosc_server.clock import running_clock
 from robosc_server.operations.failures import abort, code_of, fault_message
-from robosc_server.operations.logs import REQUEST_ID_HEADER, log_fault, request_id_of
+from robosc_server.operations.logs import log_fault, request_id_of
 from robosc_server.operations.metrics import MethodMetrics, Metrics
 from robosc_server.operations.tracing import NO_TRACING, Tracing
 from robosc_server.tasks.task import Reason, RefusedError
@@ -91,7 +91,6 @@ class CallInterceptor(Layer):
             metrics.under_way += 1
             code = _OK
             try:
-                context.set_trailing_metadata(((REQUEST_ID_HEADER, request_id()),))
                 if self._is_refusing:
                     _refuse(method)
                 answer = await inner(request, context)

@@ -19,7 +19,7 @@ from typing import Any, TextIO
 import msgspec
 import structlog
 
-from robosc_api.calls import request_id
+from robosc_api.calls import REQUEST_ID_HEADER, request_id
 from robosc_server.operations.settings import LogFormat, LogLevel
 from robosc_server.operations.worker_output import last_part, loggable_fields
 
@@ -36,9 +36,6 @@ _PLAIN = re.compile(r"[A-Za-z0-9._:/+@,%'()\[\]-]+\Z")
 
 type _Line = MutableMapping[str, Any]
 
-
-REQUEST_ID_HEADER = "x-request-id"
-"""Metadata key of the request id, in requests and in trailing metadata."""
 
 _REQUEST_ID_FORM = re.compile(r"[A-Za-z0-9._:/+=@-]{1,128}\Z")
 

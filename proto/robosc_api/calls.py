@@ -5,12 +5,15 @@ new text for each question about the peer, and layers ask several times.
 """
 
 import asyncio
+import logging
 from collections.abc import Callable
 from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from robosc_api.security.tokens import Entry
+
+_log = logging.getLogger(__name__)
 
 
 REQUEST_ID_HEADER = "x-request-id"
@@ -36,9 +39,12 @@ class Call:
         self.at_end: list[Callable[[], None]] = []
 
     def end(self, task: Any = None) -> None:
-        """Call the functions that wait for the end."""
+        """Call the functions that wait for the end, each of them whatever becomes of the others."""
         for function in self.at_end:
-            function()
+            try:
+                function()
+            except Exception:  # The others give back what the call has taken.
+                _log.exception("a function at the end of a call failed")
 
 
 CALL: ContextVar[Call | None] = ContextVar("call", default=None)

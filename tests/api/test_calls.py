@@ -1,4 +1,4 @@
-"""The peer of the current call, which is asked of gRPC once for each call."""
+"""Calls under way: their peers, which gRPC is asked for once, their number, and what happens at their end."""
 
 import asyncio
 from typing import Any
@@ -7,7 +7,7 @@ import grpc
 import grpc.aio
 import pytest
 
-from robosc_api.calls import peer_of
+from robosc_api.calls import begin_call, peer_of
 from robosc_api.failures import reason_of
 from robosc_api.layers import Layer, LayeredServices, behaviour_of, with_behaviour
 from support.waiting import PATIENCE_S
@@ -97,6 +97,24 @@ async def test_calls_beyond_the_most_are_refused_until_one_has_ended() -> None:
                 assert await method(b"later", timeout=PATIENCE_S) == b"later"
     finally:
         await server.stop(None)
+
+
+async def test_what_fails_at_the_end_of_a_call_keeps_nothing_taken(caplog: pytest.LogCaptureFixture) -> None:
+    given_back: list[str] = []
+
+    def fail() -> None:
+        raise ValueError("on purpose")
+
+    async def call() -> None:
+        at_end = begin_call().at_end
+        at_end += [lambda: given_back.append("before"), fail, lambda: given_back.append("after")]
+
+    await asyncio.create_task(call())
+    await asyncio.sleep(0)
+    assert given_back == ["before", "after"]
+    (record,) = caplog.records
+    assert record.exc_info is not None
+    assert isinstance(record.exc_info[1], ValueError)
 
 
 async def test_nothing_is_kept_where_no_call_has_begun() -> None:

@@ -23,6 +23,8 @@ from robosc.targets import available_targets
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.convert.chunks import CHUNK_BYTES
 from robosc_server.tasks.describe import server_limits, targets_response, version_response
+from robosc_server.tasks.exceeded import memory_exceeded
+from robosc_server.tasks.memory import is_lack_of_memory
 from robosc_server.tasks.requests import RequestLimits, accept_request
 from robosc_server.tasks.run import PAUSE_S, ThrottledReports, run_task
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
@@ -446,7 +448,24 @@ class TestFailures:
             raise MemoryError
 
         monkeypatch.setattr(run_module, "check", greedy)
-        assert failure(TaskKind.CHECK, small_request(TaskKind.CHECK)).reason is Reason.MEMORY_LIMIT
+        assert failure(TaskKind.CHECK, small_request(TaskKind.CHECK)) == memory_exceeded(LIMITS)
+
+    def test_the_engine_still_reports_a_lack_of_memory_in_the_words_that_are_known(self) -> None:
+        cudd = pytest.importorskip("dd.cudd")
+        manager = cudd.BDD(initial_cache_size=2**14, memory_estimate=2**24)
+        manager.configure(max_memory=2**20)
+        names = [f"x{number}" for number in range(400)]
+        manager.declare(*names)
+        node = manager.true
+
+        def grow() -> None:
+            nonlocal node
+            for low, high in zip(names[:200], names[200:], strict=True):
+                node = node & ~manager.apply("xor", manager.var(low), manager.var(high))
+
+        with pytest.raises(ValueError, match="NULL") as refused:
+            grow()
+        assert is_lack_of_memory(refused.value)
 
     @pytest.mark.parametrize(
         ("error", "reason"),
@@ -454,7 +473,9 @@ class TestFailures:
             (EncodeError("Failed to serialize proto"), Reason.MEMORY_LIMIT),
             (DecodeError("Error parsing message"), Reason.MEMORY_LIMIT),
             (OSError(errno.ENOMEM, "Cannot allocate memory"), Reason.MEMORY_LIMIT),
+            (ValueError("`DdNode *node` is `NULL` pointer."), Reason.MEMORY_LIMIT),
             (OSError(errno.ENOENT, "No such file"), Reason.INTERNAL_FAULT),
+            (ValueError("NULL"), Reason.INTERNAL_FAULT),
             (RuntimeError("can't start new thread"), Reason.INTERNAL_FAULT),
         ],
     )

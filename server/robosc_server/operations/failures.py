@@ -5,7 +5,7 @@ from typing import Any, NoReturn
 import grpc
 
 from robosc_api.failures import failure_metadata
-from robosc_server.operations.logs import log_fault
+from robosc_server.operations.logs import log_fault, log_limit
 from robosc_server.tasks.task import Failure, Reason, RefusedError
 
 MAXIMUM_MESSAGE_BYTES = 1000
@@ -37,6 +37,9 @@ _CODES = {
     Reason.PERMISSION_DENIED: grpc.StatusCode.PERMISSION_DENIED,
 }
 
+_FAULTS = frozenset({Reason.WORKER_DIED, Reason.INTERNAL_FAULT})
+"""Reasons that are to be reported; the others are refusals by a limit."""
+
 
 def code_of(reason: Reason) -> grpc.StatusCode:
     """Return the status code of a reason."""
@@ -54,9 +57,12 @@ async def abort(context: Any, error: RefusedError) -> NoReturn:
 
 
 def public_failure(failure: Failure) -> Failure:
-    """Return a failure without its details; these are logged under an id that the caller gets."""
+    """Return a failure without its details, which are logged: those of a fault under an id that the caller gets."""
     if not failure.details:
         return failure
+    if failure.reason not in _FAULTS:
+        log_limit(failure.details, failure.reason)
+        return Failure(failure.reason, failure.message)
     fault = log_fault(failure.details, failure.reason)
     return Failure(failure.reason, f"{failure.message}; {fault_message(fault)}")
 

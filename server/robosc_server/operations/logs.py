@@ -120,7 +120,7 @@ def log_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> str
 
     Args:
         fault: The error, or another process's report of it, such as a traceback, whose text is logged only at the level
-            debug; see `worker_words`.
+            debug; see `worker_output`.
         reason: The reason that the caller receives, as in google.rpc.ErrorInfo.
     """
     identity = secrets.token_hex(4)
@@ -133,6 +133,18 @@ def log_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> str
     log.error("fault", fault=identity, reason=str(reason), **known)
     log.debug("fault in full", fault=identity, traceback=words)
     return identity
+
+
+def log_limit(words: str, reason: str) -> None:
+    """Log the end of a task that exceeded a limit.
+
+    Args:
+        words: Report of the worker, whose text is logged only at the level debug; see `worker_output`.
+        reason: The reason that the caller receives, as in google.rpc.ErrorInfo.
+    """
+    log = structlog.get_logger()
+    log.info("limit", reason=str(reason), **loggable_fields(words))
+    log.debug("limit in full", reason=str(reason), words=last_part(words))
 
 
 def _code_locations(begin: TracebackType | None) -> list[str]:

@@ -7,6 +7,9 @@ from google.protobuf.message import DecodeError, EncodeError
 _PROBE_BYTES = 2**20
 """Size of an allocation that tests whether memory is left."""
 
+_NO_NODE = "`DdNode *node` is `NULL` pointer"
+"""Words of dd about an operation that CUDD broke off, which is free of what it had made by then."""
+
 
 def is_lack_of_memory(error: BaseException) -> bool:
     """Return True if an error that ended a task comes of a lack of memory; ask while the error is being handled.
@@ -23,6 +26,8 @@ def is_lack_of_memory(error: BaseException) -> bool:
         if isinstance(cause, MemoryError | DecodeError | EncodeError):
             return True
         if isinstance(cause, OSError) and cause.errno == errno.ENOMEM:
+            return True
+        if isinstance(cause, ValueError) and _NO_NODE in str(cause):
             return True
         cause = cause.__cause__ or (None if cause.__suppress_context__ else cause.__context__)
     try:

@@ -35,6 +35,7 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.clock import monotonic
 from robosc_server.tasks.automata import Automata
 from robosc_server.tasks.convert import chunks, from_proto, to_proto
+from robosc_server.tasks.exceeded import memory_exceeded
 from robosc_server.tasks.explain import explanation
 from robosc_server.tasks.memory import is_lack_of_memory
 from robosc_server.tasks.synthesis_attempt import OnReport, SynthesisAttempt
@@ -148,7 +149,7 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
         return Failure(Reason.MALFORMED_REQUEST, "initial names what the automata do not have")
     except Exception as error:  # The boundary of the worker: the server logs any error and continues.
         if is_lack_of_memory(error):
-            return Failure(Reason.MEMORY_LIMIT, f"the task needs more than {limits.memory_bytes} bytes of memory")
+            return memory_exceeded(limits)
         return Failure(Reason.INTERNAL_FAULT, "the server has an internal error", _code_locations(error))
 
 

@@ -7,6 +7,7 @@ import socket
 import traceback
 from collections.abc import Callable
 
+from robosc_server.tasks.exceeded import memory_exceeded
 from robosc_server.tasks.memory import is_lack_of_memory
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, TaskKind, TaskLimits
 from robosc_server.workers import confinement
@@ -31,8 +32,6 @@ _SMALL_BYTES = 64 * 1024
 """Size up to which a result is sent in one piece."""
 
 _RESULT_END = frame(Tag.RESULT, b"")
-
-OUT_OF_MEMORY = "the task exceeded its memory limit"
 
 
 def run_worker(
@@ -78,7 +77,7 @@ def _answer(
         # The failure needs memory, too, while what the task has made is still there.
         confinement.raise_memory_limit()
         if is_short:
-            outcome = Failure(Reason.MEMORY_LIMIT, OUT_OF_MEMORY)
+            outcome = memory_exceeded(limits)
         else:
             outcome = Failure(Reason.INTERNAL_FAULT, "the server has an internal error", traceback.format_exc())
     confinement.raise_memory_limit()

@@ -13,6 +13,7 @@ from typing import Any, Self
 
 from robosc import __version__
 from robosc_server.clock import monotonic
+from robosc_server.tasks.exceeded import time_exceeded
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Task, TaskLimits
 from robosc_server.workers import OnCpuTime, OnReport, WorkerLostError, WorkersError, ignore_cpu_time
 from robosc_server.workers.dask_cpu_time import CpuTimeAccount
@@ -275,7 +276,7 @@ class DaskWorkers:
             if now - last_worker_at > _GRACE_S:
                 raise WorkersError(self.fault or f"the Dask cluster at {self._address} has no worker")
             if events.begun and now - events.begun_at > limits.seconds + _GRACE_S:
-                return Failure(Reason.TIME_LIMIT, "the task exceeded its time limit")
+                return time_exceeded(limits)
 
     async def _keep_connected(self) -> None:
         """Keep a client connected to the cluster while the cluster is available."""

@@ -9,14 +9,12 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from robosc_server.clock import monotonic
+from robosc_server.tasks.exceeded import MACHINE_OUT_OF_MEMORY, cpu_time_exceeded, memory_exceeded
 from robosc_server.tasks.task import Failure, Reason, TaskLimits
-from robosc_server.workers.child import OUT_OF_MEMORY
-
-OUT_OF_PROCESSOR = "the task exceeded its CPU time limit"
-OUT_OF_TIME = "the task exceeded its time limit"
 
 _REMEMBERED_S = 1.0
 _NEAR_THE_LIMIT = 0.9
+_OUT_OF_MEMORY = re.compile(r"^MemoryError\b", re.MULTILINE)
 _NEVER_RESIDENT_BYTES = 96 * 2**20  # Part of the address space: mostly unused parts of libraries.
 
 
@@ -62,12 +60,15 @@ def failure_of(end: ProcessExit, limits: TaskLimits, crash_output: str, was_memo
     details = f"{exit_description(end)}\n{crash_output}".rstrip()
     out_of_processor = end.cpu_s >= limits.cpu_seconds
     if end.exit_code == -signal.SIGXCPU or (end.exit_code == -signal.SIGKILL and out_of_processor):
-        return Failure(Reason.CPU_LIMIT, OUT_OF_PROCESSOR, details)
+        return cpu_time_exceeded(limits, details)
     if end.exit_code == -signal.SIGKILL and was_memory_short:
-        return Failure(Reason.MEMORY_LIMIT, "the machine ran out of memory and killed the task", details)
-    if end.exit_code and end.peak_bytes + _NEVER_RESIDENT_BYTES >= _NEAR_THE_LIMIT * limits.memory_bytes:
-        # C libraries end the process if an allocation fails: CUDD by exit(1), others by abort().
-        return Failure(Reason.MEMORY_LIMIT, OUT_OF_MEMORY, details)
+        return Failure(Reason.MEMORY_LIMIT, MACHINE_OUT_OF_MEMORY, details)
+    # C libraries end the process if an allocation fails: CUDD by exit(1), others by abort(). A worker that exits by
+    # itself without an answer has a fault, and writes that down, unless memory is lacking for that as well.
+    has_exited = end.exit_code == 1 and (not crash_output or _OUT_OF_MEMORY.search(crash_output) is not None)
+    is_near = end.peak_bytes + _NEVER_RESIDENT_BYTES >= _NEAR_THE_LIMIT * limits.memory_bytes
+    if has_exited or (end.exit_code and is_near):
+        return memory_exceeded(limits, details)
     return Failure(Reason.WORKER_DIED, f"the worker process {_status_text(end.exit_code)}", details)
 
 

@@ -5,9 +5,9 @@ import contextlib
 from typing import Self
 
 from robosc_server.clock import monotonic
-from robosc_server.tasks.task import Failure, Outcome, Reason, Task, TaskLimits
+from robosc_server.tasks.exceeded import time_exceeded
+from robosc_server.tasks.task import Outcome, Task, TaskLimits
 from robosc_server.workers import OnCpuTime, OnReport, WorkerLostError, ignore_cpu_time
-from robosc_server.workers.exit_reasons import OUT_OF_TIME
 from robosc_server.workers.pool import WorkerPool
 from robosc_server.workers.process import ForkServerLostError, WorkerProcess
 
@@ -99,7 +99,7 @@ class LocalWorkers:
         except TimeoutError:
             if not limit.expired():
                 raise
-            return Failure(Reason.TIME_LIMIT, OUT_OF_TIME)
+            return time_exceeded(limits)
         finally:
             termination = self._pool.terminate(worker)
             termination.add_done_callback(lambda _: on_cpu_time(_cpu_s(worker, monotonic() - begun_s)))

@@ -124,6 +124,17 @@ def test_how_a_worker_died_is_logged_and_an_exception_in_it_is_not() -> None:
         assert line["fault"] in error.message
 
 
+@pytest.mark.parametrize("reason", [Reason.MEMORY_LIMIT, Reason.CPU_LIMIT])
+def test_a_task_beyond_a_limit_is_refused_and_is_no_fault(reason: Reason) -> None:
+    ending = exit_description(ProcessExit(1, 1.5, 2**20))
+    with logged(LogLevel.INFO) as log:
+        refused = public_failure(Failure(reason, "it needs more than it may", f"{ending}\n{MARKER}"))
+    assert refused == Failure(reason, "it needs more than it may")
+    (line,) = log.lines()
+    assert (line["level"], line["event"], line["reason"], line["ending"]) == ("info", "limit", reason, ending)
+    assert MARKER not in log.text
+
+
 @pytest.mark.parametrize(
     "words",
     [

@@ -9,6 +9,18 @@ from robosc_server.workers.exit_reasons import ProcessExit, RecentOomKills, fail
 
 MIB = 2**20
 LIMITS = TaskLimits(cpu_seconds=10, memory_bytes=1000 * MIB)
+OUT_OF_MEMORY = (
+    f"the task needs more memory than the server allows, {1000 * MIB} bytes; make the model smaller, or have the "
+    "operator of the server raise task_memory_bytes"
+)
+OUT_OF_PROCESSOR = (
+    "the task needs more CPU time than the server allows, 10 s; make the model smaller, or have the operator of the "
+    "server raise task_cpu_seconds"
+)
+MACHINE = (
+    "the machine ran out of memory and killed the task; make the model smaller, try again when the machine has less to "
+    "do, or have the operator of the server lower worker_processes"
+)
 
 
 @pytest.mark.parametrize(
@@ -17,20 +29,20 @@ LIMITS = TaskLimits(cpu_seconds=10, memory_bytes=1000 * MIB)
         (0, 1, 10, False, Reason.WORKER_DIED, "the worker process ended with status 0 and no answer"),
         (3, 11, 700, True, Reason.WORKER_DIED, "the worker process ended with status 3 and no answer"),
         (1, 1, 803, False, Reason.WORKER_DIED, "the worker process ended with status 1 and no answer"),
-        (1, 1, 804, False, Reason.MEMORY_LIMIT, "the task exceeded its memory limit"),
+        (1, 1, 804, False, Reason.MEMORY_LIMIT, OUT_OF_MEMORY),
         (0, 1, 950, False, Reason.WORKER_DIED, "the worker process ended with status 0 and no answer"),
         (-signal.SIGSEGV, 1, 803, False, Reason.WORKER_DIED, "the worker process was ended by SIGSEGV"),
-        (-signal.SIGSEGV, 1, 804, False, Reason.MEMORY_LIMIT, "the task exceeded its memory limit"),
-        (-signal.SIGABRT, 1, 900, False, Reason.MEMORY_LIMIT, "the task exceeded its memory limit"),
+        (-signal.SIGSEGV, 1, 804, False, Reason.MEMORY_LIMIT, OUT_OF_MEMORY),
+        (-signal.SIGABRT, 1, 900, False, Reason.MEMORY_LIMIT, OUT_OF_MEMORY),
         (-signal.SIGKILL, 9.9, 10, False, Reason.WORKER_DIED, "the worker process was ended by SIGKILL"),
-        (-signal.SIGKILL, 9.9, 10, True, Reason.MEMORY_LIMIT, "the machine ran out of memory and killed the task"),
+        (-signal.SIGKILL, 9.9, 10, True, Reason.MEMORY_LIMIT, MACHINE),
         (
             -signal.SIGKILL,
             10,
             10,
             False,
             Reason.CPU_LIMIT,
-            "the task exceeded its CPU time limit",
+            OUT_OF_PROCESSOR,
         ),
         (
             -signal.SIGXCPU,
@@ -38,7 +50,7 @@ LIMITS = TaskLimits(cpu_seconds=10, memory_bytes=1000 * MIB)
             10,
             True,
             Reason.CPU_LIMIT,
-            "the task exceeded its CPU time limit",
+            OUT_OF_PROCESSOR,
         ),
         (-63, 1, 10, False, Reason.WORKER_DIED, "the worker process was ended by signal 63"),
     ],
@@ -49,6 +61,24 @@ def test_each_ending_is_reported_by_its_cause(
     failure = failure_of(ProcessExit(exit_code, cpu_s, peak_mib * MIB), LIMITS, "Fatal error\n", was_memory_short)
     assert (failure.reason, failure.message) == (reason, message)
     assert failure.details.endswith(f"at most {peak_mib * MIB} bytes resident\nFatal error")
+
+
+@pytest.mark.parametrize(
+    ("status", "crash_output", "reason"),
+    [
+        (1, "", Reason.MEMORY_LIMIT),
+        (1, 'Traceback (most recent call last):\n  File "x.py", line 1, in f\nMemoryError\n', Reason.MEMORY_LIMIT),
+        (1, "Traceback (most recent call last):\nMemoryError: no room\n", Reason.MEMORY_LIMIT),
+        (1, "Traceback (most recent call last):\nKeyError: 'MemoryError'\n", Reason.WORKER_DIED),
+        (2, "", Reason.WORKER_DIED),
+    ],
+)
+def test_a_library_that_exits_for_want_of_memory_need_not_have_touched_it(
+    status: int, crash_output: str, reason: Reason
+) -> None:
+    """The decision diagrams' library ends the process when a large table is refused, however little is resident."""
+    failure = failure_of(ProcessExit(status, 1, 10 * MIB), LIMITS, crash_output, was_memory_short=False)
+    assert failure.reason is reason
 
 
 def test_kills_for_want_of_memory_are_counted_by_the_kernel() -> None:

@@ -13,6 +13,7 @@ from typing import Any
 
 import pytest
 
+from robosc_server.tasks.exceeded import cpu_time_exceeded, memory_exceeded, time_exceeded
 from robosc_server.tasks.task import Failure, Reason, Report, Result, TaskKind
 from robosc_server.workers import WorkerLostError, WorkersError
 from robosc_server.workers.local import LocalWorkers
@@ -67,11 +68,12 @@ class TestLimits:
         assert said(running.run("echo small", limits)) == "small"
         assert running.failure("allocate", limits).reason is Reason.MEMORY_LIMIT
 
-    @pytest.mark.parametrize("text", ["allocate", "allocate in C"])
+    @pytest.mark.parametrize("text", ["allocate", "allocate in C", "exit 1"])
     def test_memory(self, running: Running, text: str) -> None:
-        failure = running.failure(text, replace(LIMITS, memory_bytes=2**28))
-        assert failure.reason is Reason.MEMORY_LIMIT
-        assert failure.message == "the task exceeded its memory limit"
+        limits = replace(LIMITS, memory_bytes=2**28)
+        expected = memory_exceeded(limits)
+        failure = running.failure(text, limits)
+        assert (failure.reason, failure.message) == (expected.reason, expected.message)
 
     def test_processor_time(self, running: Running) -> None:
         # Side by side: the kernel counts in whole seconds.
@@ -79,7 +81,7 @@ class TestLimits:
         for failure in (task.result(PATIENCE_S) for task in tasks):
             assert isinstance(failure, Failure)
             assert failure.reason is Reason.CPU_LIMIT
-            assert failure.message == "the task exceeded its CPU time limit"
+            assert failure.message == cpu_time_exceeded(replace(LIMITS, cpu_seconds=0.1)).message
 
     def test_time_by_the_clock(self) -> None:
         clock = HeldLoop()
@@ -88,12 +90,12 @@ class TestLimits:
             loop.run(workers.__aenter__())
             running = Running(loop, workers)
             for text in ("sleep 600", "stop", "stuck"):
-                future, _ = running.begun(text, replace(LIMITS, seconds=50.0))
+                limits = replace(LIMITS, seconds=50.0)
+                future, _ = running.begun(text, limits)
                 clock.advance(49.0)
                 assert not future.done()
                 clock.advance(1.0)
-                expected = Failure(Reason.TIME_LIMIT, "the task exceeded its time limit")
-                assert future.result(PATIENCE_S) == expected
+                assert future.result(PATIENCE_S) == time_exceeded(limits)
             loop.run(workers.__aexit__())
 
     def test_the_size_of_a_result(self, running: Running) -> None:

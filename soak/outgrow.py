@@ -11,7 +11,7 @@ ended twice. A job that has lost its worker or its server too often fails, as do
 is counted as given up and submitted again under another key.
 
 With `--throughput`, nothing is killed, and the same jobs run once for each number of workers: jobs a second, processor
-time a job in each part, and memory of the processes that do the tasks.
+time a job in each part and of the work itself, and memory of the processes that do the tasks.
 
 Exit status: 0 every accepted job ended once with its right result, 1 not, 2 wrong use, 130 Ctrl-C.
 """
@@ -20,6 +20,7 @@ import argparse
 import asyncio
 import contextlib
 import json
+import math
 import multiprocessing
 import os
 import random
@@ -45,10 +46,11 @@ from robosc_client import AsyncClient, ClientError, Job, JobState, RetryPolicy  
 from support.job_ledger import GIVEN_UP, Ledger, StoredJob, note_ends, stored_jobs  # noqa: E402
 from support.job_mix import MixedJob, digest_of, mixed_job, right_digest  # noqa: E402
 from support.outgrown_site import Kind, Site, proxy_program, site, tree_of  # noqa: E402
-from support.postgresql import has_postgresql  # noqa: E402
+from support.postgresql import missing_for_postgresql  # noqa: E402
 
 SERVERS = 3
 WORKERS = 4
+KILL_EVERY_S = 15.0
 AT_ONCE = 150
 """Jobs that callers wait for at a time: many more than workers, so that these stay busy while some jobs wait for the
 lease of a dead server to expire."""
@@ -71,13 +73,26 @@ def main(argv: Sequence[str] | None = None) -> int:
     arguments = parser.parse_args(argv)
     # SIGTERM ends all parts, as Ctrl-C does.
     signal.signal(signal.SIGTERM, signal.default_int_handler)
-    if min(arguments.jobs, arguments.workers, *(arguments.throughput or [1])) < 1:
+    if min(arguments.jobs, arguments.workers or WORKERS, *(arguments.throughput or [1])) < 1:
         parser.error("--jobs, --workers and --throughput take numbers above 0")
-    if arguments.kill_every < 0:
+    if arguments.kill_every is not None and not 0 <= arguments.kill_every < math.inf:
         parser.error("--kill-every takes a number of seconds, or 0 to kill nothing")
-    if proxy_program() is None or not has_postgresql():
-        parser.error("haproxy and PostgreSQL are needed (Debian's packages: haproxy, postgresql)")
-    folder = (arguments.folder or Path(tempfile.mkdtemp(prefix="outgrow-"))).resolve()
+    if arguments.throughput and not (arguments.workers is arguments.kill_every is None):
+        parser.error(
+            "--throughput kills nothing and has its own numbers of workers: without --kill-every and --workers"
+        )
+    if proxy_program() is None:
+        parser.error("haproxy is not installed (Debian's package: haproxy)")
+    if missing := missing_for_postgresql():
+        parser.error(missing)
+    try:
+        # Found out now, and not after the run.
+        if arguments.json is not None:
+            arguments.json.touch()
+        folder = (arguments.folder or Path(tempfile.mkdtemp(prefix="outgrow-"))).resolve()
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        parser.error(f"{error.filename}: {error.strerror}")
     try:
         runs = list(run_all(arguments, folder))
     except KeyboardInterrupt:
@@ -96,8 +111,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def run_all(arguments: argparse.Namespace, folder: Path) -> Iterator[dict[str, Any]]:
     """Run as the arguments say, and yield the ledger of each run."""
-    for workers in arguments.throughput or [arguments.workers]:
-        kill_every_s = 0.0 if arguments.throughput else arguments.kill_every
+    kill_every_s = KILL_EVERY_S if arguments.kill_every is None else arguments.kill_every
+    if arguments.throughput:
+        kill_every_s = 0.0
+    for workers in arguments.throughput or [arguments.workers or WORKERS]:
         ledger = Chaos(arguments.jobs, arguments.seed, kill_every_s, workers, folder / f"workers{workers}").run()
         sys.stderr.write(f"{workers} workers: {ledger['jobs_per_s']} jobs a second\n")
         yield ledger
@@ -111,13 +128,10 @@ def make_parser() -> argparse.ArgumentParser:
     parser.add_argument(
         "--kill-every",
         type=float,
-        default=15.0,
         metavar="SECONDS",
-        help="mean time between two kills; 0: kill nothing (default: 15)",
+        help=f"mean time between two kills; 0: kill nothing (default: {KILL_EVERY_S:g})",
     )
-    parser.add_argument(
-        "--workers", type=int, default=WORKERS, metavar="N", help=f"number of Dask workers (default: {WORKERS})"
-    )
+    parser.add_argument("--workers", type=int, metavar="N", help=f"number of Dask workers (default: {WORKERS})")
     parser.add_argument(
         "--throughput",
         type=int,
@@ -143,8 +157,9 @@ class Chaos:
         ledger: Fate of the jobs.
         errors: Errors that callers have seen after all retries of the client, by their reason or message.
         latencies: Time from the acceptance to the answer of each job, in seconds.
-        sizes: Number of the job of each id.
+        numbers: Number of the job of each id.
         task_bytes: Most memory of its own that each process of a task was seen with.
+        work_s: Processor time that the work of each job takes without a service, in seconds.
     """
 
     jobs: int
@@ -157,6 +172,7 @@ class Chaos:
     latencies: list[float] = field(default_factory=list)
     numbers: dict[str, int] = field(default_factory=dict)
     task_bytes: dict[int, int] = field(default_factory=dict)
+    work_s: list[float] = field(default_factory=list)
     _answered_at: float = 0.0
     _done: int = 0
 
@@ -172,6 +188,7 @@ class Chaos:
             "workers": self.workers,
             **self.ledger.counted(stored),
             **measured,
+            "work_cpu_ms_per_job": quantiles([1000 * seconds for seconds in self.work_s]),
             "problems": self.ledger.problems[:100],
         }
 
@@ -322,15 +339,19 @@ class Chaos:
         context = multiprocessing.get_context("spawn")
         with ProcessPoolExecutor(os.cpu_count(), mp_context=context) as pool:
             digests = pool.map(partial(right_digest_of, self.seed), [self.numbers[one] for one in ids], chunksize=8)
-            for place, (one, found) in enumerate(zip(ids, digests, strict=True)):
+            for place, (one, (found, seconds)) in enumerate(zip(ids, digests, strict=True)):
                 self.ledger.expected[one] = found
+                self.work_s.append(seconds)
                 if place % 500 == 499:
                     sys.stderr.write(f"compared: {place + 1} of {len(ids)} results\n")
 
 
-def right_digest_of(seed: int, number: int) -> str:
-    """Digest of the right result of a job."""
-    return right_digest(mixed_job(seed, number).task)
+def right_digest_of(seed: int, number: int) -> tuple[str, float]:
+    """Digest of the right result of a job, and the processor time that it takes in seconds."""
+    task = mixed_job(seed, number).task
+    begun_s = time.process_time()
+    found = right_digest(task)
+    return found, time.process_time() - begun_s
 
 
 def psycopg_url(url: str) -> str:

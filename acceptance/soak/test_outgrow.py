@@ -31,7 +31,33 @@ def test_every_job_ends_once_with_its_right_result(tmp_path: Path) -> None:
     assert set(ledger["kills"]) == set(Kind) and sum(ledger["kills"].values()) > 0
 
 
-def test_wrong_use_is_reported() -> None:
-    done = subprocess.run([sys.executable, PROGRAM, "--jobs", "0"], capture_output=True, text=True, check=False)
+def test_throughput_is_measured(tmp_path: Path) -> None:
+    skip_without_postgresql()
+    if proxy_program() is None:
+        pytest.skip("haproxy is not installed (Debian's package: haproxy)")
+    command = [sys.executable, str(PROGRAM), "--jobs", "20", "--throughput", "1", "--folder", str(tmp_path / "logs")]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    (run,) = json.loads(done.stdout)["throughput"]
+    assert (run["workers"], run["accepted"], run["right"], run["problems"]) == (1, 20, 20, [])
+    assert set(run["cpu_ms_per_job"]) == {*Kind, "proxy"} and min(run["cpu_ms_per_job"].values()) >= 0
+    assert 0 < run["work_cpu_ms_per_job"]["p50"] <= run["work_cpu_ms_per_job"]["max"]
+    assert run["jobs_per_s"] > 0 and run["memory_mb"]["server"] > 0
+    assert "kills" not in run
+
+
+@pytest.mark.parametrize(
+    ("words", "complaint"),
+    [
+        (["--jobs", "0"], "--jobs, --workers and --throughput take numbers above 0"),
+        (["--kill-every", "nan"], "--kill-every takes a number of seconds, or 0 to kill nothing"),
+        (["--throughput", "1", "--kill-every", "5"], "--throughput kills nothing"),
+        (["--throughput", "1", "--workers", "2"], "without --kill-every and --workers"),
+        (["--json", "/nowhere/ledger.json"], "/nowhere/ledger.json: No such file or directory"),
+        (["--folder", "/dev/null"], "/dev/null: File exists"),
+    ],
+)
+def test_wrong_use_is_reported_before_anything_starts(words: list[str], complaint: str) -> None:
+    done = subprocess.run([sys.executable, PROGRAM, *words], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")
-    assert "--jobs, --workers and --throughput take numbers above 0" in done.stderr
+    assert complaint in done.stderr.splitlines()[-1]

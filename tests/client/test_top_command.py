@@ -3,14 +3,17 @@
 import json
 import os
 import pty
+import re
 import subprocess
 import sys
 import threading
 from typing import Any
 
 import grpc
+import pytest
 
 from robosc_api.v1 import jobs_pb2
+from robosc_client.main import main
 from support.answers import job, load
 from support.client_commands import Run, interrupted
 from support.scripted_service import Refusal, scripted
@@ -60,7 +63,7 @@ def test_one_look_as_text(run: Run) -> None:
         status, out, err = run("top", "--once", "--server", address)
     assert (status, err) == (0, "")
     head, blank, columns, ann, bob, _, names, *jobs = out.splitlines()
-    assert head == "22:15:00 UTC  servers 3  workers 4, busy 1  waiting 2  ended in the last minute 12"
+    assert head == "22:15:00 UTC  servers 3  workers 4, busy 1  waiting 2  ended/min 12"
     assert blank == ""
     assert columns.split()[:3] == ["CALLER", "QUEUED", "RUNNING"]
     assert ann.split() == ["ann", "2", "1", "2", "1", "7", "1", "h", "6", "min"]
@@ -68,8 +71,8 @@ def test_one_look_as_text(run: Run) -> None:
     assert names.split() == ["JOB", "STATE", "AGE", "BEFORE", "KIND", "CALLER", "MODEL", "DOING"]
     assert [line.split() for line in jobs] == [
         "run-1 running 1 min 15 s synthesize ann nightly synthesis: round 3".split(),
-        "wait-1 queued 1 h 6 min synthesize ann robot.rscd".split(),
-        "wait-2 queued 2.0 s 1 synthesize ann robot.rscd".split(),
+        "wait-1 queued 1 h 6 min synthesize ann robot.rscd waits for a worker".split(),
+        "wait-2 queued 2.0 s 1 synthesize ann robot.rscd waits for a worker".split(),
     ]
     states = [list(request.states) for request in script.of("ListJobs")]
     assert states == [[jobs_pb2.JOB_STATE_RUNNING], [jobs_pb2.JOB_STATE_QUEUED]]
@@ -139,11 +142,61 @@ def test_lines_of_json_come_until_it_is_interrupted() -> None:
     assert {line["workers"] for line in lines if "error" not in line} == {4}
 
 
-def test_a_terminal_is_drawn_again_and_again_and_given_back() -> None:
-    with scripted(GetLoad=[[LOAD]], ListJobs=[[jobs_pb2.ListJobsResponse()]]) as (address, script):
+def test_a_service_that_does_not_answer_in_between_is_asked_again(run: Run) -> None:
+    lost = [Refusal(grpc.StatusCode.UNAVAILABLE, "the server is shutting down", "SHUTTING_DOWN")]
+    refused = [Refusal(grpc.StatusCode.UNAUTHENTICATED, "the token has expired", "TOKEN_EXPIRED")]
+    # The client itself asks four times.
+    answers = {"GetLoad": [[LOAD], *4 * [lost], [LOAD], *4 * [lost], refused], "ListJobs": 4 * LISTED}
+    for form in ("--json", "--interval=0.02"):
+        with scripted(**answers) as (address, _):
+            status, out, err = run("top", "--interval", "0.01", form, "--server", address)
+        assert status == 3
+        assert "the token has expired" in err
+        if form == "--json":
+            first, failed, second, again, last = map(json.loads, out.splitlines())
+            assert first == second
+            assert failed == again and "is shutting down" in failed["error"]["message"]
+            assert last["error"] == {"status": 3, "message": err.removeprefix("robosc-client: ").strip()}
+        else:
+            heads = [text for text in out.splitlines() if " UTC" in text]
+            assert [text[:9] for text in heads] == ["22:15:00 ", "NO ANSWER", "22:15:00 ", "NO ANSWER"]
+            assert heads[1].startswith("NO ANSWER since 22:15:00 UTC, trying again: the server at ")
+
+
+def test_each_call_has_a_deadline() -> None:
+    """An old look must not stay on the screen as if it were new."""
+    left: list[float] = []
+
+    def asked(context: Any) -> Any:
+        left.append(context.time_remaining())
+        yield LOAD
+
+    with scripted(GetLoad=[[asked]], ListJobs=[[jobs_pb2.ListJobsResponse()]]) as (address, _):
+        assert main(["top", "--once", "--server", address]) == 0
+        assert main(["top", "--once", "--deadline", "3600", "--server", address]) == 0
+    assert left[0] <= 5 < left[1]
+
+
+def test_what_a_job_waits_for_is_told(run: Run) -> None:
+    jobs = [queued(number, _NOW_S - 9 + number, owner="ann") for number in range(2)]
+    jobs[0].progress.stage, jobs[0].progress.message = (
+        "waiting",
+        "the token has used up its quota of 1 CPU seconds per hour",
+    )
+    answers = [[jobs_pb2.ListJobsResponse()], [jobs_pb2.ListJobsResponse(jobs=jobs)]]
+    with scripted(GetLoad=[[load(workers=0)]], ListJobs=answers) as (address, _):
+        _, out, _ = run("top", "--once", "--server", address)
+    first, second = out.splitlines()[-2:]
+    assert first.endswith("  waiting: the token has used up its quota of 1 CPU seconds per hour")
+    assert second.endswith("  waits for workers: there are none")
+
+
+def drawn(columns: int, lines: int, answers: dict[str, Any]) -> list[str]:
+    """The screen of a terminal after some looks."""
+    with scripted(**answers) as (address, script):
         ours, theirs = pty.openpty()
         words = [sys.executable, "-m", "robosc_client.main", "top", "--interval", "0.01", "--server", address]
-        variables = {**os.environ, "TERM": "xterm", "COLUMNS": "150", "LINES": "40"}
+        variables = {**os.environ, "TERM": "xterm", "COLUMNS": str(columns), "LINES": str(lines)}
         process = subprocess.Popen(words, stdin=theirs, stdout=theirs, stderr=theirs, env=variables)
         os.close(theirs)
         shown = bytearray()
@@ -158,9 +211,46 @@ def test_a_terminal_is_drawn_again_and_again_and_given_back() -> None:
             process.wait()
             reader.join(PATIENCE_S)
             os.close(ours)
-    assert b"workers 4, busy 1" in shown
     # The other screen is left again.
     assert shown.index(b"\x1b[?1049h") < shown.rindex(b"\x1b[?1049l")
+    screens = [re.sub(r"\x1b\[[0-9;?]*[A-Za-z]", "", text) for text in shown.decode().split("\x1b[H")]
+    first = next(text for text in screens if " UTC" in text)
+    return [text.rstrip() for text in first.rstrip().splitlines()]
+
+
+def test_a_terminal_is_drawn_again_and_again_and_given_back() -> None:
+    screen = drawn(150, 40, {"GetLoad": [[LOAD]], "ListJobs": 100 * LISTED})
+    assert screen[0] == "22:15:00 UTC  servers 3  workers 4, busy 1  waiting 2  ended/min 12"
+    assert screen[2].split() == "CALLER QUEUED RUNNING TASKS WAITING TASKS RUNNING ENDED/MIN LONGEST WAIT".split()
+    assert screen[7].split()[-5:] == "ann nightly synthesis: round 3".split()
+    assert len(screen) <= 40
+
+
+@pytest.mark.parametrize("columns", [80, 60, 40])
+def test_a_narrow_terminal_shows_who_waits_all_the_same(columns: int) -> None:
+    identifiers = "0123456789abcdef" * 2
+    item = queued(1, _NOW_S - 75, owner="ann-of-the-warehouse", label="nightly run of the maze")
+    item.id = identifiers
+    jobs = [[jobs_pb2.ListJobsResponse()], [jobs_pb2.ListJobsResponse(jobs=[item])]]
+    owner = caller("ann-of-the-warehouse", _NOW_S - 75, queued_jobs=1, waiting_tasks=1)
+    screen = drawn(columns, 24, {"GetLoad": [[load(owner)]], "ListJobs": 100 * jobs})
+    assert max(map(len, screen)) <= columns
+    of_callers, of_jobs = screen[2:4], screen[5:7]
+    assert {"CALLER", "QUEUED", "LONGEST"} <= set(of_callers[0].split())
+    assert of_callers[1].startswith("ann-of-") and of_callers[1].endswith("1 min 15 s")
+    assert {"JOB", "STATE", "AGE", "CALLER"} <= set(of_jobs[0].split())
+    assert of_jobs[1].startswith("0123456") and "ann-of-" in of_jobs[1] and "1 min 15 s" in of_jobs[1]
+
+
+def test_many_callers_leave_room_for_jobs() -> None:
+    callers = [caller(f"caller{number}", queued_jobs=1) for number in range(50)]
+    jobs = [queued(number, _NOW_S - number, owner="ann") for number in range(50)]
+    answers = 100 * [[jobs_pb2.ListJobsResponse()], [jobs_pb2.ListJobsResponse(jobs=jobs)]]
+    screen = drawn(100, 24, {"GetLoad": [[load(*callers)]], "ListJobs": answers})
+    assert len(screen) <= 24
+    assert sum(text.startswith("caller") for text in screen) == 9
+    assert sum(text.startswith("wait-") for text in screen) == 9
+    assert screen[-1] == "and 41 more callers and 41 more jobs"
 
 
 def _read(descriptor: int, shown: bytearray) -> None:

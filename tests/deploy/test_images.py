@@ -10,6 +10,8 @@ from typing import Any
 
 import pytest
 import yaml
+from cryptography.hazmat.primitives.serialization import load_pem_private_key
+from cryptography.x509 import load_pem_x509_certificate
 
 from robosc_server.operations.settings import Settings, settings_from
 from robosc_server.operations.shutdown import END_S
@@ -181,18 +183,82 @@ def test_the_secrets_of_compose_are_made_and_kept(compose: dict[str, Any], tmp_p
     handed = {f"server/{name}" for name in SERVER_SECRETS}
     handed |= {secret["file"].removeprefix("secrets/") for secret in compose["secrets"].values()}
     # Neither container sees the token itself.
-    assert set(before) == handed | {"first_token"}
+    own = {"first_token", "callers_ca.key", "first_caller.crt", "first_caller.key"}
+    assert set(before) == handed | {"callers/ca.crt"} | own
     assert all(file.stat().st_mode & 0o077 == 0 for file in folder.rglob("*"))
     (entry,) = parse_tokens(before["server/tokens"].decode(), "tokens")
     assert entry.name == "first"
     assert before["server/database_login"].decode().strip().endswith(":" + before["database_password"].decode())
     if os.geteuid() == 0:
-        assert {folder.joinpath(name).stat().st_uid for name in (*handed, "server")} == {10001}
-        assert (folder / "first_token").stat().st_uid == 0
+        given = (*handed, "server", "callers", "callers/ca.crt")
+        assert {folder.joinpath(name).stat().st_uid for name in given} == {10001}
+        assert {folder.joinpath(name).stat().st_uid for name in own} == {0}
     subprocess.run(command, check=True, capture_output=True)
     assert _contents(folder) == before
     wrong = subprocess.run(["sh", str(COMPOSE / "make_secrets.sh"), "a b"], capture_output=True, text=True)
     assert (wrong.returncode, wrong.stderr) == (2, "make_secrets.sh: 'a b' is not a name or address of a machine\n")
+
+
+class _Overrides(yaml.SafeLoader):  # type: ignore[misc]  # untyped
+    """Reader of a file of compose that adds to another one, with the tags that Docker reads there."""
+
+
+_Overrides.add_constructor("!override", lambda loader, node: loader.construct_sequence(node, deep=True))
+_Overrides.add_constructor("!reset", lambda loader, node: loader.construct_sequence(node, deep=True))
+
+
+@pytest.fixture(scope="module")
+def with_envoy(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Any]:
+    """Content of the file that puts Envoy in front of the server."""
+    found: dict[str, Any] = yaml.load((COMPOSE / "envoy.yaml").read_text(), _Overrides)
+    return found
+
+
+def test_compose_with_envoy_fits_its_schema(with_envoy: dict[str, Any], tmp_path: Path) -> None:
+    file = tmp_path / "envoy.yaml"
+    file.write_text(yaml.safe_dump(with_envoy))
+    checked("check-jsonschema", "--builtin-schema", "vendor.compose-spec", file)
+
+
+def test_only_envoy_is_reached_from_outside(compose: dict[str, Any], with_envoy: dict[str, Any]) -> None:
+    server, envoy = with_envoy["services"]["server"], with_envoy["services"]["envoy"]
+    assert server["ports"] == [] and server["networks"] == ["inside"]
+    assert envoy["networks"] == ["outside"] and len(envoy["ports"]) == 1
+    assert envoy["read_only"] is True and envoy["cap_drop"] == ["ALL"]
+    assert envoy["security_opt"] == ["no-new-privileges:true"]
+    assert {"mem_limit", "pids_limit", "restart", "logging"} <= set(envoy) and "latest" not in envoy["image"]
+    assert _seconds(envoy["stop_grace_period"]) > 30
+    # The socket has the user of both.
+    assert (
+        envoy["user"] == "10001:10001" and "uid=10001,gid=10001" in with_envoy["volumes"]["socket"]["driver_opts"]["o"]
+    )
+    assert "socket:/run/robosc" in envoy["volumes"] and server["volumes"] == ["socket:/run/robosc"]
+    assert set(compose["services"]) & set(with_envoy["services"]) == {"server"}
+
+
+def test_envoy_of_compose_starts_with_the_secrets_that_are_made(with_envoy: dict[str, Any], tmp_path: Path) -> None:
+    secrets = tmp_path / "secrets"
+    command = ["sh", str(COMPOSE / "make_secrets.sh"), "localhost", str(secrets)]
+    subprocess.run(command, check=True, capture_output=True)
+    places = {}
+    for mount in with_envoy["services"]["envoy"]["volumes"]:
+        source, target, *_ = mount.split(":")
+        places[target] = tmp_path / source if source.startswith("./secrets") else COMPOSE / source
+    text = places.pop("/etc/envoy/envoy.yaml").read_text()
+    for target, source in places.items():
+        assert source.exists() or target == "/run/robosc", source
+        text = text.replace(target, str(source))
+    file = tmp_path / "mtls.yaml"
+    file.write_text(text)
+    checked("envoy", "--mode", "validate", "-c", file)
+    # The first caller is one of those whom Envoy lets through, and no authority.
+    verify = ["openssl", "verify", "-purpose", "sslclient", "-CAfile", "callers/ca.crt", "first_caller.crt"]
+    done = subprocess.run(verify, cwd=secrets, capture_output=True, text=True, check=False)
+    assert done.stdout == "first_caller.crt: OK\n", done.stderr
+    certificate = load_pem_x509_certificate((secrets / "first_caller.crt").read_bytes())
+    key = load_pem_private_key((secrets / "first_caller.key").read_bytes(), None)
+    assert key.public_key() == certificate.public_key()
+    assert certificate.subject.rfc4514_string() == "CN=first"
 
 
 def test_variables_of_the_images_are_settings() -> None:

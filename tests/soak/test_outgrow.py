@@ -1,13 +1,15 @@
 """The parts of `soak/outgrow.py` that judge: its ledger finds every kind of fault, and jobs are the same again."""
 
 from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
 
 import pytest
 
 from robosc_client import Check, Generate, Synthesize
 from support.job_ledger import Ledger, StoredJob
 from support.job_mix import MixedJob, digest, mixed_job, right_digest
-from support.outgrown_site import proxy_configuration
+from support.outgrown_site import cluster_commands, proxy_configuration
 
 SOUND = StoredJob("a", "1-0-0", "succeeded", "", 1, 1)
 
@@ -98,3 +100,9 @@ def test_the_proxy_admits_all_watches_of_one_connection() -> None:
     text = proxy_configuration(1, [2, 3])
     assert "server server1 127.0.0.1:3 check" in text
     assert "tune.h2.max-concurrent-streams 2000" in text
+
+
+def test_nobody_elsewhere_reaches_the_cluster(tmp_path: Path) -> None:
+    for command in cluster_commands(tmp_path, 8786):
+        given = dict(pairwise(command))
+        assert (given["--host"], given["--dashboard-address"]) == ("127.0.0.1", "127.0.0.1:0")

@@ -272,11 +272,25 @@ def _environment() -> dict[str, str]:
     return variables
 
 
+def cluster_commands(folder: Path, port: int) -> tuple[list[str], list[str]]:
+    """Commands of a scheduler of Dask and of a worker, which nobody on another machine can reach.
+
+    Whoever reaches them can run programs here. Without an address they would listen on all, and so would the pages of
+    HTTP that each has even without a dashboard.
+
+    Args:
+        folder: Folder of the files of workers.
+        port: Port of the scheduler.
+    """
+    here = ["--host", "127.0.0.1", "--no-dashboard", "--dashboard-address", "127.0.0.1:0"]
+    scheduler = [sys.executable, "-m", "distributed.cli.dask_scheduler", "--port", str(port), *here]
+    worker = [sys.executable, "-m", "distributed.cli.dask_worker", f"tcp://127.0.0.1:{port}", "--nthreads", "1"]
+    worker += ["--no-nanny", "--death-timeout", "60", "--local-directory", str(folder / "workers"), *here]
+    return scheduler, worker
+
+
 def _cluster(folder: Path, port: int, workers: int) -> list[Part]:
-    dask = [sys.executable, "-m"]
-    scheduler = [*dask, "distributed.cli.dask_scheduler", "--host", "127.0.0.1", "--port", str(port), "--no-dashboard"]
-    worker = [*dask, "distributed.cli.dask_worker", f"tcp://127.0.0.1:{port}", "--nthreads", "1", "--no-nanny"]
-    worker += ["--no-dashboard", "--death-timeout", "60", "--local-directory", str(folder / "workers")]
+    scheduler, worker = cluster_commands(folder, port)
     variables = _environment()
     return [
         Part(Kind.SCHEDULER, scheduler, folder / "scheduler.log", variables),

@@ -31,20 +31,24 @@ def _programs() -> Path | None:
     return found[-1].parent if found else None
 
 
-def has_postgresql() -> bool:
-    """Return True if PostgreSQL is installed."""
-    return _programs() is not None
-
-
-def skip_without_postgresql() -> None:
-    """Skip the test where there is no PostgreSQL, or no user to run it as."""
+def missing_for_postgresql() -> str | None:
+    """Return what PostgreSQL lacks here; None: it can run."""
     if _programs() is None:
-        pytest.skip("PostgreSQL is not installed (Debian's package: postgresql)")
+        return "PostgreSQL is not installed (Debian's package: postgresql)"
     if os.getuid() == 0:
         try:
             pwd.getpwnam(_USER)
         except KeyError:
-            pytest.skip(f"there is no user {_USER}, and PostgreSQL does not run as root")
+            return f"there is no user {_USER}, and PostgreSQL does not run as root"
+        if shutil.which("setpriv") is None:
+            return f"there is no setpriv to become the user {_USER} (Debian's package: util-linux)"
+    return None
+
+
+def skip_without_postgresql() -> None:
+    """Skip the test where there is no PostgreSQL, or no user to run it as."""
+    if missing := missing_for_postgresql():
+        pytest.skip(missing)
 
 
 class Postgresql:

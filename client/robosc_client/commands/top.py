@@ -4,30 +4,48 @@ import argparse
 import json
 import sys
 import time
-from collections.abc import Iterable
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from datetime import datetime
 from typing import TYPE_CHECKING, Any
 
 from robosc.cli.output import ExitCode
-from robosc_client import Client, Job, JobState, ServiceLoad
+from robosc.source import visible
+from robosc_client import (
+    Client,
+    ClientError,
+    DeadlineError,
+    Job,
+    JobState,
+    ServerBusyError,
+    ServerUnavailableError,
+    ServiceLoad,
+)
 from robosc_client.commands.connection import add_connection_arguments, exit_statuses, number_up_to, seconds
 from robosc_client.commands.jobs import job_json
 
 if TYPE_CHECKING:
-    from rich.console import Group
+    from rich.text import Text
 
 _DESCRIPTION = """\
 Show what a service does now: how many tasks its workers can do and are doing, which callers wait and for how long, and
-the jobs that have not ended. Without --all, only your own jobs. Ctrl-C ends it.
+the jobs that have not ended. Without --all, only your own jobs. Ctrl-C ends it. If the service does not answer in
+between, this is said and tried again.
 """
 
 _INTERVAL_S = 2.0
+_DEADLINE_S = 5.0
+"""Time limit of each call: what is shown must not grow old without a word."""
+
 _MOST = 20
 _MOST_JOBS = 1000
 _MAXIMUM_TEXT = 40
+_MAXIMUM_DOING = 100
 
 _MINUTE_S, _HOUR_S, _DAY_S = 60, 3600, 86400
+
+_PASSING = (ServerUnavailableError, DeadlineError, ServerBusyError)
+"""Failures that may pass: a server is started again, a network comes back."""
 
 
 def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -52,7 +70,7 @@ def add_parsers(commands: "argparse._SubParsersAction[argparse.ArgumentParser]")
         help="show at most N jobs that run and N that wait (default: %(default)s)",
     )
     parser.add_argument("--json", action="store_true", help="print one line of JSON for each look, for machines")
-    add_connection_arguments(parser, epilog=exit_statuses("it was shown once (--once)"))
+    add_connection_arguments(parser, deadline_s=_DEADLINE_S, epilog=exit_statuses("it was shown once (--once)"))
     parser.set_defaults(run=_top)
 
 
@@ -87,24 +105,49 @@ def _show(arguments: argparse.Namespace, client: Client) -> int:
     from rich.console import Console
     from rich.live import Live
 
-    with Live(console=Console(markup=False, highlight=False), screen=True, auto_refresh=False) as live:
-        while True:
-            live.update(_drawn(_look(arguments, client)), refresh=True)
-            time.sleep(arguments.interval)
+    console = Console(markup=False, highlight=False)
+    with Live(console=console, screen=True, auto_refresh=False) as live:
+        for look, failure in _looks(arguments, client):
+            live.update(_drawn(look, failure, console.width, console.height), refresh=True)
+    raise AssertionError("unreachable: only an interrupt or an error ends it")
 
 
 def _print(arguments: argparse.Namespace, client: Client) -> int:
     """Print one look, or one after the other."""
-    while True:
-        look = _look(arguments, client)
-        if arguments.json:
-            sys.stdout.write(json.dumps(_document(look)) + "\n")
-        else:
-            _write(look)
-        sys.stdout.flush()
-        if arguments.once:
-            return ExitCode.OK
+    is_first = True
+    try:
+        for look, failure in _looks(arguments, client):
+            if arguments.json:
+                sys.stdout.write(json.dumps(_document(look) if failure is None else _failure_document(failure)) + "\n")
+            else:
+                sys.stdout.write(("" if is_first else "\n") + _text(look, failure))
+            sys.stdout.flush()
+            is_first = False
+    except ClientError as error:
+        if is_first or not arguments.json:
+            raise
+        # A line as the others are, since it follows them.
+        sys.stdout.write(json.dumps(_failure_document(error)) + "\n")
+        sys.stderr.write(f"robosc-client: {visible(str(error))}\n")
+        return ExitCode.SERVICE
+    return ExitCode.OK
+
+
+def _looks(arguments: argparse.Namespace, client: Client) -> Iterator[tuple[_Look, ClientError | None]]:
+    """Look once, or again and again; yield what was seen last, and the failure of the last attempt to look, if any.
+
+    A failure of the first attempt is raised, since a wrong address does not become right.
+    """
+    look = _look(arguments, client)
+    yield look, None
+    while not arguments.once:
         time.sleep(arguments.interval)
+        failure = None
+        try:
+            look = _look(arguments, client)
+        except _PASSING as error:
+            failure = error
+        yield look, failure
 
 
 def _look(arguments: argparse.Namespace, client: Client) -> _Look:
@@ -154,6 +197,10 @@ def _document(look: _Look) -> dict[str, Any]:
     }
 
 
+def _failure_document(failure: ClientError) -> dict[str, Any]:
+    return {"error": {"status": int(ExitCode.SERVICE), "message": str(failure)}}
+
+
 def _age_s(now: datetime, since: datetime | None) -> float | None:
     """Return the seconds since a moment, by the server's clock; the clocks of several servers may differ a little."""
     return None if since is None else round(max(0.0, (now - since).total_seconds()), 3)
@@ -164,8 +211,12 @@ def _headline(look: _Look) -> str:
     ended = sum(caller.ended_jobs for caller in load.callers)
     return (
         f"{load.time:%H:%M:%S} UTC  servers {load.servers}  workers {load.workers}, busy {load.running_tasks}  "
-        f"waiting {load.waiting_tasks}  ended in the last minute {ended}"
+        f"waiting {load.waiting_tasks}  ended/min {ended}"
     )
+
+
+def _no_answer(look: _Look, failure: ClientError) -> str:
+    return f"NO ANSWER since {look.load.time:%H:%M:%S} UTC, trying again: {visible(str(failure))}"
 
 
 def _caller_rows(look: _Look) -> list[tuple[str, ...]]:
@@ -183,11 +234,14 @@ def _caller_rows(look: _Look) -> list[tuple[str, ...]]:
     ]
 
 
-_CALLER_COLUMNS = ("CALLER", "QUEUED", "RUNNING", "TASKS WAITING", "TASKS RUNNING", "ENDED/MIN", "WAITS FOR")
+_CALLER_COLUMNS = ("CALLER", "QUEUED", "RUNNING", "TASKS WAITING", "TASKS RUNNING", "ENDED/MIN", "LONGEST WAIT")
 _JOB_COLUMNS = ("JOB", "STATE", "AGE", "BEFORE", "KIND", "CALLER", "MODEL", "DOING")
 
-_NAMES = frozenset({"JOB", "CALLER", "MODEL", "DOING"})
-"""Columns that are cut off where a terminal is narrow."""
+_SHORTENED = {"CALLER": 8, "MODEL": 8, "DOING": 16, "JOB": 8}
+"""Columns that are cut off where a terminal is narrow, and the width that each keeps; the first are widened first."""
+
+_DROPPED = ("KIND", "TASKS RUNNING", "TASKS WAITING", "ENDED/MIN", "BEFORE", "MODEL", "DOING", "AGE", "QUEUED")
+"""Columns that a narrow terminal does without, the first of them first."""
 
 
 def _job_rows(look: _Look) -> list[tuple[str, ...]]:
@@ -201,10 +255,19 @@ def _job_rows(look: _Look) -> list[tuple[str, ...]]:
             str(job.kind),
             job.owner[:_MAXIMUM_TEXT],
             (job.label or job.main_file)[:_MAXIMUM_TEXT],
-            "" if job.progress is None else f"{job.progress.stage}: {job.progress.message}"[:_MAXIMUM_TEXT],
+            _doing(look, job),
         )
         for job in (*look.running, *look.queued)
     ]
+
+
+def _doing(look: _Look, job: Job) -> str:
+    """Return what a job does or waits for."""
+    if job.progress is not None:
+        return f"{job.progress.stage}: {job.progress.message}"[:_MAXIMUM_DOING]
+    if job.state is not JobState.QUEUED:
+        return ""
+    return "waits for a worker" if look.load.workers else "waits for workers: there are none"
 
 
 def _age(now: datetime, since: datetime | None) -> str:
@@ -222,17 +285,23 @@ def _age(now: datetime, since: datetime | None) -> str:
     raise AssertionError("unreachable: it is at least a minute")
 
 
-def _more(look: _Look) -> str:
-    return f"and {look.more} more jobs: see --most\n" if look.more else ""
+def _tables(look: _Look) -> Iterator[tuple[tuple[str, ...], list[tuple[str, ...]]]]:
+    """The columns and rows of callers and of jobs."""
+    yield _CALLER_COLUMNS, _caller_rows(look)
+    yield _JOB_COLUMNS, _job_rows(look)
 
 
-def _write(look: _Look) -> None:
-    """Write a look as plain text."""
-    sys.stdout.write(f"{_headline(look)}\n")
-    for columns, rows in ((_CALLER_COLUMNS, _caller_rows(look)), (_JOB_COLUMNS, _job_rows(look))):
+def _text(look: _Look, failure: ClientError | None) -> str:
+    """A look, or that there is no newer one, as plain text."""
+    if failure is not None:
+        return f"{_no_answer(look, failure)}\n"
+    parts = [f"{_headline(look)}\n"]
+    for columns, rows in _tables(look):
         if rows:
-            sys.stdout.write("\n" + "".join(f"{line}\n" for line in _lines(columns, rows)))
-    sys.stdout.write(_more(look))
+            parts.append("\n" + "".join(f"{line}\n" for line in _lines(columns, rows)))
+    if look.more:
+        parts.append(f"and {look.more} more jobs: see --most\n")
+    return "".join(parts)
 
 
 def _lines(columns: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> list[str]:
@@ -241,22 +310,57 @@ def _lines(columns: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> list[st
     return ["  ".join(f"{text:{width}}" for text, width in zip(row, widths, strict=True)).rstrip() for row in table]
 
 
-def _drawn(look: _Look) -> "Group":
-    """A look for a terminal; what does not fit is cut off."""
-    from rich.console import Group
-    from rich.table import Table
+def _drawn(look: _Look, failure: ClientError | None, width: int, height: int) -> "Text":
+    """A look for a terminal, which fits into it.
+
+    Args:
+        look: The last look.
+        failure: Failure to look again; None: the look is new.
+        width: Columns of the terminal.
+        height: Lines of the terminal.
+    """
     from rich.text import Text
 
-    parts: list[Text | Table] = [Text(_headline(look), style="bold", no_wrap=True, overflow="ellipsis"), Text("")]
-    for columns, rows in ((_CALLER_COLUMNS, _caller_rows(look)), (_JOB_COLUMNS, _job_rows(look))):
+    callers, jobs = _tables(look)
+    # The headline, the last line, and for each table an empty line and the names of its columns.
+    room = max(2, height - 2 - 2 * sum(1 for _, rows in (callers, jobs) if rows))
+    most_callers = max(1, room // 2, room - len(jobs[1]))
+    most_jobs = max(1, room - min(most_callers, len(callers[1])))
+    style = "bold" if failure is None else "bold reverse"
+    drawn = Text(no_wrap=True, overflow="ellipsis")
+    drawn.append(_headline(look) if failure is None else _no_answer(look, failure), style)
+    for (columns, rows), most in ((callers, most_callers), (jobs, most_jobs)):
         if rows:
-            table = Table(box=None, pad_edge=False, header_style="bold")
-            for place, name in enumerate(columns):
-                # Numbers are shown whole; names make room for them.
-                width = None if name in _NAMES else max(len(row[place]) for row in (columns, *rows))
-                table.add_column(name, min_width=width, no_wrap=True, overflow="ellipsis")
-            for row in rows:
-                table.add_row(*map(Text, row))
-            parts += [table, Text("")]
-    parts.append(Text(_more(look).rstrip()))
-    return Group(*parts)
+            heading, *lines = _fitted(columns, rows[:most], width)
+            drawn.append("\n\n").append(heading, "bold").append("".join(f"\n{line}" for line in lines))
+    more_callers = max(0, len(callers[1]) - most_callers)
+    more_jobs = look.more + max(0, len(jobs[1]) - most_jobs)
+    left = [f"{count} more {name}" for count, name in ((more_callers, "callers"), (more_jobs, "jobs")) if count]
+    return drawn.append(f"\nand {' and '.join(left)}" if left else "")
+
+
+def _fitted(columns: Sequence[str], rows: Sequence[Sequence[str]], width: int) -> list[str]:
+    """The lines of a table on a terminal, of so many columns as fit, and cut off where that makes room for others."""
+    from rich.cells import cell_len
+
+    table = [columns, *rows]
+    whole = {name: max(cell_len(row[place]) for row in table) for place, name in enumerate(columns)}
+    least = {name: min(size, _SHORTENED.get(name, size)) for name, size in whole.items()}
+    for name in _DROPPED:
+        if sum(least.values()) + 2 * (len(least) - 1) > width:
+            least.pop(name, None)
+    left = width - sum(least.values()) - 2 * (len(least) - 1)
+    for name in _SHORTENED:
+        if name in least:
+            more = max(0, min(left, whole[name] - least[name]))
+            least[name] += more
+            left -= more
+    places = [(place, least[name]) for place, name in enumerate(columns) if name in least]
+    return ["  ".join(_cell(row[place], size) for place, size in places).rstrip() for row in table]
+
+
+def _cell(text: str, size: int) -> str:
+    """A text that takes so many columns of a terminal; an ellipsis stands for what is cut off."""
+    from rich.cells import cell_len, set_cell_size
+
+    return set_cell_size(text, size) if cell_len(text) <= size else set_cell_size(text, size - 1) + "…"

@@ -11,7 +11,8 @@ from typing import Any
 import pytest
 import yaml
 
-from robosc_server.operations.settings import Settings, settings_from
+from robosc_server.operations.settings import Settings
+from robosc_server.operations.settings_sources import settings_from
 from robosc_server.operations.shutdown import END_S
 from support.checkers import checked
 from support.containers import IMAGES, TOP

@@ -119,7 +119,7 @@ def _look(arguments: argparse.Namespace, client: Client) -> _Look:
 
 
 def _jobs(arguments: argparse.Namespace, client: Client, state: JobState) -> list[Job]:
-    """Jobs in a state; a list begins with the youngest, and the oldest ones are wanted."""
+    """Return all jobs in a state, since a list begins with the youngest, and the oldest ones are wanted."""
     found = client.list_jobs(
         states=(state,), all_owners=arguments.all, page_size=_MOST_JOBS, deadline_s=arguments.deadline
     )
@@ -127,7 +127,7 @@ def _jobs(arguments: argparse.Namespace, client: Client, state: JobState) -> lis
 
 
 def _document(look: _Look) -> dict[str, Any]:
-    """A look as JSON values; times in ISO 8601."""
+    """Return a look as JSON values; times in ISO 8601."""
     load = look.load
     return {
         "time": load.time.isoformat(),
@@ -242,7 +242,7 @@ def _lines(columns: tuple[str, ...], rows: Iterable[tuple[str, ...]]) -> list[st
 
 
 def _drawn(look: _Look) -> "Group":
-    """A look for a terminal; what does not fit is cut off."""
+    """Return a look for a terminal; what does not fit is cut off."""
     from rich.console import Group
     from rich.table import Table
     from rich.text import Text

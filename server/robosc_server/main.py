@@ -85,7 +85,7 @@ def _announce(address: str) -> None:
         logging.getLogger(__name__).warning(
             "listening on %s; the address cannot be written to standard output: %s", address, error
         )
-        # Otherwise the interpreter would try again at its exit.
+        # The interpreter would try again at its exit.
         sys.stdout = None
 
 

@@ -177,7 +177,7 @@ def check_config(argv: Sequence[str]) -> int:
 
 
 def _settings_document(settings: Settings, arguments: argparse.Namespace) -> dict[str, Any]:
-    """Each setting's value, and where it comes from."""
+    """Return the value of each setting, and where it comes from."""
     document = {}
     config = config_file_of(arguments)
     for name in Settings.model_fields:
@@ -194,7 +194,7 @@ def _settings_document(settings: Settings, arguments: argparse.Namespace) -> dic
 def _json_value(name: str, value: Any) -> Any:
     if value is None or isinstance(value, bool | int | float):
         return value
-    # It may hold a password.
+    # The URL may hold a password.
     return "set, not shown" if name == "database_url" else format_value(name, value)
 
 

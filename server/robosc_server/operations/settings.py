@@ -41,7 +41,7 @@ class Confinement(StrEnum):
 
 
 def _bytes(value: object) -> object:
-    """A number of bytes, also with a unit."""
+    """Read a number of bytes, also with a unit."""
     if isinstance(value, str):
         match = _SIZE.match(value.strip())
         if match is None:
@@ -79,10 +79,10 @@ def _workers(text: str) -> str:
 
 
 def _database(text: str) -> str:
-    # Not the text itself in the message: it may hold a password.
     scheme, separator, rest = text.partition("://")
     is_known = scheme in ("postgresql", "postgresql+psycopg") or (scheme == "sqlite" and len(rest) > 1)
     if not separator or not is_known:
+        # The message does not have the text, which may hold a password.
         raise PydanticCustomError("database", "must be postgresql://USER:PASSWORD@HOST:PORT/NAME or sqlite:///FILE")
     return text
 

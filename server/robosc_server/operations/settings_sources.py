@@ -142,7 +142,7 @@ def read_file(path: Path) -> dict[str, Any]:
     except (UnicodeDecodeError, RecursionError) as error:
         raise SettingsError([f"{path}: not valid TOML"]) from error
     except tomllib.TOMLDecodeError as error:
-        # Only where: a line may hold a password.
+        # The message has the place and not the line, which may hold a password.
         place = re.search(r"\(at (?:line \d+, column \d+|end of document)\)", str(error))
         raise SettingsError([f"{path}: not valid TOML {place[0] if place else ''}".rstrip()]) from None
 

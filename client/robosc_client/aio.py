@@ -5,7 +5,7 @@ The list of methods is written in both: type checkers then know each signature, 
 
 import asyncio
 from collections.abc import AsyncGenerator, Awaitable, Callable, Coroutine, Mapping
-from contextlib import aclosing, suppress
+from contextlib import aclosing
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Concatenate, Self
 
@@ -13,19 +13,15 @@ import grpc
 import grpc.aio
 
 import robosc
-from robosc_api.security import Credentials, SecurityError, open_async_channel
-from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
+from robosc_api.security import Credentials, open_async_channel
 from robosc_client import operations
-from robosc_client.calls import CHANNEL_OPTIONS, WATCH_INTERRUPTED, JobPages, JobWatch, Operation, RetriedCall
+from robosc_client.calls import WATCH_INTERRUPTED, JobPages, JobWatch, Operation, RetriedCall, channel_of
 from robosc_client.convert.failures import failure_of
 from robosc_client.convert.requests import JobStub, SynthesisStub
-from robosc_client.errors import CredentialsError, malformed
+from robosc_client.errors import malformed
 from robosc_client.jobs import Job
 from robosc_client.operations import LocalFunction, client_method
 from robosc_client.retry import DEFAULT_RETRIES, RetryPolicy
-
-if TYPE_CHECKING:
-    pass
 
 
 def _unary_method[**P, Result](
@@ -91,18 +87,10 @@ class AsyncClient:
         Raises:
             CredentialsError: A file with them cannot be used, or a token would be sent in the clear.
         """
-        # The names of gRPC that are no such addresses stay what they are.
-        with suppress(ValueError):
-            address = with_port(address, SYNTHESIS_PORT)
-        self._address = address
+        self._address, self._channel = channel_of(open_async_channel, address, credentials, channel_options)
         self._retries = retries
         self._is_closed = False
         self._sleep = sleep
-        options = (*CHANNEL_OPTIONS, *(channel_options or {}).items())
-        try:
-            self._channel = open_async_channel(address, credentials or Credentials(), options)
-        except SecurityError as error:
-            raise CredentialsError(str(error)) from error
         self._tasks = SynthesisStub(self._channel)  # type: ignore[no-untyped-call]  # generated
         self._jobs = JobStub(self._channel)  # type: ignore[no-untyped-call]  # generated
 
@@ -197,7 +185,7 @@ class AsyncClient:
 
 
 def _parsed[Message](message: Message | None) -> Message:
-    """A message of an answer.
+    """Return a message of an answer.
 
     Raises:
         ServiceError: The message cannot be parsed: `grpc.aio` logs that and returns None.

@@ -1,22 +1,25 @@
-"""Calls with their retries, and the options of channels: the part that both clients share.
+"""Calls with their retries, and the opening of channels: the part that both clients share.
 
 Nothing is sent or received here. A client makes the call of an operation, passes on every message or the error, and
 waits for the delay that it is given.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import grpc
 
 from robosc.certification.progress import OnProgress, ignored
+from robosc_api.security import Credentials, SecurityError
+from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
 from robosc_api.v1 import jobs_pb2
 from robosc_client.convert import jobs
 from robosc_client.convert.failures import Failure, failure_of
 from robosc_client.convert.requests import list_request
 from robosc_client.convert.response_readers import MAXIMUM_BYTES, ResponseReader, UnaryReader
-from robosc_client.errors import malformed
+from robosc_client.errors import CredentialsError, malformed
 from robosc_client.jobs import Job, JobState, TaskKind
 from robosc_client.retry import Attempts, RetryPolicy
 
@@ -48,6 +51,27 @@ WATCH_INTERRUPTED = Failure(grpc.StatusCode.UNAVAILABLE, "the watch ended before
 """Failure of a watch that ends without an error before its job does."""
 
 _EMPTY_PAGES = 100
+
+
+def channel_of[Channel](
+    open_channel: Callable[[str, Credentials, tuple[tuple[str, Any], ...]], Channel],
+    address: str,
+    credentials: Credentials | None,
+    channel_options: Mapping[str, Any] | None,
+) -> tuple[str, Channel]:
+    """Return the address and the channel of a client; the arguments are those of the clients.
+
+    Raises:
+        CredentialsError: A file with them cannot be used, or a token would be sent in the clear.
+    """
+    # The names of gRPC that are no such addresses stay what they are.
+    with suppress(ValueError):
+        address = with_port(address, SYNTHESIS_PORT)
+    options = (*CHANNEL_OPTIONS, *(channel_options or {}).items())
+    try:
+        return address, open_channel(address, credentials or Credentials(), options)
+    except SecurityError as error:
+        raise CredentialsError(str(error)) from error
 
 
 @dataclass(frozen=True, slots=True)

@@ -2,20 +2,18 @@
 
 import time
 from collections.abc import Callable, Generator, Iterator, Mapping
-from contextlib import closing, suppress
+from contextlib import closing
 from types import TracebackType
 from typing import TYPE_CHECKING, Any, Concatenate, Self
 
 import grpc
 
 import robosc
-from robosc_api.security import Credentials, SecurityError, close_channel, open_channel
-from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
+from robosc_api.security import Credentials, close_channel, open_channel
 from robosc_client import operations
-from robosc_client.calls import CHANNEL_OPTIONS, WATCH_INTERRUPTED, JobPages, JobWatch, Operation, RetriedCall
+from robosc_client.calls import WATCH_INTERRUPTED, JobPages, JobWatch, Operation, RetriedCall, channel_of
 from robosc_client.convert.failures import failure_of
 from robosc_client.convert.requests import JobStub, SynthesisStub
-from robosc_client.errors import CredentialsError
 from robosc_client.jobs import Job
 from robosc_client.operations import LocalFunction, client_method
 from robosc_client.retry import DEFAULT_RETRIES, RetryPolicy
@@ -79,18 +77,10 @@ class Client:
         Raises:
             CredentialsError: A file with them cannot be used, or a token would be sent in the clear.
         """
-        # The names of gRPC that are no such addresses stay what they are.
-        with suppress(ValueError):
-            address = with_port(address, SYNTHESIS_PORT)
-        self._address = address
+        self._address, self._channel = channel_of(open_channel, address, credentials, channel_options)
         self._retries = retries
         self._is_closed = False
         self._sleep = sleep
-        options = (*CHANNEL_OPTIONS, *(channel_options or {}).items())
-        try:
-            self._channel = open_channel(address, credentials or Credentials(), options)
-        except SecurityError as error:
-            raise CredentialsError(str(error)) from error
         self._tasks = SynthesisStub(self._channel)  # type: ignore[no-untyped-call]  # generated
         self._jobs = JobStub(self._channel)  # type: ignore[no-untyped-call]  # generated
 

@@ -13,7 +13,7 @@ from robosc.cli.arguments import Parser
 from robosc.cli.main import guarded, parse
 from robosc.cli.output import CommandError, ExitCode, UsageError
 from robosc_client import ClientError, CredentialsError, NotThereError
-from robosc_client.commands import bench, health, jobs, profiles, server_info, tasks, top
+from robosc_client.commands import bench, health, jobs, profiles, server_info, submit, tasks, top
 from robosc_client.commands.connection import EPILOG, connect
 
 
@@ -27,7 +27,7 @@ def make_parser() -> Parser:
     )
     parser.add_argument("--version", action="version", version=f"robosc-client {__version__}")
     commands = parser.add_subparsers(title="commands", dest="command", required=True, metavar="COMMAND")
-    for module in (tasks, server_info, health, jobs, top, profiles, bench):
+    for module in (tasks, server_info, health, submit, jobs, top, profiles, bench):
         module.add_parsers(commands)
     return parser
 

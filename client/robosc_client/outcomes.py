@@ -402,7 +402,7 @@ def _formula(text: Any, model: Model) -> Any:
 
 
 def _model(bundle: Bundle) -> Model:
-    """The model of texts for which the server has found one.
+    """Return the model of texts for which the server has found one.
 
     Raises:
         ServiceError: There is none.

@@ -212,7 +212,7 @@ def _token_file(name: str) -> Path:
 
 
 def _document() -> "TOMLDocument":
-    """The file as it stands, for changing it; it was read before."""
+    """Return the file as it stands, for changing it; it was read before."""
     import tomlkit
 
     return tomlkit.parse(_text(profiles_file()))

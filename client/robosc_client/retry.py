@@ -144,7 +144,7 @@ class Attempts:
     def _delay_s(self, asked_s: float | None) -> float | None:
         """Return the delay in seconds; None: the server requests more than the policy allows."""
         policy = self._policy
-        # No number of failures makes the power too large.
+        # The power does not grow too large, whatever the number of failures.
         grown_s = policy.first_s * policy.factor ** min(self._failed - 1, 64)
         delay_s = min(grown_s, policy.longest_s) * (0.5 + policy.scatter() / 2)
         if asked_s is None:

@@ -13,7 +13,8 @@ os.environ.setdefault("GRPC_VERBOSITY", "NONE")
 from robosc_server.operations.commands import run_command
 from robosc_server.operations.descriptors import raise_descriptor_limit
 from robosc_server.operations.logs import configure_logging
-from robosc_server.operations.settings import Settings, load_settings
+from robosc_server.operations.settings import Settings
+from robosc_server.operations.settings_sources import load_settings
 from robosc_server.operations.shutdown import ShutdownSignals
 from robosc_server.workers.kernel import keep_memory_private
 
@@ -84,7 +85,7 @@ def _announce(address: str) -> None:
         logging.getLogger(__name__).warning(
             "listening on %s; the address cannot be written to standard output: %s", address, error
         )
-        # Otherwise the interpreter would try again at its exit.
+        # The interpreter would try again at its exit.
         sys.stdout = None
 
 

@@ -1,4 +1,4 @@
-"""Signs supervisors with the server's own key (semantics 3.12): who trusts the key need not verify them again."""
+"""Signatures of supervisors by the server's own key: who trusts the key need not verify them again."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING

@@ -90,7 +90,7 @@ class SynthesisService:
         for name, kind in _UNARY.items():
             methods[name] = grpc.unary_unary_rpc_method_handler(self._unary(kind))
         for name, kind in _STREAMS.items():
-            # On the wire, a unary response is a stream of one message. gRPC sends the response of such a handler
+            # A unary response is a stream of one message on the wire. gRPC sends the response of such a handler
             # together with the status, and lets the handler write other messages before.
             methods[name] = grpc.unary_unary_rpc_method_handler(self._stream(kind))
         for name, (message, answer) in self._fixed.items():
@@ -98,7 +98,7 @@ class SynthesisService:
         return grpc.method_handlers_generic_handler(SERVICE_NAME, methods)
 
     def _accepted(self, kind: TaskKind, request: bytes, context: Context) -> tuple[Task, str]:
-        """The task of a request, under the key of its caller, and that caller.
+        """Return the task of a request, under the key of its caller, and that caller.
 
         Raises:
             RefusedError: There is none.

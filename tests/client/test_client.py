@@ -132,7 +132,7 @@ def test_both_clients_have_the_same_methods() -> None:
     assert names[0] == names[1]
 
 
-_LOCAL = ("close", "explain", "simulate")
+_LOCAL = ("close", "simulate")
 """Methods that call no server."""
 
 

@@ -14,7 +14,7 @@ from robosc.explanation import RequestError
 from robosc.source import SourceFile
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client import AsyncClient, Client, Explain, NotThereError, Synthesize, Verify
-from robosc_client.commands.jobs import result_json
+from robosc_client.commands.job_results import result_json
 from robosc_client.convert.requests import request_of
 from support.models import EMPTY, EXAMPLES, UNSUPPORTED
 from support.service import served

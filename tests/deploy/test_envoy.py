@@ -12,7 +12,7 @@ from cryptography.hazmat.primitives.asymmetric import rsa
 
 from robosc_api.security.forwarded import CALLER_HEADER, SCOPES_HEADER
 from robosc_server.operations.config_check import check_settings
-from robosc_server.operations.settings import settings_from
+from robosc_server.operations.settings_sources import settings_from
 from support.certificates import Authority
 from support.checkers import TOP, checked
 

@@ -13,7 +13,8 @@ import yaml
 from cryptography.hazmat.primitives.serialization import load_pem_private_key
 from cryptography.x509 import load_pem_x509_certificate
 
-from robosc_server.operations.settings import Settings, settings_from
+from robosc_server.operations.settings import Settings
+from robosc_server.operations.settings_sources import settings_from
 from robosc_server.operations.shutdown import END_S
 from support.checkers import checked
 from support.containers import IMAGES, TOP

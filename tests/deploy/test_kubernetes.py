@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from robosc.signatures import make_key_pair
-from robosc_server.operations.settings import Settings, settings_from
+from robosc_server.operations.settings import Settings
+from robosc_server.operations.settings_sources import settings_from
 from robosc_server.operations.shutdown import END_S
 from robosc_server.signing import SigningError, read_signing_key
 from support.checkers import checked

@@ -327,7 +327,7 @@ def are_understood(arguments: argparse.Namespace, bundle: Bundle) -> bool:
 
 
 def _verified(arguments: argparse.Namespace, client: Client, task: Verify) -> Verification:
-    """The server's answer.
+    """Return the server's answer.
 
     Raises:
         UnsupportedModelError: The model is correct, but cannot be handled.

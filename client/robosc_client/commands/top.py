@@ -162,7 +162,7 @@ def _look(arguments: argparse.Namespace, client: Client) -> _Look:
 
 
 def _jobs(arguments: argparse.Namespace, client: Client, state: JobState) -> list[Job]:
-    """Jobs in a state; a list begins with the youngest, and the oldest ones are wanted."""
+    """Return all jobs in a state, since a list begins with the youngest, and the oldest ones are wanted."""
     found = client.list_jobs(
         states=(state,), all_owners=arguments.all, page_size=_MOST_JOBS, deadline_s=arguments.deadline
     )
@@ -170,7 +170,7 @@ def _jobs(arguments: argparse.Namespace, client: Client, state: JobState) -> lis
 
 
 def _document(look: _Look) -> dict[str, Any]:
-    """A look as JSON values; times in ISO 8601."""
+    """Return a look as JSON values; times in ISO 8601."""
     load = look.load
     return {
         "time": load.time.isoformat(),

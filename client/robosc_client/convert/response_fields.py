@@ -1,6 +1,6 @@
 """Conversion of parts of responses to checked values."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Mapping, Sequence
 
 from robosc.certification.goals import GoalExplanation, NearestPlace
 from robosc.errors import Diagnostic, RelatedPlace, Severity
@@ -57,6 +57,7 @@ _EXPLAINED = {
     pb.EXPLANATION_STATUS_EMPTY: SynthesisStatus.EMPTY,
     pb.EXPLANATION_STATUS_MODEL_ERRORS: SynthesisStatus.MODEL_ERRORS,
     pb.EXPLANATION_STATUS_UNSUPPORTED_MODEL: SynthesisStatus.UNSUPPORTED_MODEL,
+    pb.EXPLANATION_STATUS_NOT_THERE: None,
 }
 
 
@@ -96,16 +97,12 @@ def status_of(number: pb.SynthesisStatus) -> SynthesisStatus:
     Raises:
         ServiceError: The number is unknown.
     """
-    if number not in _STATUSES:
-        raise malformed(f"unknown status {number}")
-    return _STATUSES[number]
+    return _known(_STATUSES, number, "status")
 
 
 def verification_status_of(number: pb.VerificationStatus) -> VerificationStatus:
     """Return the status that a verification found; raises as `status_of`."""
-    if number not in _VERDICTS:
-        raise malformed(f"unknown status {number}")
-    return _VERDICTS[number]
+    return _known(_VERDICTS, number, "status")
 
 
 def explanation_status_of(number: pb.ExplanationStatus) -> SynthesisStatus | None:
@@ -114,11 +111,13 @@ def explanation_status_of(number: pb.ExplanationStatus) -> SynthesisStatus | Non
     Raises:
         ServiceError: The number is unknown.
     """
-    if number == pb.EXPLANATION_STATUS_NOT_THERE:
-        return None
-    if number not in _EXPLAINED:
-        raise malformed(f"unknown status {number}")
-    return _EXPLAINED[number]
+    return _known(_EXPLAINED, number, "status")
+
+
+def _known[Number: int, Meaning](meanings: Mapping[Number, Meaning], number: Number, what: str) -> Meaning:
+    if number not in meanings:
+        raise malformed(f"unknown {what} {number}")
+    return meanings[number]
 
 
 def whole_explanation_of(text: str) -> Explanation:
@@ -127,10 +126,7 @@ def whole_explanation_of(text: str) -> Explanation:
     Raises:
         ServiceError: The text is no such document.
     """
-    try:
-        return whole_from_text(text)
-    except ValueError as error:
-        raise malformed(str(error)) from error
+    return _read(whole_from_text, text)
 
 
 def explanation_of(text: str) -> EmptyExplanation | None:
@@ -139,8 +135,12 @@ def explanation_of(text: str) -> EmptyExplanation | None:
     Raises:
         ServiceError: The text is no such document.
     """
+    return _read(from_text, text) if text else None
+
+
+def _read[Document](reader: Callable[[str], Document], text: str) -> Document:
     try:
-        return from_text(text) if text else None
+        return reader(text)
     except ValueError as error:
         raise malformed(str(error)) from error
 
@@ -269,10 +269,8 @@ def _location(message: pb.Location) -> Location:
 
 
 def _diagnostic(message: pb.Diagnostic) -> Diagnostic:
-    if message.severity not in _SEVERITIES:
-        raise malformed(f"unknown severity {message.severity}")
     return Diagnostic(
-        severity=_SEVERITIES[message.severity],
+        severity=_known(_SEVERITIES, message.severity, "severity"),
         code=message.code,
         message=message.message,
         location=_location(message.location) if message.HasField("location") else None,

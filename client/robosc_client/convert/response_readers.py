@@ -86,13 +86,13 @@ class UnaryReader[Message, Result]:
         self._found: list[Result] = []
 
     def take(self, message: Message) -> None:
-        """The answer."""
+        """Take the answer."""
         if self._found:
             raise malformed("it continues after its end")
         self._found.append(self._convert(message))
 
     def result(self) -> Result:
-        """The answer."""
+        """Return the answer."""
         if not self._found:
             raise malformed("it has no message")
         return self._found[0]
@@ -256,7 +256,7 @@ class GenerationReader(_StreamReader):
 
 
 def _files_digest(message: pb.GenerationResult) -> bytes:
-    """The digest over all files, as the API defines it."""
+    """Return the digest over all files, as the API defines it."""
     listing = hashlib.sha256()
     for file in message.files:
         try:
@@ -455,7 +455,7 @@ class JobResultReader:
             raise malformed("the result of a job has progress messages")
 
     def result(self) -> TaskResult:
-        """The result."""
+        """Return the result."""
         if self._kind is None:
             raise malformed("it ended without a result")
         return self._inner.result()

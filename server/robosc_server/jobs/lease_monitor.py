@@ -151,5 +151,5 @@ class LeaseMonitor:
             for record in changed:
                 self._watchers.notify(record)
             for job_id in forgotten:
-                # It ended and was deleted between two polls: its watchers get NO_SUCH_JOB.
+                # The job ended and was deleted between two polls: its watchers get NO_SUCH_JOB.
                 self._watchers.notify_gone(job_id)

@@ -402,7 +402,7 @@ def _may_see(caller: Caller, record: JobRecord) -> bool:
 
 
 def _same_task(record: JobRecord, task: Task) -> JobRecord:
-    """The job of an idempotency key.
+    """Return the job of an idempotency key.
 
     Raises:
         RefusedError: Its task is another one.

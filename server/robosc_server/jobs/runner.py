@@ -145,7 +145,7 @@ class JobRunner:
             StoreUnavailableError: It is unknown whether the job was accepted.
         """
         job = self._active[record.id] = ActiveJob(record, place)
-        # Shielded: a caller that disconnects must not leave a half-accepted job.
+        # A caller that disconnects must not leave a half-accepted job.
         return await asyncio.shield(self._spawn(self._accept(job, task, bound)))
 
     def take_over(self, records: Iterable[JobRecord]) -> None:
@@ -180,7 +180,7 @@ class JobRunner:
         waiting = [job for job in self.all if not job.runs]
         await self.stop(waiting)
         with contextlib.suppress(StoreUnavailableError):  # Retried at the end of the shutdown.
-            # Some may have started at this moment.
+            # Jobs may have started at this moment.
             await self._store.requeue({job.record.id for job in waiting}, self.replica, None)
             await self._store.release_queued(self.replica)
 
@@ -225,7 +225,7 @@ class JobRunner:
         job.is_stored = True
         job.stored_revision = record.revision
         job.work = self._spawn(self._run(job))
-        # Not at the end of the coroutine: one that is cancelled before it starts never gets there.
+        # A coroutine that is cancelled before it starts never gets to its end, so the job is not removed there.
         job.work.add_done_callback(lambda _: self._remove(job))
 
     async def _run(self, job: ActiveJob) -> None:
@@ -249,7 +249,7 @@ class JobRunner:
             place = job.place = job.place or self._scheduler.enter_unbounded(job.record.owner)
             await place.wait_for_worker()
             if (wait_s := self._quota_wait_s(job)) > 0:
-                # It waits outside the queue, where it blocks no other task.
+                # The job waits outside the queue, where it blocks no other task.
                 self._release_place(job)
                 await asyncio.sleep(wait_s)
                 continue

@@ -77,7 +77,7 @@ class JobService(convert.JobServiceServicer):
         label, retention_s = convert.checked_label(request.label), convert.retention_s_of(request)
         caller = self._identify(context)
         if not idempotency_key:
-            # First, since it takes less time than checking the request.
+            # Counting comes first, since it takes less time than checking the request.
             self._count(caller)
         task = self._accept(*convert.kind_and_request(request.task))
         task = replace(task, key=self._keys(task.key, caller.name))
@@ -193,7 +193,7 @@ class _SerializedAdapter:
 
 
 def _checked_id(text: str) -> str:
-    # No id has another form; this saves a database query.
+    # Ids have no other form; the check saves a database query.
     if not 0 < len(text) <= _ID_CHARACTERS or not text.isascii() or not text.isprintable():
         raise RefusedError(Reason.NO_SUCH_JOB, "there is no job with this id that the caller may see")
     return text

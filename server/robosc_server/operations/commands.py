@@ -15,18 +15,16 @@ from robosc_api.security import (
     issue_token,
     run_tokens,
 )
-from robosc_server.operations.settings import (
-    Settings,
+from robosc_server.operations.settings import Settings, default_text, format_value
+from robosc_server.operations.settings_reference import example_file
+from robosc_server.operations.settings_sources import (
     SettingsError,
     add_settings_arguments,
     config_file_of,
-    default_text,
-    format_value,
     make_parser,
     settings_of,
     source_of,
 )
-from robosc_server.operations.settings_reference import example_file
 
 _CHECK_EPILOG = """\
 exit status:
@@ -155,11 +153,9 @@ def check_config(argv: Sequence[str]) -> int:
     try:
         settings = settings_of(arguments)
     except SettingsError as error:
-        if arguments.json:
-            _print_json({"ok": False, "settings": {}, "findings": [], "problems": list(error.problems)})
-        else:
-            for problem in error.problems:
-                sys.stderr.write(f"robosc-server: {problem}\n")
+        if not arguments.json:
+            return error.report()
+        _print_json({"ok": False, "settings": {}, "findings": [], "problems": list(error.problems)})
         return 2
     findings = check_settings(settings)
     is_ok = all(finding.grade is not CheckGrade.ERROR for finding in findings)
@@ -181,7 +177,7 @@ def check_config(argv: Sequence[str]) -> int:
 
 
 def _settings_document(settings: Settings, arguments: argparse.Namespace) -> dict[str, Any]:
-    """Each setting's value, and where it comes from."""
+    """Return the value of each setting, and where it comes from."""
     document = {}
     config = config_file_of(arguments)
     for name in Settings.model_fields:
@@ -198,7 +194,7 @@ def _settings_document(settings: Settings, arguments: argparse.Namespace) -> dic
 def _json_value(name: str, value: Any) -> Any:
     if value is None or isinstance(value, bool | int | float):
         return value
-    # It may hold a password.
+    # The URL may hold a password.
     return "set, not shown" if name == "database_url" else format_value(name, value)
 
 

@@ -310,7 +310,7 @@ def _unwritable(folder: Path) -> str | None:
         except OSError as error:
             if error.errno not in (errno.EOPNOTSUPP, errno.EISDIR, errno.ENOENT):
                 raise
-            # Not every file system supports unnamed files.
+            # The file system does not support unnamed files.
             Path(tempfile.mkdtemp(prefix=".robosc-", dir=folder)).rmdir()
     except OSError as error:
         return error.strerror or str(error)

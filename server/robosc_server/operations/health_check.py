@@ -7,7 +7,8 @@ from collections.abc import Sequence
 from robosc.cli.running import Parser
 from robosc_api.health import Condition, ask_alive, ask_health, local_address
 from robosc_api.security import SecurityError
-from robosc_server.operations.settings import Settings, SettingsError, add_settings_arguments, settings_of
+from robosc_server.operations.settings import Settings
+from robosc_server.operations.settings_sources import SettingsError, add_settings_arguments, settings_of
 
 _EPILOG = """\
 The settings come from flags, environment variables and the settings file, as for the server itself; inside its
@@ -40,15 +41,13 @@ def make_parser() -> Parser:
     return parser
 
 
-def main(argv: Sequence[str] | None = None) -> int:
+def main(argv: Sequence[str]) -> int:
     """Query the health; returns the exit status."""
     given = make_parser().parse_args(argv)
     try:
         condition = _ask(settings_of(given), given.service, given.timeout, is_alive_enough=given.alive)
     except SettingsError as error:
-        for problem in error.problems:
-            sys.stderr.write(f"robosc-server: {problem}\n")
-        return 2
+        return error.report()
     except SecurityError as error:
         sys.stderr.write(f"robosc-server: {error}\n")
         return 2
@@ -77,7 +76,3 @@ def _seconds(text: str) -> float:
 
 # Argparse prints the name in "invalid ... value".
 _seconds.__name__ = "number"
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -209,7 +209,7 @@ def _json(logger: Any, name: str, line: _Line) -> str:
         text = _encode(first | dict(line)).decode()
         if text.isprintable():
             return text
-    # Also escape characters that JSON permits but terminals interpret, such as U+2028 or U+009B.
+    # Characters that JSON permits but terminals interpret, such as U+2028 or U+009B, are escaped, too.
     return json.dumps(first | dict(line), default=str, skipkeys=True)
 
 

@@ -262,7 +262,7 @@ class Metrics:
         return _OnLoop(self._registry, loop)
 
     def text(self) -> bytes:
-        """All metrics, in the text format of Prometheus."""
+        """Return all metrics, in the text format of Prometheus."""
         return generate_latest(self._registry)
 
 
@@ -350,7 +350,7 @@ class MetricsEndpoint:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         if self._server is not None:
-            # Not on the loop, which a thread may be asking for metrics.
+            # A thread may be asking the loop for metrics, so it must not wait for the threads.
             await asyncio.to_thread(self._server.stop)
 
 

@@ -1,31 +1,17 @@
-"""Settings: one definition, from which flags, environment variables, the settings file and the manual follow.
+"""Settings: one definition, from which flags, environment variables, the settings file and the manual follow."""
 
-A flag overrides the environment, the environment overrides the file, and the file overrides the default.
-"""
-
-import argparse
 import os
 import re
-import sys
-import tomllib
-from collections.abc import Mapping, Sequence
 from enum import StrEnum
 from pathlib import Path
-from typing import Annotated, Any, ClassVar
+from typing import Annotated, Any
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field, ValidationError
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 from pydantic_core import PydanticCustomError, PydanticUndefined
-from pydantic_settings import BaseSettings, PydanticBaseSettingsSource, SettingsConfigDict
 
-from robosc import __version__
-from robosc.cli.running import Parser
 from robosc_api.security import ServerSecurity, joined
 from robosc_api.security.addresses import UNIX, split_address
 from robosc_server.tasks.task import TaskLimits
-
-ENVIRONMENT_PREFIX = "ROBOSC_SERVER_"
-CONFIG_VARIABLE = ENVIRONMENT_PREFIX + "CONFIG"
-MAXIMUM_FILE_BYTES = 256 * 1024
 
 _SIZE = re.compile(r"([0-9]{1,18})\s*(B|KiB|MiB|GiB|TiB)?\Z")
 _UNITS = {None: 1, "B": 1, "KiB": 2**10, "MiB": 2**20, "GiB": 2**30, "TiB": 2**40}
@@ -55,7 +41,7 @@ class Confinement(StrEnum):
 
 
 def _bytes(value: object) -> object:
-    """A number of bytes, also with a unit."""
+    """Read a number of bytes, also with a unit."""
     if isinstance(value, str):
         match = _SIZE.match(value.strip())
         if match is None:
@@ -93,10 +79,10 @@ def _workers(text: str) -> str:
 
 
 def _database(text: str) -> str:
-    # Not the text itself in the message: it may hold a password.
     scheme, separator, rest = text.partition("://")
     is_known = scheme in ("postgresql", "postgresql+psycopg") or (scheme == "sqlite" and len(rest) > 1)
     if not separator or not is_known:
+        # The message does not have the text, which may hold a password.
         raise PydanticCustomError("database", "must be postgresql://USER:PASSWORD@HOST:PORT/NAME or sqlite:///FILE")
     return text
 
@@ -149,7 +135,7 @@ _STORAGE, _WORKERS, _OPERATIONS = "jobs and results", "workers", "operations"
 class Settings(BaseModel):
     """Settings of one server; each field's description is what the manual says about it.
 
-    Creating an instance reads neither the file nor the environment: `load_settings` does.
+    Creating an instance reads neither the file nor the environment: `settings_sources.load_settings` does.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", hide_input_in_errors=True)
@@ -357,132 +343,6 @@ class Settings(BaseModel):
         )
 
 
-class SettingsError(Exception):
-    """Settings that cannot be used.
-
-    Attributes:
-        problems: A sentence for each problem, with its place.
-    """
-
-    def __init__(self, problems: Sequence[str]) -> None:
-        super().__init__("\n".join(problems))
-        self.problems = tuple(problems)
-
-
-class _SourcedSettings(BaseSettings, Settings):
-    """Settings read from flags, environment and file."""
-
-    model_config = SettingsConfigDict(
-        frozen=True,
-        extra="forbid",
-        hide_input_in_errors=True,
-        env_prefix=ENVIRONMENT_PREFIX,
-        env_ignore_empty=True,
-        validate_default=False,
-    )
-
-    from_file: ClassVar[Mapping[str, Any]] = {}
-
-    @classmethod
-    def settings_customise_sources(
-        cls,
-        settings_cls: type[BaseSettings],
-        init_settings: PydanticBaseSettingsSource,
-        env_settings: PydanticBaseSettingsSource,
-        dotenv_settings: PydanticBaseSettingsSource,
-        file_secret_settings: PydanticBaseSettingsSource,
-    ) -> tuple[Any, ...]:
-        """Return the sources of the settings, the one that takes precedence first."""
-        return init_settings, env_settings, lambda: dict(cls.from_file)
-
-
-def settings_from(flags: Mapping[str, Any], config: Path | None) -> Settings:
-    """Return the settings of flags, environment and file together.
-
-    Args:
-        flags: Values of flags, by name of the field.
-        config: File in TOML; None: none.
-
-    Raises:
-        SettingsError: The file cannot be read, has an unknown key, or a value is wrong; the error lists all problems.
-    """
-    content = {} if config is None else read_file(config)
-
-    class SourcedSettings(_SourcedSettings):
-        from_file = content
-
-    try:
-        given = SourcedSettings(**flags)
-    except ValidationError as error:
-        problems = []
-        for problem in error.errors(include_url=False, include_context=False):
-            place = source_of(str(problem["loc"][0]), flags, config)
-            problems.append(f"{place}: {_problem_text(problem['type'], problem['msg'])}")
-        raise SettingsError(problems) from None
-    return Settings.model_construct(given.model_fields_set, **dict(given))
-
-
-def source_of(name: str, flags: Mapping[str, Any], config: Path | None) -> str:
-    """Return a description of the source of a setting's value."""
-    if name in flags:
-        return flag_of(name)
-    variable = variable_of(name)
-    # Unknown variables with our prefix are ignored: they may belong to other programs.
-    if name in Settings.model_fields and os.environ.get(variable):
-        return f"${variable}"
-    return f"{config}: {name}"
-
-
-_PROBLEM_TEXTS = {
-    "extra_forbidden": "unknown setting; `robosc-server example-config` lists all settings",
-    "int_parsing": "must be a whole number",
-    "int_type": "must be a whole number",
-    "float_parsing": "must be a number",
-    "float_type": "must be a number",
-    "bool_parsing": "must be true or false",
-    "bool_type": "must be true or false",
-    "string_type": "must be a text",
-    "path_type": "must be a text",
-}
-
-
-def _problem_text(kind: str, message: str) -> str:
-    return _PROBLEM_TEXTS.get(kind) or message.replace("Input should be", "must be")
-
-
-def read_file(path: Path) -> dict[str, Any]:
-    """Return the content of a file of settings.
-
-    Raises:
-        SettingsError: The file cannot be read, is too large, or is not TOML.
-    """
-    try:
-        with path.open("rb") as stream:
-            data = stream.read(MAXIMUM_FILE_BYTES + 1)
-    except OSError as error:
-        raise SettingsError([f"{path}: {error.strerror}"]) from error
-    if len(data) > MAXIMUM_FILE_BYTES:
-        raise SettingsError([f"{path}: the file is larger than {MAXIMUM_FILE_BYTES} bytes"])
-    try:
-        return tomllib.loads(data.decode())
-    except (UnicodeDecodeError, RecursionError) as error:
-        raise SettingsError([f"{path}: not valid TOML"]) from error
-    except tomllib.TOMLDecodeError as error:
-        # Only where: a line may hold a password.
-        place = re.search(r"\(at (?:line \d+, column \d+|end of document)\)", str(error))
-        raise SettingsError([f"{path}: not valid TOML {place[0] if place else ''}".rstrip()]) from None
-
-
-def flag_of(name: str) -> str:
-    """Return the flag of a setting."""
-    return "--" + name.replace("_", "-")
-
-
-def variable_of(name: str) -> str:
-    """Return the environment variable of a setting."""
-    return ENVIRONMENT_PREFIX + name.upper()
-
-
 def default_text(name: str) -> str:
     """Return the default of a setting as text."""
     field = Settings.model_fields[name]
@@ -514,91 +374,3 @@ def group_of(name: str) -> str:
 def description_of(name: str) -> str:
     """Return the description of a setting."""
     return Settings.model_fields[name].description or ""
-
-
-_EPILOG = f"""\
-commands:
-  robosc-server token NAME       create a token for a caller
-  robosc-server tokens COMMAND   add, rotate, list or revoke the tokens of a file
-  robosc-server check-config     check whether the server can start with these settings
-  robosc-server example-config   print a settings file with every setting and its default
-  robosc-server health           query the health of the server that runs with these settings
-
-Each setting can also be set in the settings file (state_dir = "/var/lib/robosc-server") and by an environment variable
-({ENVIRONMENT_PREFIX}STATE_DIR). A flag overrides the environment, and the environment overrides the file. Sizes may
-have a unit: 64MiB. Addresses that other machines can reach need TLS. SIGTERM and SIGINT shut it down gracefully.
-
-exit status:
-  0  the server was stopped by a signal
-  1  the address, a certificate, the tokens, the database or the workers cannot be used
-  2  wrong options or settings
-"""
-
-
-def add_settings_arguments(parser: argparse.ArgumentParser) -> None:
-    """Add a flag for each setting, and `--config`."""
-    parser.add_argument(
-        "--config", type=Path, metavar="FILE", help=f"settings file in TOML (default: ${CONFIG_VARIABLE})"
-    )
-    groups: dict[str, Any] = {}
-    for name, field in Settings.model_fields.items():
-        group = groups.setdefault(group_of(name), None) or parser.add_argument_group(group_of(name))
-        groups[group_of(name)] = group
-        extra: Any = field.json_schema_extra
-        words = f"{description_of(name)} (default: {default_text(name)})".replace("%", "%%")
-        if field.annotation is bool:
-            group.add_argument(
-                flag_of(name), dest=name, action=argparse.BooleanOptionalAction, default=argparse.SUPPRESS, help=words
-            )
-        else:
-            metavar = extra["metavar"] or _metavar(name)
-            group.add_argument(flag_of(name), dest=name, default=argparse.SUPPRESS, metavar=metavar, help=words)
-
-
-def _metavar(name: str) -> str:
-    annotation = Settings.model_fields[name].annotation
-    if isinstance(annotation, type) and issubclass(annotation, StrEnum):
-        return "|".join(annotation)
-    return {"host": "HOST", "port": "PORT"}.get(name, "SECONDS" if name.endswith("_seconds") else "N")
-
-
-def settings_of(arguments: argparse.Namespace) -> Settings:
-    """Return the settings of parsed flags, the environment and the file.
-
-    Raises:
-        SettingsError: The settings cannot be used.
-    """
-    flags = {name: value for name, value in vars(arguments).items() if name in Settings.model_fields}
-    return settings_from(flags, config_file_of(arguments))
-
-
-def config_file_of(arguments: argparse.Namespace) -> Path | None:
-    """Return the path of the settings file; None: there is none."""
-    if arguments.config is not None:
-        return Path(arguments.config)
-    variable = os.environ.get(CONFIG_VARIABLE)
-    return Path(variable) if variable else None
-
-
-def make_parser() -> Parser:
-    """Return the parser of the command line that serves."""
-    parser = Parser(
-        prog="robosc-server",
-        description="Check models, synthesize supervisors and generate packages over gRPC.",
-        epilog=_EPILOG,
-        formatter_class=argparse.RawDescriptionHelpFormatter,
-        allow_abbrev=False,
-    )
-    parser.add_argument("--version", action="version", version=f"robosc-server {__version__}")
-    add_settings_arguments(parser)
-    return parser
-
-
-def load_settings(argv: Sequence[str] | None = None) -> Settings:
-    """Return the settings of a command line; ends the program with status 2 if they are wrong."""
-    try:
-        return settings_of(make_parser().parse_args(argv))
-    except SettingsError as error:
-        for problem in error.problems:
-            sys.stderr.write(f"robosc-server: {problem}\n")
-        raise SystemExit(2) from None

@@ -117,7 +117,7 @@ class OtlpTracing(Tracing):
     def _span(self, name: str, attributes: Attributes | None, kind: Any, parent: Any) -> Iterator[Any]:
         from opentelemetry.trace import Status, StatusCode
 
-        # Not with the exception itself, as is usual: its message may quote a model.
+        # The exception itself is not recorded, as is usual: its message may quote a model.
         with self._tracer.start_as_current_span(
             name,
             context=parent,

@@ -64,7 +64,7 @@ def open_store(
         try:
             url = make_url(database_url)
         except ArgumentError as error:
-            # Not the text itself: it may hold a password.
+            # The message does not have the URL, which may hold a password.
             raise StoreError(
                 "the database URL is invalid: it must have the form postgresql://USER:PASSWORD@HOST:PORT/NAME"
             ) from error
@@ -104,7 +104,7 @@ def _open_sqlite(given: Path) -> tuple[Database, tuple[Path, int]]:
     except OSError as error:
         raise StoreError(f"the database {given} cannot be used: {error.strerror}") from error
     try:
-        # Private, since it holds data of callers.
+        # The file is private, since it holds data of callers.
         os.close(os.open(path, os.O_RDWR | os.O_CREAT | os.O_CLOEXEC, 0o600))
         engine = create_engine(
             URL.create("sqlite+pysqlite", database=str(path)),
@@ -145,8 +145,8 @@ def _set_up_sqlite(connection: sqlite3.Connection, _record: Any) -> None:
     connection.isolation_level = None
     cursor = connection.cursor()
     cursor.execute(f"PRAGMA busy_timeout = {round(_BUSY_S * 1000)}")
-    # Before there is any table. Later it changes nothing, but is a transaction that writes all the same: a reader's
-    # connection could not be made while the disk is full, or while another connection writes.
+    # The setting has an effect only before there is any table. Later it is a transaction that writes all the same: a
+    # reader's connection could not be made while the disk is full, or while another connection writes.
     if cursor.execute("PRAGMA auto_vacuum").fetchone() != (_INCREMENTAL,):
         cursor.execute(f"PRAGMA auto_vacuum = {_INCREMENTAL}")
     for setting in (

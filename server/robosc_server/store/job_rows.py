@@ -49,7 +49,7 @@ _LOCK = select(JOBS).where(JOBS.c.id == bindparam("job")).with_for_update()
 _REQUEST = select(REQUESTS.c.content).where(REQUESTS.c.job == bindparam("of"))
 _INSERT_REQUEST = insert(REQUESTS)
 _DROP_REQUEST = delete(REQUESTS).where(REQUESTS.c.job == bindparam("of"))
-# Locked against being swept, where rows are: until a job refers to it.
+# The row is locked, where a database locks rows, so that it is not swept before a job refers to it.
 _LOCK_RESULT = select(RESULTS.c.key).where(RESULTS.c.key == bindparam("of"))
 _LOCK_RESULT = _LOCK_RESULT.with_for_update(read=True, key_share=True)
 _ACTIVE_IDS = select(JOBS.c.id).where(_IS_ACTIVE, JOBS.c.replica == bindparam("by"))
@@ -60,7 +60,7 @@ _NO_PROGRESS = {"stage": None, "progress": None}
 
 @cache
 def _change_of(names: tuple[str, ...]) -> Any:
-    """The statement that gives columns of a job new values."""
+    """Return the statement that gives columns of a job new values."""
     values: dict[str, Any] = {name: bindparam(f"new_{name}") for name in names}
     changed = update(JOBS).where(JOBS.c.id == bindparam("job"))
     return changed.values(revision=JOBS.c.revision + STEP, **values).returning(*JOBS.c)
@@ -180,7 +180,7 @@ def loads(connection: Connection, owner: str | None, since_us: int) -> list[Owne
 
 
 def _ended_by_owner(owner: str | None, since_us: int) -> Any:
-    """The number of jobs of each owner that have ended since a time.
+    """Return the query for the number of jobs of each owner that have ended since a time.
 
     It reads the index `jobs_ended` once for each owner and not all jobs: "Loose indexscan", wiki.postgresql.org.
     """

@@ -26,7 +26,7 @@ def insert_result(connection: Connection, key: str, kind: TaskKind, result: Resu
     """Store a result that was made for an owner, unless there is one with this key."""
     size = sum(map(len, result.messages))
     new = {"key": key, "kind": kind, "size": size, "used_us": now_us, "owner": owner}
-    # Not by the number of inserted rows: a driver may not know it, and say -1.
+    # The number of inserted rows would not tell: a driver may not know it, and say -1.
     if connection.scalar(_INSERT[connection.dialect.name], new) is not None:
         for number, block in enumerate(blocks_of(result.messages)):
             connection.execute(_INSERT_BLOCK, {"key": key, "number": number, "content": block})

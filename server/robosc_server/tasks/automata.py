@@ -47,7 +47,7 @@ class Automata:
         self._on_report = on_report
 
     def synthesis(self, *, is_modular: bool) -> pb.SynthesisResult:
-        """The supervisor, with all that is reported about it."""
+        """Return the supervisor, with all that is reported about it."""
         made = synthesize(self._model, self._options, is_modular=is_modular, on_progress=self._report)
         result = pb.SynthesisResult(**_result_fields(made))
         if made.statistics is not None:
@@ -56,7 +56,7 @@ class Automata:
             try:
                 content = made.supervisor.encode()
             except UnsupportedModelError as error:
-                # It is more than a supervisor's file can hold.
+                # The supervisor is more than a file can hold.
                 result.status, result.reason = pb.SYNTHESIS_STATUS_UNSUPPORTED_MODEL, str(error)
                 return result
             result.supervisor, result.supervisor_digest = content, hashlib.sha256(content).digest()
@@ -66,7 +66,7 @@ class Automata:
     def generation(
         self, target: str, choices: GenerateOptions, initial: str | None
     ) -> tuple[GeneratedFiles | None, dict[str, Any]]:
-        """The files of a target, or None, and the fields of the result.
+        """Return the files of a target, or None, and the fields of the result.
 
         Raises:
             RequestError: `initial` names a part that does not exist.
@@ -76,12 +76,12 @@ class Automata:
         return made.files, _result_fields(made)
 
     def exploration(self, maximum_states: int) -> tuple[Graph | None, dict[str, Any]]:
-        """The graph of the controlled system, or None, and the fields of the result."""
+        """Return the graph of the controlled system, or None, and the fields of the result."""
         made = explore(self._model, self._options, maximum_states=maximum_states, on_progress=self._report)
         return made.graph, _result_fields(made)
 
     def verification(self, maximum_states: int, *, is_strict: bool) -> pb.VerificationResult:
-        """The report about a supervisor that is made."""
+        """Return the report about a supervisor that is made."""
         found = verify(
             self._model,
             options=self._options,

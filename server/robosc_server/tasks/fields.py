@@ -90,7 +90,7 @@ def has_few_fields(content: bytes, nested: Nested, limit: int) -> bool:
 
 
 def _varint(content: bytes, place: int) -> tuple[int, int]:
-    """The number at a place, and the place behind it."""
+    """Return the number at a place, and the place behind it."""
     number = 0
     for shift in range(0, 7 * _VARINT_BYTES, 7):
         byte, place = content[place], place + 1

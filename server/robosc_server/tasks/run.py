@@ -214,7 +214,7 @@ def _automata(
     limits: TaskLimits,
     on_report: OnReport,
 ) -> Automata | None:
-    """The automata of a request; None: it is about a RoboSC model."""
+    """Return the automata of a request; None: it is about a RoboSC model."""
     model = from_proto.bundle(request.bundle)
     return Automata(model, request.options, limits.nodes, on_report) if isinstance(model, LoadedAutomata) else None
 
@@ -256,7 +256,7 @@ def _generate(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterat
 def _generated(
     request: pb.GenerateRequest, choices: GenerateOptions, limits: TaskLimits, on_report: OnReport
 ) -> tuple[GeneratedFiles | None, dict[str, Any]]:
-    """The files for a robot, or None, and the fields of the result."""
+    """Return the files for a robot, or None, and the fields of the result."""
     attempt = SynthesisAttempt()
     files: GeneratedFiles | None = None
     with attempt:
@@ -291,7 +291,7 @@ def _explore(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterato
 def _explored(
     request: pb.ExploreRequest, limits: TaskLimits, on_report: OnReport
 ) -> tuple[Graph | None, dict[str, Any]]:
-    """The graph of a robot under its supervisor, or None, and the fields of the result."""
+    """Return the graph of a robot under its supervisor, or None, and the fields of the result."""
     attempt = SynthesisAttempt()
     graph: Graph | None = None
     with attempt:

@@ -110,7 +110,7 @@ def _property_errors(request: pb.VerifyRequest, model: Model) -> pb.Verification
 
 
 def _properties(request: pb.VerifyRequest, model: Model) -> tuple[Property, ...]:
-    """The properties of a request.
+    """Return the properties of a request.
 
     Raises:
         LanguageError: They have errors.

@@ -98,7 +98,7 @@ class DaskWorkers:
             raise WorkersError(
                 "workers on a Dask cluster need the package distributed: pip install 'robosc[dask]'"
             ) from error
-        except OSError as error:  # It reads /proc, which a sandbox may hide.
+        except OSError as error:  # The package reads /proc, which a sandbox may hide.
             raise WorkersError(
                 f"workers on a Dask cluster need the package distributed, which cannot be loaded here: {error}"
             ) from error
@@ -172,7 +172,7 @@ class DaskWorkers:
     async def _run_once(
         self, task: Task, limits: TaskLimits, on_report: OnReport, on_cpu_time: OnCpuTime, events: _TaskEvents
     ) -> Outcome | None:
-        """The outcome of a task; None: workers were lost, and it has to be begun anew."""
+        """Return the outcome of a task; None: workers were lost, and it has to be begun anew."""
         from robosc_server.workers.dask_task import run_on_cluster
 
         client = self._client
@@ -340,7 +340,7 @@ class DaskWorkers:
             await asyncio.sleep(POLL_S)
 
     async def _check_worker(self, client: Any, address: str) -> tuple[str, str | None]:
-        """A worker's address, and why it cannot be used: empty if it can, None if it does not answer."""
+        """Return a worker's address, and why it cannot be used: empty if it can, None if it does not answer."""
         from robosc_server.workers.dask_task import mismatch, ready_version
 
         try:

@@ -98,7 +98,7 @@ class RecentOomKills:
         self._until_s = -math.inf
 
     def __call__(self) -> int:
-        """The number."""
+        """Return the number."""
         if self._clock() >= self._until_s:
             self._known, self._until_s = self._count(), self._clock() + _REMEMBERED_S
         return self._known

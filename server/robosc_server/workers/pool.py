@@ -91,7 +91,7 @@ class WorkerPool:
             await asyncio.gather(self._restarter, return_exceptions=True)
         self._changed.set()
         while self._terminations:
-            # Not `gather`: it returns at once if all tasks are done, before their callbacks remove them from the set.
+            # `gather` would return at once if all tasks are done, before their callbacks remove them from the set.
             await asyncio.wait(self._terminations)
 
     @property
@@ -244,8 +244,8 @@ class WorkerPool:
         packet_values = json.loads(packet)
         match packet_values["is"]:
             case "worker" if len(descriptors) < _DESCRIPTORS:
-                # No descriptors were available. A worker without its connection exits by itself; request another one
-                # later.
+                # Descriptors were missing. A worker without its connection exits by itself, and another one is
+                # requested later.
                 for number in descriptors:
                     os.close(number)
                 self.fault = "this process has reached its limit of open files"

@@ -106,7 +106,7 @@ class WorkerProcess:
 
     async def _failure(self, limits: TaskLimits, kills: int) -> Failure:
         """Return the reason why the connection ended before an answer was whole."""
-        self.kill()  # It has closed the connection, but may still be running.
+        self.kill()  # The process has closed the connection, but may still be running.
         try:
             async with asyncio.timeout(_EXIT_S):
                 end = await asyncio.shield(self.exit)

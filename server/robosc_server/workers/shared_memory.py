@@ -78,7 +78,7 @@ def join_pages() -> int:
 
 
 def _huge_pages_of(mapping: str) -> tuple[int, int]:
-    """The addresses of a mapping (proc_pid_maps(5)) between which huge pages fit; equal if there are none."""
+    """Return the addresses of a mapping (proc_pid_maps(5)) between which huge pages fit; equal if there are none."""
     addresses, permissions, _, _, inode, *name = mapping.split(maxsplit=5)
     if permissions != "rw-p" or inode != "0" or name not in ([], [_HEAP]):
         return 0, 0

@@ -19,8 +19,9 @@ from robosc_api.security import Quota, Scope, TokenFile, make_token
 from robosc_api.security.tokens import parse_tokens, read_time
 from robosc_server.operations import config_check
 from robosc_server.operations.commands import run_command
-from robosc_server.operations.settings import Settings, settings_from, variable_of
+from robosc_server.operations.settings import Settings
 from robosc_server.operations.settings_reference import example_file
+from robosc_server.operations.settings_sources import settings_from, variable_of
 from robosc_server.store import StoreError, open_store
 from robosc_server.store.factory import DATABASE_FILE
 from robosc_server.store.migrate import latest_version

@@ -6,7 +6,8 @@ from pathlib import Path
 from prometheus_client.parser import text_string_to_metric_families
 
 from robosc_server.operations.metrics import Metrics
-from robosc_server.operations.settings import Settings, default_text, description_of, flag_of, group_of, variable_of
+from robosc_server.operations.settings import Settings, default_text, description_of, group_of
+from robosc_server.operations.settings_sources import flag_of, variable_of
 
 PAGE = (Path(__file__).parents[3] / "docs" / "server.md").read_text("utf-8")
 

@@ -5,15 +5,12 @@ from pathlib import Path
 import pytest
 
 from robosc_api.security import ServerSecurity
-from robosc_server.operations.settings import (
+from robosc_server.operations.settings import Settings, default_text, description_of, format_value
+from robosc_server.operations.settings_sources import (
     ENVIRONMENT_PREFIX,
     MAXIMUM_FILE_BYTES,
-    Settings,
     SettingsError,
-    default_text,
-    description_of,
     flag_of,
-    format_value,
     load_settings,
     read_file,
     variable_of,

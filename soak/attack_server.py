@@ -4,36 +4,44 @@
     python soak/attack_server.py --seconds 10 --envoy .venv-checkers/bin/envoy
 
 Each attack has a server of its own, started by this program, and ends after the given seconds. The attackers are
-processes that write raw HTTP/2 (RFC 9113) over sockets and have no token. The client is a real one, which checks a
-small model every ten milliseconds. The table has, for each attack, the calls of the client, how many of them failed,
-their median, their 99th percentile and the worst one, and the most memory that the server (and Envoy) took.
+processes that write raw HTTP/2 (RFC 9113) over sockets, have no token, and call from another loopback address than the
+client. The client is a real one, which checks a small model every ten milliseconds. The table has, for each attack, the
+calls of the client, how many of them failed, their median, their 99th percentile and the worst one, and the most memory
+that the server (and Envoy) took.
 
-With `--envoy`, the server listens on a Unix socket and everything comes through Envoy, with the limits of `deploy/`.
+With `--envoy`, the server listens on a Unix socket and everything comes through Envoy, with the limits of `deploy/`;
+each of the two addresses is a caller. Callers have TLS only under the attacks on TLS.
 
 Exit status: 0 all limits are held, 1 some are not, 2 wrong use.
 """
 
 import argparse
 import contextlib
+import gzip
 import json
 import multiprocessing
 import resource
 import signal
 import socket
+import ssl
 import struct
 import subprocess
 import sys
 import tempfile
 import time
 from collections import deque
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
+from functools import cache
 from pathlib import Path
 from typing import Any
 
 import yaml
 
 ROOT = Path(__file__).parents[1]
+sys.path[:0] = [str(ROOT / "tests")]
+
+from support.certificates import Authority  # noqa: E402
 
 PREFACE = b"PRI * HTTP/2.0\r\n\r\nSM\r\n\r\n"
 DATA, HEADERS, RST_STREAM, SETTINGS, PING, WINDOW_UPDATE, CONTINUATION = 0, 1, 3, 4, 6, 8, 9
@@ -44,6 +52,9 @@ MODEL = "robot lamp {\n}\n"
 
 P99_S, MEMORY_BYTES = 0.2, 300 * 2**20
 """Limits that the server is to hold: the client's 99th percentile, and the server's memory."""
+
+ATTACKER = "127.0.0.2"
+"""Address from which attacks come: another host, and so another caller, than that of the client."""
 
 CALL_EVERY_S = 0.01
 DEADLINE_S = 20.0
@@ -59,11 +70,11 @@ def literal(name: bytes, value: bytes) -> bytes:
     return b"\x00" + bytes([len(name)]) + name + bytes([len(value)]) + value
 
 
-def call_headers(path: bytes = CHECK_PATH) -> bytes:
-    """The header block of a call of gRPC."""
+def call_headers(path: bytes = CHECK_PATH, more: Mapping[bytes, bytes] | None = None) -> bytes:
+    """The header block of a call of gRPC, with more metadata."""
     fields = {b":method": b"POST", b":scheme": b"http", b":path": path, b":authority": b"localhost"}
     fields |= {b"te": b"trailers", b"content-type": b"application/grpc"}
-    return b"".join(literal(name, value) for name, value in fields.items())
+    return b"".join(literal(name, value) for name, value in (fields | dict(more or {})).items())
 
 
 class Deadline:
@@ -78,20 +89,22 @@ class Deadline:
 
 def connected(port: int, *, is_greeting: bool = True) -> socket.socket:
     """A connection to the server on this machine, with the beginning of HTTP/2."""
-    line = socket.create_connection(("127.0.0.1", port), timeout=5)
+    line = socket.create_connection(("127.0.0.1", port), timeout=5, source_address=(ATTACKER, 0))
     if is_greeting:
         line.sendall(PREFACE + frame(SETTINGS, 0, 0))
     return line
 
 
-def flooded(port: int, deadline: Deadline, first: bytes, chunk: bytes, connections: int = 1) -> None:
+def flooded(
+    port: int, deadline: Deadline, first: bytes, chunk: bytes, connections: int = 1, *, is_greeting: bool = True
+) -> None:
     """Send chunks on some connections for as long as the other end takes them, and connect again when it does not."""
     lines: list[socket.socket | None] = [None] * connections
     while deadline:
         for number, line in enumerate(lines):
             try:
                 if line is None:
-                    line = lines[number] = connected(port)
+                    line = lines[number] = connected(port, is_greeting=is_greeting)
                     line.sendall(first)
                     line.setblocking(False)  # named by the library
                 with contextlib.suppress(BlockingIOError):
@@ -254,6 +267,119 @@ def unread_pings(port: int, deadline: Deadline) -> None:
     flooded_with_calls(port, deadline, lambda stream: frame(PING, 0, 0, b"12345678"), at_once=1000, is_read=False)
 
 
+def unread_answers(port: int, deadline: Deadline) -> None:
+    """Calls of ListTargets whose answers are not read, on four connections."""
+    headers = call_headers(b"/robosc_api.v1.SynthesisService/ListTargets")
+    flooded_with_calls(
+        port,
+        deadline,
+        lambda stream: frame(HEADERS, END_HEADERS, stream, headers) + frame(DATA, END_STREAM, stream, bytes(5)),
+        is_read=False,
+    )
+
+
+def compressed(port: int, deadline: Deadline) -> None:
+    """Calls whose request of 0.6 kB is 0.5 MB when it is unpacked, on four connections."""
+    from robosc_api.v1 import synthesis_pb2
+
+    file = synthesis_pb2.SourceFile(name="a.rscd", text="// " + "v" * 500_000 + "\n" + MODEL)
+    packed = gzip.compress(synthesis_pb2.FormatRequest(file=file).SerializeToString())
+    headers = call_headers(b"/robosc_api.v1.SynthesisService/Format", {b"grpc-encoding": b"gzip"})
+    message = b"\1" + struct.pack(">I", len(packed)) + packed
+    flooded_with_calls(
+        port,
+        deadline,
+        lambda stream: frame(HEADERS, END_HEADERS, stream, headers) + frame(DATA, END_STREAM, stream, message),
+        at_once=10,
+    )
+
+
+def slow_readers(port: int, deadline: Deadline) -> None:
+    """Calls whose answers of 0.5 MB are read at 20 kB a second, 90 on each of ten connections."""
+    from robosc_api.v1 import synthesis_pb2
+
+    file = synthesis_pb2.SourceFile(name="a.rscd", text=many_states(9))
+    request = synthesis_pb2.ExploreRequest(bundle=synthesis_pb2.Bundle(main=file)).SerializeToString()
+    headers = call_headers(b"/robosc_api.v1.SynthesisService/Explore")
+    message = b"\0" + struct.pack(">I", len(request)) + request
+    # The windows of HTTP/2 are as large as can be: whatever holds the answers, it is the server or Envoy.
+    wide = frame(SETTINGS, 0, 0, struct.pack(">HI", 4, 2**31 - 1))
+    wide += frame(WINDOW_UPDATE, 0, 0, struct.pack(">I", 2**31 - 2**16))
+    lines: list[socket.socket] = []
+    while deadline:
+        with contextlib.suppress(OSError):
+            if len(lines) < 10:
+                lines.append(connected(port))
+                lines[-1].sendall(
+                    wide
+                    + b"".join(
+                        frame(HEADERS, END_HEADERS, stream, headers) + frame(DATA, END_STREAM, stream, message)
+                        for stream in range(1, 181, 2)
+                    )
+                )
+        for line in lines:
+            with contextlib.suppress(OSError):
+                line.recv(1000, socket.MSG_DONTWAIT)
+        time.sleep(0.05)
+
+
+def many_states(components: int) -> str:
+    """A robot with twice as many states for each further component."""
+    component = """component c{0} {{
+        outgoing message m{0} with identifier: "/m{0}", type: boolean
+        behaviour {{
+            initial marked state a {{ on response from m{0} goto b }}
+            marked state b {{ on response from m{0} goto a }}
+        }}
+    }}
+    """
+    return "robot lamp {\n" + "".join(map(component.format, range(components))) + "}\n"
+
+
+def many_fields(port: int, deadline: Deadline) -> None:
+    """Calls with 150 fields of metadata."""
+    headers = call_headers(more={b"x-%03d" % number: b"v" for number in range(150)})
+    flooded_with_calls(
+        port,
+        deadline,
+        lambda stream: frame(HEADERS, END_HEADERS, stream, headers) + frame(DATA, END_STREAM, stream, bytes(5)),
+    )
+
+
+def tls_endless(port: int, deadline: Deadline) -> None:
+    """Hellos of TLS of 16 MB, on 200 connections."""
+    record = struct.pack(">BHH", 22, 0x0301, FRAME_BYTES)
+    first = record + b"\x01\xff\xff\xff" + bytes(FRAME_BYTES - 4)
+    flooded(port, deadline, first, record + bytes(FRAME_BYTES), connections=200, is_greeting=False)
+
+
+def tls_slow(port: int, deadline: Deadline) -> None:
+    """1,300 connections that send a byte of a hello of TLS now and then."""
+    _held(port, deadline, 1300, hello())
+
+
+def tls_hellos(port: int, deadline: Deadline) -> None:
+    """Hellos of TLS on new connections whose answers are not read, as fast as this machine makes them."""
+    lines: deque[socket.socket] = deque()
+    while deadline:
+        with contextlib.suppress(OSError):
+            lines.append(connected(port, is_greeting=False))
+            lines[-1].sendall(hello())
+        if len(lines) > 200:
+            lines.popleft().close()
+
+
+@cache
+def hello() -> bytes:
+    """The first message of a client of TLS that speaks HTTP/2."""
+    context = ssl.create_default_context()
+    context.set_alpn_protocols(["h2"])
+    sent = ssl.MemoryBIO()
+    with contextlib.suppress(ssl.SSLWantReadError):
+        context.wrap_bio(ssl.MemoryBIO(), sent, server_hostname="localhost").do_handshake()
+    return sent.read()
+
+
 def half_closed(port: int, deadline: Deadline) -> None:
     """Connections that begin twenty calls and close their own half."""
     calls = b"".join(frame(HEADERS, END_HEADERS, stream, call_headers()) for stream in range(1, 41, 2))
@@ -269,15 +395,16 @@ def half_closed(port: int, deadline: Deadline) -> None:
 
 def idle(port: int, deadline: Deadline) -> None:
     """1,300 connections without a call, each made again when it is closed."""
-    _held(port, deadline, 1300, is_greeting=True)
+    _held(port, deadline, 1300)
 
 
 def slow(port: int, deadline: Deadline) -> None:
     """1,300 connections that send a byte of the beginning now and then."""
-    _held(port, deadline, 1300, is_greeting=False)
+    _held(port, deadline, 1300, PREFACE)
 
 
-def _held(port: int, deadline: Deadline, count: int, *, is_greeting: bool) -> None:
+def _held(port: int, deadline: Deadline, count: int, dripped: bytes = b"") -> None:
+    """Hold connections that send a byte of a text now and then; without one, they begin HTTP/2 and are silent."""
     lines: list[socket.socket | None] = [None] * count
     sent = 0
     while deadline:
@@ -286,10 +413,10 @@ def _held(port: int, deadline: Deadline, count: int, *, is_greeting: bool) -> No
                 return
             try:
                 if line is None:
-                    lines[number] = line = connected(port, is_greeting=is_greeting)
+                    lines[number] = line = connected(port, is_greeting=not dripped)
                     line.setblocking(False)
-                elif not is_greeting and sent < len(PREFACE):
-                    line.send(PREFACE[sent : sent + 1])
+                elif sent < len(dripped):
+                    line.send(dripped[sent : sent + 1])
                 with contextlib.suppress(BlockingIOError):
                     if not line.recv(65536):
                         raise ConnectionResetError
@@ -304,14 +431,23 @@ def _held(port: int, deadline: Deadline, count: int, *, is_greeting: bool) -> No
 def silent_calls(port: int, deadline: Deadline) -> None:
     """Calls whose request never comes: 90 on each of 20 connections."""
     headers = call_headers()
+    _waiting(port, deadline, lambda stream: frame(HEADERS, END_HEADERS, stream, headers))
+
+
+def half_sent(port: int, deadline: Deadline) -> None:
+    """Calls that announce a request of 4 MB and send 500 bytes of it: 90 on each of 20 connections."""
+    headers, part = call_headers(), b"\0" + struct.pack(">I", 4 * 2**20) + bytes(500)
+    _waiting(port, deadline, lambda stream: frame(HEADERS, END_HEADERS, stream, headers) + frame(DATA, 0, stream, part))
+
+
+def _waiting(port: int, deadline: Deadline, call: Callable[[int], bytes]) -> None:
+    """Begin 90 calls on each of 20 connections, and hold them."""
     lines: list[socket.socket] = []
     while deadline:
-        try:
+        with contextlib.suppress(OSError):
             if len(lines) < 20:
                 lines.append(connected(port))
-                lines[-1].sendall(b"".join(frame(HEADERS, END_HEADERS, number, headers) for number in range(1, 181, 2)))
-        except OSError:
-            pass
+                lines[-1].sendall(b"".join(map(call, range(1, 181, 2))))
         time.sleep(0.05)
 
 
@@ -358,7 +494,18 @@ ATTACKS: dict[str, Callable[[int, Deadline], None]] = {
     "many-messages": many_messages,
     "unread-pings": unread_pings,
     "half-closed": half_closed,
+    "half-sent": half_sent,
+    "unread-answers": unread_answers,
+    "slow-readers": slow_readers,
+    "compressed": compressed,
+    "many-fields": many_fields,
+    "tls-endless": tls_endless,
+    "tls-slow": tls_slow,
+    "tls-hellos": tls_hellos,
 }
+
+OVER_TLS = ("tls-endless", "tls-slow", "tls-hellos")
+"""Attacks on a port with TLS."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -415,11 +562,36 @@ def ended(process: "subprocess.Popen[str]") -> Iterator["subprocess.Popen[str]"]
             process.wait()
 
 
+@dataclass(frozen=True, slots=True)
+class Target:
+    """A server that runs.
+
+    Attributes:
+        port: Port for callers.
+        process: Process of the server.
+        door: Process of Envoy; 0: there is none.
+        secrets: Certificate authority, and certificate and key of a client; empty: without TLS.
+    """
+
+    port: int
+    process: int
+    door: int
+    secrets: tuple[Path, ...]
+
+
 @contextlib.contextmanager
-def running(server: Sequence[str], envoy: str | None) -> Iterator[tuple[int, int, int]]:
-    """Run a server; yield the port for callers, the server's process and Envoy's, 0 if there is none."""
+def running(server: Sequence[str], envoy: str | None, *, is_secure: bool = False) -> Iterator[Target]:
+    """Run a server, perhaps behind Envoy, and with TLS for callers."""
     with tempfile.TemporaryDirectory(prefix="robosc-attack-") as folder, contextlib.ExitStack() as stack:
+        secrets: tuple[Path, ...] = ()
         where = ["--port", "0"] if envoy is None else ["--socket", f"{folder}/server.socket", "--forwarded-identity"]
+        if is_secure:
+            authority = Authority(Path(folder))
+            own = authority.sign("server")
+            secrets = authority.file, *authority.sign("client")
+            secrets[-1].chmod(0o600)
+            if envoy is None:
+                where += ["--tls-certificate", str(own[0]), "--tls-key", str(own[1])]
         words = [*server, *where, "--state-dir", folder, "--log-level", "warning", "--drain-seconds", "0"]
         log = stack.enter_context((Path(folder) / "log").open("w", encoding="utf-8"))
         process = stack.enter_context(
@@ -439,27 +611,36 @@ def running(server: Sequence[str], envoy: str | None) -> Iterator[tuple[int, int
             raise SystemExit(f"attack_server.py: the server did not start: {(Path(folder) / 'log').read_text()}")
         address = line.split(";")[0].split()[-1]
         if envoy is None:
-            yield int(address.rpartition(":")[2]), process.pid, 0
+            yield Target(int(address.rpartition(":")[2]), process.pid, 0, secrets)
             return
         door_port = free_port()
         file = Path(folder) / "envoy.yaml"
-        file.write_text(json.dumps(door_settings(door_port, Path(folder))), encoding="utf-8")
+        file.write_text(json.dumps(door_settings(door_port, Path(folder), is_secure=is_secure)), encoding="utf-8")
         words = [envoy, "-c", str(file), "--log-level", "error", "--concurrency", "2", "--base-id", str(process.pid)]
         door = stack.enter_context(ended(subprocess.Popen(words, stdout=log, stderr=log, text=True)))
         wait_for_door(door_port)
-        yield door_port, process.pid, door.pid
+        yield Target(door_port, process.pid, door.pid, secrets)
 
 
-def door_settings(port: int, folder: Path) -> dict[str, Any]:
-    """Settings of Envoy as in `deploy/envoy/mtls.yaml`, without TLS, so that raw bytes reach it, and for one caller."""
+def door_settings(port: int, folder: Path, *, is_secure: bool) -> dict[str, Any]:
+    """Settings of Envoy as in `deploy/envoy/mtls.yaml`; without TLS, raw bytes reach it, and hosts are callers."""
     settings: dict[str, Any] = yaml.safe_load((ROOT / "deploy" / "envoy" / "mtls.yaml").read_text(encoding="utf-8"))
     settings["admin"]["address"]["pipe"]["path"] = str(folder / "admin.socket")
     (listener,) = settings["static_resources"]["listeners"]
     listener["address"]["socket_address"] = {"address": "127.0.0.1", "port_value": port}
     (chain,) = listener["filter_chains"]
-    del chain["transport_socket"]
-    (host,) = chain["filters"][-1]["typed_config"]["route_config"]["virtual_hosts"]
-    host["routes"][-1]["request_headers_to_add"][0]["header"]["value"] = "somebody"
+    if is_secure:
+        context = chain["transport_socket"]["typed_config"]["common_tls_context"]
+        context["tls_certificates"][0]["certificate_chain"]["filename"] = str(folder / "server.crt")
+        context["tls_certificates"][0]["private_key"]["filename"] = str(folder / "server.key")
+        context["validation_context"]["trusted_ca"]["filename"] = str(folder / "authority.pem")
+    else:
+        del chain["transport_socket"]
+    (early,) = chain["filters"][-1]["typed_config"]["early_header_mutation_extensions"]
+    for mutation in early["typed_config"]["mutations"]:
+        header = mutation.get("append", {}).get("header", {})
+        if header.get("key") == "x-robosc-caller" and not is_secure:
+            header["value"] = "%DOWNSTREAM_REMOTE_ADDRESS_WITHOUT_PORT%"
     (cluster,) = settings["static_resources"]["clusters"]
     (endpoints,) = cluster["load_assignment"]["endpoints"]
     endpoints["lb_endpoints"][0]["endpoint"]["address"]["pipe"]["path"] = str(folder / "server.socket")
@@ -483,15 +664,18 @@ def wait_for_door(port: int) -> None:
     raise SystemExit("attack_server.py: Envoy does not listen")
 
 
-def call_until(stop: float, port: int) -> tuple[list[float], list[str]]:
+def call_until(stop: float, target: Target) -> tuple[list[float], list[str]]:
     """Times of the calls of a well-behaved client until a time, and the messages of those that failed."""
     from robosc import load
+    from robosc_api.security import Credentials
     from robosc_client import Client, ClientError
 
     times: list[float] = []
     failures: list[str] = []
     model = load(text=MODEL)
-    with Client(f"127.0.0.1:{port}") as client:
+    ca, certificate, key = target.secrets or (None, None, None)
+    credentials = Credentials(ca=ca, certificate=certificate, key=key)
+    with Client(f"127.0.0.1:{target.port}", credentials) as client:
         while (begun := time.monotonic()) < stop:
             try:
                 client.check(model, deadline_s=DEADLINE_S)
@@ -504,16 +688,16 @@ def call_until(stop: float, port: int) -> tuple[list[float], list[str]]:
 
 def attacked(name: str, seconds: float, server: Sequence[str], envoy: str | None) -> Row:
     """Run one attack."""
-    with running(server, envoy) as (port, process, door):
-        call_until(time.monotonic() + 0.5, port)
+    with running(server, envoy, is_secure=name in OVER_TLS) as target:
+        call_until(time.monotonic() + 0.5, target)
         attacker = multiprocessing.get_context("fork").Process(
-            target=ATTACKS[name], args=(port, Deadline(seconds)), daemon=True
+            target=ATTACKS[name], args=(target.port, Deadline(seconds)), daemon=True
         )
         attacker.start()
-        times, failures = call_until(time.monotonic() + seconds, port)
+        times, failures = call_until(time.monotonic() + seconds, target)
         attacker.join(5)
         attacker.kill()
-        memory, door_memory = most_memory(process), most_memory(door) if door else 0
+        memory, door_memory = most_memory(target.process), most_memory(target.door) if target.door else 0
     times.sort()
     return Row(
         name,

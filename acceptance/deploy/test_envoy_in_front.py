@@ -20,6 +20,7 @@ import grpc
 import pytest
 from cryptography.hazmat.primitives import hashes
 from cryptography.hazmat.primitives.asymmetric import padding, rsa
+from grpc_health.v1 import health_pb2, health_pb2_grpc
 
 from support.certificates import Authority
 from support.checkers import found
@@ -32,6 +33,15 @@ from support.waiting import PATIENCE_S, wait_until
 ENVOY = TOP / "deploy" / "envoy"
 KEY = rsa.generate_private_key(public_exponent=65537, key_size=2048)
 _CALLS = 5
+CALLS_OF_SERVER = "cluster.server.upstream_rq_total"
+FOUR_CALLS = (
+    "{max_tokens: 1000, tokens_per_fill: 200, fill_interval: 1s}",
+    "{max_tokens: 4, tokens_per_fill: 1, fill_interval: 3600s}",
+)
+TWO_PROBES = (
+    "{max_tokens: 100, tokens_per_fill: 20, fill_interval: 1s}",
+    "{max_tokens: 2, tokens_per_fill: 1, fill_interval: 3600s}",
+)
 SPOOFED = (("x-robosc-caller", "root"), ("x-robosc-scopes", "synthesize admin"))
 
 
@@ -43,8 +53,8 @@ def folder() -> Iterator[Path]:
 
 
 @contextmanager
-def behind_envoy(name: str, folder: Path, authority: Authority) -> Iterator[str]:
-    """Run a server behind Envoy; yield the address for callers."""
+def behind_envoy(name: str, folder: Path, authority: Authority, *smaller: tuple[str, str]) -> Iterator[str]:
+    """Run a server behind Envoy, with some smaller limits; yield the address for callers."""
     certificate, key = authority.sign("localhost")
     (folder / "jwks.json").write_text(json.dumps({"keys": [_public()]}))
     with socket.create_server(("127.0.0.1", 0)) as place:
@@ -60,6 +70,9 @@ def behind_envoy(name: str, folder: Path, authority: Authority) -> Iterator[str]
         "address: 0.0.0.0, port_value: 50051": f"address: 127.0.0.1, port_value: {port}",
     }.items():
         text = text.replace(str(old), str(new))
+    for usual, other in smaller:
+        assert usual in text
+        text = text.replace(usual, other)
     file = folder / name
     file.write_text(text, encoding="utf-8")
     words = [found("envoy"), "-c", str(file), "--log-level", "error", "--concurrency", "1"]
@@ -122,6 +135,52 @@ def test_callers_with_tokens_of_an_identity_provider(folder: Path) -> None:
         assert list_jobs(address, authority, _bearer(), *SPOOFED) == "UNAUTHENTICATED"
 
 
+def test_a_caller_has_its_calls_on_all_its_connections(folder: Path) -> None:
+    authority = Authority(folder)
+    anna, berta = authority.sign("anna"), authority.sign("berta")
+    with behind_envoy("mtls.yaml", folder, authority, FOUR_CALLS) as address:
+        statuses = [list_jobs(address, authority, *SPOOFED, certificate=anna) for _ in range(5)]
+        assert statuses == ["OK"] * 4 + ["RESOURCE_EXHAUSTED"]
+        assert list_jobs(address, authority, certificate=berta) == "OK"
+
+
+def test_a_holder_of_tokens_has_its_calls_on_all_its_connections(folder: Path) -> None:
+    authority = Authority(folder)
+    with behind_envoy("jwt.yaml", folder, authority, FOUR_CALLS, TWO_PROBES) as address:
+        tokens = [_bearer(scope="synthesize", exp=int(time.time()) + 3600 + number) for number in range(5)]
+        statuses = [list_jobs(address, authority, token) for token in tokens]
+        assert statuses == ["OK"] * 4 + ["RESOURCE_EXHAUSTED"]
+        assert [_health(address, authority) for _ in range(3)] == ["OK"] * 2 + ["RESOURCE_EXHAUSTED"]
+        # Those whose token is refused, and those without one, use up nobody's calls.
+        assert list_jobs(address, authority, *SPOOFED) == "UNAUTHENTICATED"
+        assert list_jobs(address, authority, _bearer(scope="synthesize", sub="berta")) == "OK"
+
+
+def test_calls_of_a_connection_that_ends_reach_no_server(folder: Path) -> None:
+    """One of the calls that arrive together with the end of their connection is begun."""
+    authority = Authority(folder)
+    anna = authority.sign("anna")
+    with behind_envoy("mtls.yaml", folder, authority) as address:
+        with _line(address, authority, anna) as line:
+            calls = [
+                frame(
+                    HEADERS, END_OF_HEADERS | END_OF_STREAM, stream, headers("/robosc_api.v1.JobService/ListJobs", {})
+                )
+                for stream in range(1, 2 * _CALLS, 2)
+            ]
+            line.sendall(b"".join(calls))
+            assert _ended(line) == _CALLS
+        assert _statistic(folder, CALLS_OF_SERVER) == _CALLS
+        with _line(address, authority, anna) as line:
+            # The end leaves in one packet with what was sent before.
+            line.setsockopt(socket.IPPROTO_TCP, socket.TCP_CORK, 1)
+            line.sendall(b"".join(calls))
+            line.shutdown(socket.SHUT_RDWR)
+        wait_until(lambda: _statistic(folder, "http.callers.downstream_rq_total") == 2 * _CALLS)
+        wait_until(lambda: _statistic(folder, "http.callers.downstream_cx_active") == 0)
+        assert _statistic(folder, CALLS_OF_SERVER) <= _CALLS + 1
+
+
 @pytest.mark.parametrize("wrong", ["abc", "", "999999999999S"])
 def test_a_wrong_deadline_harms_no_calls_of_others(wrong: str, folder: Path) -> None:
     """Calls of all callers share connections from Envoy to a server, in which gRPC keeps fields of earlier calls."""
@@ -136,6 +195,26 @@ def test_a_wrong_deadline_harms_no_calls_of_others(wrong: str, folder: Path) -> 
             assert _ended(line) == _CALLS
         statuses = [list_jobs(address, authority, certificate=anna) for _ in range(5)]
         assert statuses == ["OK"] * 5
+
+
+def _statistic(folder: Path, name: str) -> int:
+    """Return a counter of Envoy; 0 if it has not counted yet."""
+    with socket.socket(socket.AF_UNIX) as line:
+        line.settimeout(PATIENCE_S)
+        line.connect(str(folder / "admin.socket"))
+        line.sendall(f"GET /stats?filter=^{name}$ HTTP/1.1\r\nHost: envoy\r\nConnection: close\r\n\r\n".encode())
+        text = b"".join(iter(lambda: line.recv(65536), b"")).decode()
+    return sum(int(row.rpartition(": ")[2]) for row in text.splitlines() if row.startswith(f"{name}: "))
+
+
+def _health(address: str, authority: Authority) -> str:
+    """Return the status of a health check without a token."""
+    with grpc.secure_channel(address, grpc.ssl_channel_credentials(authority.file.read_bytes())) as channel:
+        try:
+            health_pb2_grpc.HealthStub(channel).Check(health_pb2.HealthCheckRequest(), timeout=PATIENCE_S)
+        except grpc.RpcError as error:
+            return str(error.code().name)
+    return "OK"
 
 
 def _ended(line: ssl.SSLSocket) -> int:

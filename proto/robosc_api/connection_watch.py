@@ -241,6 +241,8 @@ class ConnectionWatch:
 
     Attributes:
         closed: Number of closed connections, by reason, each of which is there.
+        barred: Number of hosts whose new connections the kernel keeps away now.
+        times_barred: Number of times that the kernel began to keep those of a host away.
     """
 
     def __init__(
@@ -269,6 +271,7 @@ class ConnectionWatch:
         self._end = threading.Event()
         self._thread = threading.Thread(target=self._run, name="connection watch", daemon=True)
         self.closed: Counter[CloseReason] = Counter(dict.fromkeys(CloseReason, 0))
+        self.barred = self.times_barred = 0
 
     def __enter__(self) -> Self:
         if can_watch():
@@ -309,10 +312,15 @@ class ConnectionWatch:
 
     def _bar(self, hosts: frozenset[str]) -> None:
         """Keep new connections of these hosts away, and of no others."""
-        if hosts - self._barred:
+        added = hosts - self._barred
+        if added:
             _log.warning("after floods, new connections are late from %s", ", ".join(sorted(hosts)[:_NAMED_HOSTS]))
         self._barred = hosts
-        if not self._sockets.bar(hosts):
+        if self._sockets.bar(hosts):
+            self.barred = len(hosts)
+            self.times_barred += len(added)
+        else:
+            self.barred = 0
             _log.warning("the kernel takes no filter of connections: hosts that flood connect again at once")
 
     def _run(self) -> None:

@@ -261,7 +261,9 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     if settings.socket is None:
         limits = ConnectionLimits(connections=connections, request_bytes=request_limits.submission_bytes)
         watch = stack.enter_context(ConnectionWatch(split_address(address)[1], limits, arrivals, bars=_is_elsewhere))
-        metrics.set_sources(closed=lambda: watch.closed)
+        metrics.set_sources(
+            closed=lambda: watch.closed, barred=lambda: watch.barred, times_barred=lambda: watch.times_barred
+        )
     stack.push_async_callback(end)
     return address
 

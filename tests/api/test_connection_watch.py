@@ -367,13 +367,16 @@ def test_a_host_that_floods_again_and_again_connects_late_and_present_connection
             watch = ConnectionWatch(port, limits, arrivals, bars=lambda host: True, clock=lambda: now_s[0])
             for _ in range(3):
                 assert not is_late(port, "127.0.0.1")
+                assert (watch.barred, watch.times_barred) == (0, 0)
                 await asyncio.to_thread(endless_headers, port, watch.look)
             assert is_late(port, "127.0.0.1")
+            assert (watch.barred, watch.times_barred) == (1, 1)
             assert not is_late(port, "127.0.0.2")
             assert (await call(channel, b"after")).answer == b"after"
             now_s[0] = 6.0
             await asyncio.to_thread(watch.look)
             assert not is_late(port, "127.0.0.1")
+            assert (watch.barred, watch.times_barred) == (0, 1)
 
     asyncio.run(flooded())
     assert [record.getMessage() for record in caplog.records if "late" in record.getMessage()] == [

@@ -45,7 +45,9 @@ def test_what_arrives_is_bounded(name: str) -> None:
     http2 = manager["http2_protocol_options"]
     assert http2["max_concurrent_streams"] <= 100
     assert http2["max_consecutive_inbound_frames_with_empty_payload"] == 1
-    assert "token_bucket" in manager["http_filters"][0]["typed_config"]
+    assert settings["layered_runtime"]["layers"][0]["static_layer"]["http"]["max_requests_per_io_cycle"] == 1
+    (listener,) = settings["static_resources"]["listeners"]
+    assert listener["max_connections_to_accept_per_socket_event"] == 1
     monitors = {monitor["name"] for monitor in settings["overload_manager"]["resource_monitors"]}
     assert {
         "envoy.resource_monitors.fixed_heap",
@@ -54,10 +56,33 @@ def test_what_arrives_is_bounded(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", FILES)
+def test_calls_are_bounded_by_connection_and_by_caller(name: str) -> None:
+    """No client that behaves uses up the calls of others, and none needs several connections for a burst of watches."""
+    filters = manager_of(read(name))["http_filters"]
+    by_connection, by_caller = (
+        found["typed_config"] for found in filters if found["name"] == "envoy.filters.http.local_ratelimit"
+    )
+    assert filters[0]["typed_config"] is by_connection and filters[-2]["typed_config"] is by_caller
+    assert by_connection["local_rate_limit_per_downstream_connection"] is True
+    assert "local_rate_limit_per_downstream_connection" not in by_caller
+    assert by_caller["rate_limits"][0]["actions"] == [
+        {"request_headers": {"header_name": CALLER_HEADER, "descriptor_key": "caller"}}
+    ]
+    of_caller = by_caller["descriptors"][0]
+    assert of_caller["entries"] == [{"key": "caller"}]
+    connection, caller, together = (limits["token_bucket"] for limits in (by_connection, of_caller, by_caller))
+    for size in ("max_tokens", "tokens_per_fill"):
+        assert connection[size] < caller[size] < together[size]
+    for limits in (by_connection, by_caller):
+        assert limits["filter_enforced"] == limits["filter_enabled"] == {"default_value": {"numerator": 100}}
+        assert limits["rate_limited_as_resource_exhausted"] is True
+
+
+@pytest.mark.parametrize("name", FILES)
 def test_callers_cannot_send_the_word_of_the_proxy(name: str) -> None:
     manager = manager_of(read(name))
     (early,) = manager["early_header_mutation_extensions"]
-    removed = {mutation["remove"] for mutation in early["typed_config"]["mutations"]}
+    removed = {mutation.get("remove") for mutation in early["typed_config"]["mutations"]}
     assert {CALLER_HEADER, SCOPES_HEADER} <= removed
 
 
@@ -86,6 +111,26 @@ def test_callers_are_known_by_a_certificate_or_a_token() -> None:
     *open_rules, last = filters[1]["typed_config"]["rules"]
     assert last == {"match": {"prefix": "/"}, "requires": {"provider_name": "site"}}
     assert [rule["match"]["prefix"] for rule in open_rules] == ["/grpc.health.v1.Health/"]
+
+
+def test_callers_with_tokens_have_the_same_limits() -> None:
+    """The configurations differ in whom they know, and in nothing else."""
+    certificates, tokens = (read(name) for name in ("mtls.yaml", "jwt.yaml"))
+    for settings in (certificates, tokens):
+        (listener,) = settings["static_resources"]["listeners"]
+        del listener["filter_chains"][0]["transport_socket"]["typed_config"]
+        manager = manager_of(settings)
+        (early,) = manager["early_header_mutation_extensions"]
+        early["typed_config"]["mutations"] = [
+            mutation for mutation in early["typed_config"]["mutations"] if "remove" in mutation
+        ]
+        manager["http_filters"] = [
+            found for found in manager["http_filters"] if found["name"] != "envoy.filters.http.jwt_authn"
+        ]
+        by_caller = manager["http_filters"][1]["typed_config"]
+        # Those without a name, whom only the identity provider's configuration lets through.
+        del by_caller["rate_limits"][1:], by_caller["descriptors"][1:]
+    assert certificates == tokens
 
 
 def test_kubernetes_has_the_same_configuration() -> None:

@@ -130,12 +130,17 @@ class Metrics:
         self._restarts: Callable[[], int] = _zero
         self._expiries: Callable[[], Mapping[str, float]] = dict
         self._closed: Callable[[], Mapping[CloseReason, int]] = lambda: dict.fromkeys(CloseReason, 0)
+        self._barred: Callable[[], int] = _zero
+        self._times_barred: Callable[[], int] = _zero
         Gauge("robosc_server_tasks_waiting", "Tasks waiting for a worker.", registry=registry).set_function(
             lambda: self._waiting()
         )
         Gauge("robosc_server_tasks_running", "Tasks that workers are running.", registry=registry).set_function(
             lambda: self._running()
         )
+        Gauge(
+            "robosc_server_hosts_barred", "Hosts whose new connections are kept away after floods.", registry=registry
+        ).set_function(lambda: self._barred())
         registry.register(_LabelledCollector(self))
 
     def method(self, name: str) -> MethodMetrics:
@@ -194,6 +199,8 @@ class Metrics:
         restarts: Callable[[], int] | None = None,
         expiries: Callable[[], Mapping[str, float]] | None = None,
         closed: Callable[[], Mapping[CloseReason, int]] | None = None,
+        barred: Callable[[], int] | None = None,
+        times_barred: Callable[[], int] | None = None,
     ) -> None:
         """Set the functions that are called for each request for metrics, on the event loop: they must be quick.
 
@@ -205,6 +212,8 @@ class Metrics:
             restarts: Number of times that the process that starts workers had to be started again.
             expiries: Seconds until tokens expire, by id of the token.
             closed: Number of connections that the server has closed, by reason.
+            barred: Number of hosts whose new connections are kept away now.
+            times_barred: Number of times that those of a host began to be kept away.
         """
         self._waiting = waiting or self._waiting
         self._running = running or self._running
@@ -213,6 +222,8 @@ class Metrics:
         self._restarts = restarts or self._restarts
         self._expiries = expiries or self._expiries
         self._closed = closed or self._closed
+        self._barred = barred or self._barred
+        self._times_barred = times_barred or self._times_barred
 
     def labelled_metrics(self) -> Iterable[Metric]:
         """Return the metrics that have labels and values that are computed on request."""
@@ -255,7 +266,11 @@ class Metrics:
         )
         for reason, number in self._closed().items():
             closed.add_metric((reason.name.lower(),), number)
-        return calls, seconds, lookups, jobs, conditions, restarts, expiries, closed
+        bars = CounterMetricFamily(
+            "robosc_server_host_bars", "Times that new connections of a host began to be kept away after floods."
+        )
+        bars.add_metric((), self._times_barred())
+        return calls, seconds, lookups, jobs, conditions, restarts, expiries, closed, bars
 
     def collector(self, loop: asyncio.AbstractEventLoop) -> Collector:
         """Return a collector of all metrics for other threads, which collects them on the event loop."""

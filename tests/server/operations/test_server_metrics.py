@@ -62,6 +62,8 @@ def test_prometheus_can_read_them() -> None:
         restarts=lambda: 7,
         expiries=lambda: {"0f5c1d2e": -1.5},
         closed=lambda: {CloseReason.BYTES_TOGETHER: 4},
+        barred=lambda: 6,
+        times_barred=lambda: 8,
     )
     metrics.cache_hit("memory")
     metrics.cache_miss()
@@ -82,6 +84,8 @@ def test_prometheus_can_read_them() -> None:
             ("robosc_server_condition", {"name": "store"}, 0),
             ("robosc_server_worker_restarts_total", {}, 7),
             ("robosc_server_connections_closed_total", {"reason": "bytes_together"}, 4),
+            ("robosc_server_hosts_barred", {}, 6),
+            ("robosc_server_host_bars_total", {}, 8),
             ("robosc_server_token_seconds_to_expiry", {"token": "0f5c1d2e"}, -1.5),
             ("robosc_server_result_lookups_total", {"found": "memory"}, 1),
             ("robosc_server_result_lookups_total", {"found": "store"}, 0),

@@ -254,7 +254,15 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
         scheduler.close()
         await asyncio.gather(
             manager.drain(settings.drain_seconds),
-            drain(server, health, calls, settings.drain_seconds, _IDLE_METHODS, lambda: sender.unread_bytes),
+            drain(
+                server,
+                health,
+                calls,
+                settings.drain_seconds,
+                _IDLE_METHODS,
+                lambda: sender.unread_bytes,
+                scheduler.end_calls,
+            ),
         )
 
     await server.start()

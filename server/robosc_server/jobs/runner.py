@@ -35,7 +35,9 @@ MAXIMUM_LOSSES = 3
 _LOST = f"the worker process was lost {MAXIMUM_LOSSES} times during this job"
 _SHORTEST_S = 0.01
 _WAITING = "waiting"
-"""The stage of a job that waits for its owner's quota."""
+"""The stage of a job that waits for its owner's quota, or for the database."""
+
+_UNSTORED = Report(_WAITING, "the task is done; its outcome is stored once the database is available and has room")
 
 
 @dataclass(slots=True)
@@ -329,6 +331,8 @@ class JobRunner:
                 ended = await self._store.end(job_id, self.replica, outcome)
                 break
             except StoreUnavailableError as error:
+                if job.record.progress != _UNSTORED:
+                    self._publish_progress(job, _UNSTORED)
                 await asyncio.sleep(error.retry_after_s or _RETRY_S)
             except Exception as error:
                 # The result cannot be stored: the job fails instead.

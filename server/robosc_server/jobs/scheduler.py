@@ -11,7 +11,7 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from typing import Protocol
+from typing import Any, Protocol
 
 from robosc_api.security.callers import network_of
 from robosc_server.clock import monotonic
@@ -114,6 +114,8 @@ class Scheduler:
         self._waiting_outside: Counter[str] = Counter()
         self._mean_s: float | None = None
         self._is_closed = False
+        self._calls: set[asyncio.Task[Any]] = set()
+        self._has_ended_calls = False
         self._poll_timer: asyncio.TimerHandle | None = None
         self._order: dict[Place, int] | None = None
 
@@ -141,6 +143,12 @@ class Scheduler:
         """Refuse new tasks from now on; waiting tasks stay in the queue."""
         self._is_closed = True
 
+    def end_calls(self) -> None:
+        """End the tasks that are bound to calls, which are refused; those of jobs stay as they are."""
+        self._is_closed = self._has_ended_calls = True
+        for call in self._calls:
+            call.cancel()
+
     async def run(
         self,
         task: Task,
@@ -160,12 +168,14 @@ class Scheduler:
                 ended meanwhile.
 
         Raises:
-            RefusedError: The queue is full, there are no workers, the server shuts down, or the caller has used up its
-                quota while the task waited.
+            RefusedError: The queue is full, there are no workers, the server shuts down before the task has ended, or
+                the caller has used up its quota while the task waited.
         """
         if self._workers.capacity < 1:
             raise _no_workers()
         place = self.enter(caller)
+        call: Any = asyncio.current_task()
+        self._calls.add(call)
         try:
             await place.wait_for_worker()
             if (outcome := known()) is not None:
@@ -177,7 +187,13 @@ class Scheduler:
             return Failure(Reason.WORKER_DIED, "the worker process was lost more than once during this task")
         except WorkersError as error:
             raise _no_workers() from error
+        except asyncio.CancelledError:
+            if not self._has_ended_calls:
+                raise
+            call.uncancel()
+            raise _shutting_down() from None
         finally:
+            self._calls.discard(call)
             self.leave(place)
 
     def check(self, caller: str) -> None:
@@ -217,11 +233,7 @@ class Scheduler:
             RefusedError: The queue is full, or the server shuts down.
         """
         if self._is_closed:
-            raise RefusedError(
-                Reason.SHUTTING_DOWN,
-                "the server is shutting down; call another server, or try again later",
-                retry_after_s=1.0,
-            )
+            raise _shutting_down()
         waiting = self._waiting + self._waiting_outside.total()
         is_free = not waiting and self._running < self._workers.capacity
         name = network_of(caller)
@@ -338,6 +350,11 @@ class Scheduler:
         mean_s = _FIRST_GUESS_S if self._mean_s is None else self._mean_s
         guess_s = mean_s * before / max(1, self._workers.capacity)
         return min(_LONGEST_RETRY_S, max(_SHORTEST_RETRY_S, guess_s))
+
+
+def _shutting_down() -> RefusedError:
+    message = "the server is shutting down; call another server, or try again later"
+    return RefusedError(Reason.SHUTTING_DOWN, message, retry_after_s=1.0)
 
 
 def _no_workers() -> RefusedError:

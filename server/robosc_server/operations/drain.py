@@ -15,6 +15,9 @@ _POLL_S = 0.05
 _FLUSH_S = 0.2
 """Time for gRPC to send small responses before the server stops, in seconds."""
 
+_REFUSED_S = 2.0
+"""Time for the work of the remaining calls to end, so that they are refused with a reason, in seconds."""
+
 
 STOP_S = 5.0
 """Time for gRPC to close its connections after all calls are cancelled, in seconds."""
@@ -42,8 +45,9 @@ async def drain(
     seconds: float,
     idle_methods: frozenset[str] = frozenset(),
     unread_bytes: Callable[[], int] = lambda: 0,
+    end_work: Callable[[], None] = lambda: None,
 ) -> None:
-    """Shut down a server: report NOT_SERVING, refuse new calls, wait for open calls, and cancel the rest.
+    """Shut down a server: report NOT_SERVING, refuse new calls, wait for open calls, and end the rest.
 
     The port stays open until then, so that callers and load balancers learn of the shutdown.
 
@@ -55,6 +59,8 @@ async def drain(
         idle_methods: Methods whose calls are not waited for, since their callers can use another server at any time.
         unread_bytes: Function that returns the bytes of large answers that were sent and are not read yet; the shutdown
             waits for them as for calls.
+        end_work: Function that ends the work of calls whose time is up, so that they are refused with a reason; calls
+            that go on are cancelled.
     """
     log = structlog.get_logger()
     begun_s = monotonic()
@@ -64,5 +70,10 @@ async def drain(
     while (calls.under_way(idle_methods) or unread_bytes()) and monotonic() - begun_s < seconds:
         await asyncio.sleep(_POLL_S)
     left = calls.under_way(idle_methods)
+    if left:
+        end_work()
+        cut_off_s = monotonic()
+        while calls.under_way(idle_methods) and monotonic() - cut_off_s < _REFUSED_S:
+            await asyncio.sleep(_POLL_S)
     await stop(server, _FLUSH_S)
     log.info("drained", seconds=round(monotonic() - begun_s, 3), cancelled=left)

@@ -41,6 +41,18 @@ _PROGRAMMING_ERRORS = (IntegrityError, ProgrammingError, DataError)
 _CONFLICTS = frozenset({"40001", "40P01"})  # serialization_failure, deadlock_detected
 
 
+class FileGoneError(Exception):
+    """The file of a database is no longer in its place: changes would be stored nowhere that outlives the server."""
+
+    def __init__(self) -> None:
+        super().__init__("its file was removed or replaced: put it back, or restart the server to begin with a new one")
+
+
+def _in_place() -> bool:
+    """Return True: a database behind a network keeps its own files."""
+    return True
+
+
 class _Transaction[T]:
     """One unit of work, which another thread may cut off.
 
@@ -48,10 +60,13 @@ class _Transaction[T]:
         engine: Engine of the database.
         work: Function that does the work; it may be done again after a collision.
         is_write: True if it changes anything.
+        is_in_place: Function that returns True if the file of the database is still where it was opened.
     """
 
-    def __init__(self, engine: Engine, work: Callable[[Connection], T], *, is_write: bool) -> None:
-        self._engine, self._work, self._is_write = engine, work, is_write
+    def __init__(
+        self, engine: Engine, work: Callable[[Connection], T], is_in_place: Callable[[], bool], *, is_write: bool
+    ) -> None:
+        self._engine, self._work, self._is_in_place, self._is_write = engine, work, is_in_place, is_write
         self._lock = threading.Lock()
         self._driver_connection: Any = None
         self._is_abandoned = False
@@ -62,7 +77,10 @@ class _Transaction[T]:
         Raises:
             DBAPIError: As the database says.
             PoolTimeoutError: No connection is free.
+            FileGoneError: The file of the database is gone; work that only reads goes on.
         """
+        if self._is_write and not self._is_in_place():
+            raise FileGoneError
         for tries_left in reversed(range(_TRIES)):
             try:
                 return self._run_once()
@@ -125,6 +143,8 @@ class Database:
         writers: Number of threads for transactions that write.
         answer_s: Maximum duration of a transaction, in seconds.
         clock: Seconds of a monotonic clock.
+        is_in_place: Function that returns True if the file of the database is still where it was opened; called in a
+            thread before each transaction that writes.
     """
 
     def __init__(
@@ -135,8 +155,9 @@ class Database:
         writers: int,
         answer_s: float = 8.0,
         clock: Callable[[], float] = monotonic,
+        is_in_place: Callable[[], bool] = _in_place,
     ) -> None:
-        self._engine = engine
+        self._engine, self._is_in_place = engine, is_in_place
         self._readers = ThreadPoolExecutor(readers, thread_name_prefix="store-reader")
         self._writers = ThreadPoolExecutor(writers, thread_name_prefix="store-writer")
         self._answer_s = answer_s
@@ -173,7 +194,7 @@ class Database:
         """Run work that writes in a transaction, which may be tried twice; its changes are stored when this returns.
 
         Raises:
-            StoreUnavailableError: The database is unavailable, too slow or full.
+            StoreUnavailableError: The database is unavailable, too slow or full, or its file is gone.
         """
         return await self._run(work, is_write=True)
 
@@ -186,7 +207,7 @@ class Database:
     async def _run[T](self, work: Callable[[Connection], T], *, is_write: bool) -> T:
         if self._pending >= _PENDING or self._clock() < self._paused_until_s:
             raise StoreUnavailableError
-        transaction = _Transaction(self._engine, work, is_write=is_write)
+        transaction = _Transaction(self._engine, work, self._is_in_place, is_write=is_write)
         threads = self._writers if is_write else self._readers
         self._pending += 1
         future = asyncio.get_running_loop().run_in_executor(threads, transaction.run)
@@ -196,7 +217,7 @@ class Database:
             result = await asyncio.wait_for(asyncio.shield(future), self._answer_s)
         except _PROGRAMMING_ERRORS:
             raise
-        except (DBAPIError, PoolTimeoutError, TimeoutError) as error:
+        except (DBAPIError, PoolTimeoutError, TimeoutError, FileGoneError) as error:
             if isinstance(error, TimeoutError):
                 future.add_done_callback(_consume_outcome)
                 future.cancel()
@@ -216,6 +237,8 @@ class Database:
         if self.is_available:
             # The parameters of the statement come from a caller and are left out.
             reason = error.orig if isinstance(error, DBAPIError) else type(error).__name__
+            if isinstance(error, FileGoneError):
+                reason = error
             _log.error("the database is unavailable: %s", reason)
         self._is_failing[is_write] = True
         if self.dialect != "sqlite":

@@ -117,6 +117,7 @@ def _open_sqlite(given: Path) -> tuple[Database, tuple[Path, int]]:
         event.listen(engine, "connect", _set_up_sqlite)
         event.listen(engine, "begin", _begin_sqlite)
         _prepare(engine, f"the database {path}")
+        opened = _file_at(path)
     except OSError as error:
         _unlock(lock)
         raise StoreError(f"the database {path} cannot be used: {error.strerror}") from error
@@ -124,7 +125,16 @@ def _open_sqlite(given: Path) -> tuple[Database, tuple[Path, int]]:
         _unlock(lock)
         raise
     # One writer thread: SQLite permits one at a time, and here they wait in a fair queue.
-    return Database(engine, readers=2, writers=1), lock
+    return Database(engine, readers=2, writers=1, is_in_place=lambda: _file_at(path) == opened), lock
+
+
+def _file_at(path: Path) -> tuple[int, int] | None:
+    """Return what tells the file at a path from every other; None: there is none."""
+    try:
+        found = path.stat()
+    except OSError:
+        return None
+    return found.st_dev, found.st_ino
 
 
 def _prepare(engine: Engine, what: str) -> None:

@@ -532,6 +532,35 @@ async def test_a_job_whose_result_cannot_be_kept_ends_all_the_same(
         assert (made.scheduler.running, made.scheduler.waiting) == (0, 0)
 
 
+async def test_a_job_whose_outcome_cannot_be_stored_yet_says_so(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    async with parts(tmp_path) as made:
+        end, is_full = made.store.end, [True]
+
+        async def end_if_there_is_room(job_id: str, replica: str, outcome: Result | Failure) -> JobRecord | None:
+            if is_full[0]:
+                error = StoreUnavailableError()
+                error.retry_after_s = 0.001
+                raise error
+            return await end(job_id, replica, outcome)
+
+        monkeypatch.setattr(made.store, "end", end_if_there_is_room)
+        job, _ = await made.manager.submit(task_of("a"), ME)
+
+        async def is_waiting() -> bool:
+            record = await made.manager.get(job.id, ME)
+            return record.progress is not None and record.progress.stage == "waiting"
+
+        await until(is_waiting)
+        waiting = await made.manager.get(job.id, ME)
+        assert waiting.state is JobState.RUNNING
+        assert waiting.progress is not None
+        assert "stored once the database is available and has room" in waiting.progress.message
+        is_full[0] = False
+        assert (await ended(made.manager, job.id)).state is JobState.SUCCEEDED
+
+
 async def test_jobs_that_wait_for_workers_count_like_those_in_the_line(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:

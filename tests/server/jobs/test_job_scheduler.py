@@ -175,6 +175,24 @@ async def test_a_closed_line_takes_nothing_more() -> None:
     assert scheduler.tasks_ahead(waiting) == 0
 
 
+async def test_calls_that_the_end_of_the_server_cuts_off_learn_why_and_jobs_stay() -> None:
+    scheduler = Scheduler(ScriptedWorkers(1), QueueLimits())
+    job = scheduler.enter("me")
+    calls = [asyncio.create_task(scheduler.run(task_of("a"), "me", TaskLimits(), drop)) for _ in range(3)]
+    await asyncio.sleep(0)
+    # A caller who goes away at that time is no concern of the end.
+    calls[2].cancel()
+    await asyncio.wait(calls[2:])
+    assert calls[2].cancelled()
+    scheduler.end_calls()
+    for call in calls[:2]:
+        with pytest.raises(RefusedError) as refused:
+            await call
+        assert refused.value.reason is Reason.SHUTTING_DOWN
+        assert not call.cancelling()
+    assert (scheduler.waiting, scheduler.running, job.has_worker) == (0, 1, True)
+
+
 class Twin:
     """The line as a list: who is next is found by looking through it."""
 

@@ -63,6 +63,36 @@ def test_a_foreign_database_is_not_touched(tmp_path: Path) -> None:
         open_store(tmp_path)
 
 
+@pytest.mark.parametrize("is_replaced", [False, True])
+async def test_nothing_is_accepted_into_a_file_that_is_gone(
+    tmp_path: Path, is_replaced: bool, caplog: pytest.LogCaptureFixture
+) -> None:
+    store = open_store(tmp_path / "state")
+    try:
+        await store.enter("me")
+        (tmp_path / "state").rename(tmp_path / "aside")
+        if is_replaced:
+            (tmp_path / "state").mkdir()
+            (tmp_path / "state" / "jobs.sqlite").touch()
+        for _ in range(2):
+            with pytest.raises(StoreUnavailableError):
+                await store.beat("me")
+            assert not store.is_available
+        assert await store.active_ids_of("me") == set()
+        assert store.is_readable
+        assert [record.message for record in caplog.records] == [
+            "the database is unavailable: its file was removed or replaced: put it back, or restart the server to "
+            "begin with a new one"
+        ]
+        if is_replaced:
+            (tmp_path / "state").rename(tmp_path / "other")
+        (tmp_path / "aside").rename(tmp_path / "state")
+        assert await store.beat("me")
+        assert store.is_available
+    finally:
+        store.close()
+
+
 @pytest.mark.parametrize(
     ("url", "message"),
     [

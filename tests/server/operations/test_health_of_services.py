@@ -14,6 +14,7 @@ from robosc_server.operations.health import Health
 from robosc_server.operations.interceptor import CallInterceptor
 from robosc_server.operations.metrics import Metrics
 from robosc_server.result_sender import ResultSender
+from robosc_server.tasks.task import Reason, RefusedError
 from support.held_time import HeldLoop, on_held_time
 from support.small_server import SERVICE, call, logged, small_server
 from support.waiting import PATIENCE_S, limited, until
@@ -230,6 +231,28 @@ async def test_a_large_answer_that_was_sent_is_waited_for(loop: HeldLoop) -> Non
             assert not ending.done()
             assert [len(message) async for message in reader] == [size]
             await passes(loop, ending)
+
+
+def test_calls_whose_time_is_up_are_refused_with_a_reason() -> None:
+    async def run(loop: HeldLoop) -> None:
+        is_over = asyncio.Event()
+
+        async def working(request: bytes, context: Any) -> bytes:
+            await is_over.wait()
+            raise RefusedError(Reason.SHUTTING_DOWN, "the server is shutting down")
+
+        calls = CallInterceptor(Metrics("1"))
+        async with small_server(layers=[calls], unary=working) as (channel, server):
+            under_way = asyncio.create_task(call(channel))
+            await until(lambda: calls.under_way() > 0)
+            ending = asyncio.create_task(drain(server, Health({}), calls, 30.0, end_work=is_over.set))
+            await loop.passed(29.0)
+            assert not is_over.is_set()
+            await passes(loop, ending)
+            refused = await under_way
+            assert (refused.code, refused.reason) == (grpc.StatusCode.UNAVAILABLE, "SHUTTING_DOWN")
+
+    on_held_time(run)
 
 
 def test_connections_that_grpc_does_not_let_go_of_keep_nobody_from_ending(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -5,10 +5,13 @@ import subprocess
 import sys
 from pathlib import Path
 
+import psycopg
 import pytest
 
+from support.earlier_databases import script_of
+from support.job_ledger import note_ends, stored_jobs
 from support.outgrown_site import Kind, proxy_program
-from support.postgresql import skip_without_postgresql
+from support.postgresql import postgresql, skip_without_postgresql
 
 PROGRAM = Path(__file__).parents[2] / "soak" / "outgrow.py"
 
@@ -61,3 +64,32 @@ def test_wrong_use_is_reported_before_anything_starts(words: list[str], complain
     done = subprocess.run([sys.executable, PROGRAM, *words], capture_output=True, text=True, check=False)
     assert (done.returncode, done.stdout) == (2, "")
     assert complaint in done.stderr.splitlines()[-1]
+
+
+def test_the_database_notes_each_end_of_a_job() -> None:
+    skip_without_postgresql()
+    with postgresql() as server:
+        url = server.new_database()
+        with psycopg.connect(url) as connection:
+            connection.execute(script_of(2, "postgresql").encode())
+            connection.execute("UPDATE jobs SET ended_us = NULL, state = 'running', reason = NULL")
+        note_ends(url)
+        # All end once, and two of them again: for another reason, and after they have been taken up again.
+        changes = [
+            "UPDATE jobs SET progress = 'round 2'",
+            "UPDATE jobs SET ended_us = 5, state = 'succeeded'",
+            "UPDATE jobs SET expires_us = 7",
+            "UPDATE jobs SET reason = 'WORKER_DIED', state = 'failed' WHERE id = 'done'",
+            "UPDATE jobs SET ended_us = NULL WHERE id = 'zoe'",
+            "UPDATE jobs SET ended_us = 6 WHERE id = 'zoe'",
+        ]
+        seen = []
+        for change in changes:
+            with psycopg.connect(url) as connection:
+                connection.execute(change.encode())
+            seen.append({job.id: job.ends for job in stored_jobs(url)})
+    others = seen[0].keys() - {"done", "zoe"}
+    assert others and set(seen[0].values()) == {0}
+    assert all(set(ends.values()) == {1} for ends in seen[1:3])
+    assert seen[-1]["done"] > 1 and seen[-1]["zoe"] > 1
+    assert {seen[-1][other] for other in others} == {1}

@@ -148,10 +148,14 @@ def ask_alive(
 
 
 def _takes_connections(address: str, timeout_s: float) -> bool:
-    """Return True if the port accepts connections."""
-    host, port = split_address(address)
+    """Return True if the port or Unix socket accepts connections."""
     try:
-        with socket.create_connection((host, port), timeout_s):
+        if address.startswith(UNIX):
+            with socket.socket(socket.AF_UNIX) as line:
+                line.settimeout(timeout_s)
+                line.connect(address.removeprefix(UNIX))
+            return True
+        with socket.create_connection(split_address(address), timeout_s):
             return True
     except OSError:
         return False

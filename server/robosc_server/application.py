@@ -1,6 +1,7 @@
 """Assembly of a server from its parts: storage, workers, services, operations and graceful shutdown."""
 
 import asyncio
+import logging
 from collections.abc import AsyncIterator, Callable
 from contextlib import AsyncExitStack, asynccontextmanager
 from functools import partial
@@ -33,6 +34,7 @@ from robosc_server.jobs import (
 )
 from robosc_server.operations.descriptors import usable_connections
 from robosc_server.operations.drain import drain, stop
+from robosc_server.operations.exposure import exposures
 from robosc_server.operations.health import Health
 from robosc_server.operations.instrumented_workers import InstrumentedWorkers
 from robosc_server.operations.interceptor import CallInterceptor
@@ -53,6 +55,8 @@ from robosc_server.tasks.task import Result, TaskKind, own_key
 from robosc_server.workers import Workers, WorkersError
 from robosc_server.workers.cluster_check import check_cluster
 from robosc_server.workers.factory import open_workers
+
+_log = logging.getLogger(__name__)
 
 _RULE = Rule(frozenset({Scope.SYNTHESIZE}))
 
@@ -120,6 +124,8 @@ async def _start(settings: Settings, given_workers: Workers | None, stack: Async
     if settings.metrics_address:
         check_metrics_address(settings.metrics_address, beyond_loopback=settings.metrics_beyond_loopback)
     check_cluster(settings.workers, is_insecure_allowed=settings.insecure_workers_beyond_loopback)
+    for warning in exposures(settings.database_url, settings.tracing_endpoint):
+        _log.warning("%s", warning)
     finish = _finish(settings)
     tokens = (
         None

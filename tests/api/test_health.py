@@ -1,6 +1,7 @@
 """Asking a service for its health by its own configuration: with and without TLS, well and not well."""
 
 import socket
+import tempfile
 from pathlib import Path
 
 import pytest
@@ -142,3 +143,23 @@ def test_wrong_use_is_one_clear_error(tmp_path: Path, capsys: pytest.CaptureFixt
     assert "remote.grpc_address is not set" in capsys.readouterr().err
     assert server_health(["--port", "many"]) == 2
     assert capsys.readouterr().err == "robosc-server: --port: must be a whole number\n"
+
+
+def test_a_unix_socket_is_told_apart_too(capsys: pytest.CaptureFixture[str]) -> None:
+    # Paths of sockets are short.
+    with tempfile.TemporaryDirectory(prefix="robosc-") as folder:
+        place = f"{folder}/socket"
+        nobody = ask_health(f"unix:{place}", timeout_s=10)
+        assert (nobody.is_alive, nobody.is_serving) == (False, False) and nobody.message.startswith("UNAVAILABLE")
+        for words in ([], ["--alive"]):
+            assert server_health([*words, "--socket", place]) == 1
+            assert "UNAVAILABLE" in capsys.readouterr().err
+        # A program has ended, and its socket is there still; another one accepts connections and never answers.
+        for name, hangs in (("left", False), ("hanging", True)):
+            with socket.socket(socket.AF_UNIX) as listener:
+                listener.bind(f"{folder}/{name}")
+                if hangs:
+                    listener.listen()
+                condition = ask_health(f"unix:{folder}/{name}", timeout_s=0.5)
+            assert not condition.is_alive
+            assert condition.message.startswith("DEADLINE_EXCEEDED" if hangs else "UNAVAILABLE")

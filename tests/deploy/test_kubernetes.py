@@ -14,18 +14,31 @@ from robosc_server.signing import SigningError, read_signing_key
 from support.checkers import checked
 from support.containers import IMAGES
 from support.dockerfiles import parse_dockerfile
-from support.manifests import VARIANTS, Manifest, container_of, has_kustomize, manifests, named, of_kind, rendered
+from support.manifests import (
+    VARIANTS,
+    WITH_ENVOY,
+    Manifest,
+    container_of,
+    has_kustomize,
+    manifests,
+    named,
+    of_kind,
+    rendered,
+)
 
 pytestmark = pytest.mark.skipif(not has_kustomize(), reason="there is no kubectl, which knows Kustomize")
 
 # The oldest version in use, and the newest.
 VERSIONS = ("1.29.0", "1.34.0")
 
+EVERY = (*VARIANTS, WITH_ENVOY)
+"""Also the one whose servers are not reached themselves."""
+
 
 @pytest.mark.parametrize("version", VERSIONS)
 def test_manifests_fit_the_schemas(version: str, tmp_path: Path) -> None:
-    files = [tmp_path / f"{number}.yaml" for number in range(len(VARIANTS))]
-    for file, variant in zip(files, VARIANTS, strict=True):
+    files = [tmp_path / f"{number}.yaml" for number in range(len(EVERY))]
+    for file, variant in zip(files, EVERY, strict=True):
         file.write_text(rendered(variant))
     checked("kubernetes-validate", "--strict", "--quiet", "-k", version, *files)
 
@@ -37,7 +50,7 @@ def test_a_wrong_manifest_would_be_found(tmp_path: Path) -> None:
         checked("kubernetes-validate", "--strict", "--quiet", file)
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("variant", EVERY)
 def test_pods_keep_to_the_strictest_standard(variant: str) -> None:
     """Check that pods meet the Pod Security Standard `restricted`, and more."""
     for pod in _pods(variant):
@@ -56,7 +69,7 @@ def test_pods_keep_to_the_strictest_standard(variant: str) -> None:
                 "readOnlyRootFilesystem": True,
                 "capabilities": {"drop": ["ALL"]},
             }
-            assert re.fullmatch(r"robosc-server:\d+\.\d+\.\d+", container["image"])
+            assert re.fullmatch(r"(robosc-server:|docker\.io/envoyproxy/envoy:v)\d+\.\d+\.\d+", container["image"])
             assert {"cpu", "memory"} == set(container["resources"]["limits"]) == set(container["resources"]["requests"])
         assert all({"startupProbe", "readinessProbe", "livenessProbe"} <= set(one) for one in spec["containers"])
         mounted = {mount["name"] for container in containers for mount in container["volumeMounts"]}
@@ -67,7 +80,7 @@ def test_pods_keep_to_the_strictest_standard(variant: str) -> None:
     assert namespace["metadata"]["labels"]["pod-security.kubernetes.io/enforce"] == "restricted"
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("variant", EVERY)
 def test_whatever_chooses_pods_finds_some(variant: str) -> None:
     pods = _pods(variant)
     for item in manifests(variant):
@@ -80,12 +93,12 @@ def test_whatever_chooses_pods_finds_some(variant: str) -> None:
     deployments = {item["metadata"]["name"] for item in of_kind(variant, "Deployment")}
     for scaler in of_kind(variant, "HorizontalPodAutoscaler"):
         assert scaler["spec"]["scaleTargetRef"]["name"] in deployments
-    ports = {port["name"]: port["containerPort"] for pod in pods for port in pod["spec"]["containers"][0]["ports"]}
+    ports = {port["name"]: port["containerPort"] for pod in pods for port in _ports_of(pod)}
     for service in of_kind(variant, "Service"):
         assert all(ports[port["targetPort"]] or port for port in service["spec"]["ports"])
 
 
-@pytest.mark.parametrize("variant", VARIANTS)
+@pytest.mark.parametrize("variant", EVERY)
 def test_nothing_reaches_pods_but_what_a_policy_says(variant: str) -> None:
     policies = of_kind(variant, "NetworkPolicy")
     (nothing,) = [item for item in policies if item["spec"]["podSelector"] == {}]
@@ -95,7 +108,7 @@ def test_nothing_reaches_pods_but_what_a_policy_says(variant: str) -> None:
         policy = named(variant, "NetworkPolicy", f"robosc-{component}")["spec"]
         opened = {port["port"] for rule in policy["ingress"] for port in rule["ports"]}
         # Probes come from the node, which no policy keeps away.
-        listening = {port["containerPort"] for port in pod["spec"]["containers"][0]["ports"] if port["name"] != "http"}
+        listening = {port["containerPort"] for port in _ports_of(pod) if port["name"] != "http"}
         assert opened == listening, component
         assert all(rule["from"] for rule in policy["ingress"]) and all(rule["to"] for rule in policy["egress"])
 
@@ -157,6 +170,30 @@ def test_several_servers_share_a_database_and_one_alone_does_not() -> None:
         assert (not of_kind(variant, "HorizontalPodAutoscaler")) == is_alone
 
 
+def test_servers_behind_envoy_are_reached_through_it_alone() -> None:
+    pod = named(WITH_ENVOY, "Deployment", "robosc-server")["spec"]["template"]["spec"]
+    containers = {container["name"]: container for container in pod["containers"]}
+    server, envoy = containers["server"], containers["envoy"]
+    assert [port["name"] for port in server["ports"]] == ["metrics"]
+    assert [port["name"] for port in envoy["ports"]] == ["grpc"]
+    variables = {item["name"]: item.get("value") for item in server["env"]}
+    mounts = {
+        name: {mount["mountPath"]: mount["name"] for mount in container["volumeMounts"]}
+        for name, container in containers.items()
+    }
+    # Both have the socket at the place where each looks for it, and each its configuration.
+    socket = Path(str(variables["ROBOSC_SERVER_SOCKET"]))
+    assert mounts["server"][str(socket.parent)] == mounts["envoy"][str(socket.parent)] == "socket"
+    (config,) = [item for item in of_kind(WITH_ENVOY, "ConfigMap") if "envoy.yaml" in item["data"]]
+    assert f"path: {socket}" in config["data"]["envoy.yaml"]
+    assert mounts["server"][str(Path(str(variables["ROBOSC_SERVER_CONFIG"])).parent)] == "envoy"
+    assert "server.toml" in config["data"]
+    assert envoy["command"][2] == "/etc/envoy/envoy.yaml" and mounts["envoy"]["/etc/envoy"] == "envoy"
+    # The server needs no certificate and no tokens, and the pod starts without them.
+    assert _secrets_of(pod) == {"robosc-tls", "robosc-callers"}
+    assert "/etc/robosc/tls" in mounts["envoy"] and not {"tls", "tokens"} & set(mounts["server"].values())
+
+
 def test_a_key_that_signs_is_handed_over_for_its_reader_alone(tmp_path: Path) -> None:
     """Check that the file that Kubernetes makes of a secret, which is also for a group, is refused."""
     pod = named("overlays/signed", "Deployment", "robosc-server")["spec"]["template"]["spec"]
@@ -203,6 +240,10 @@ def settings_of(variant: str, folder: Path) -> Settings:
 
 def _secrets_of(pod: Manifest) -> set[str]:
     return {volume["secret"]["secretName"] for volume in pod["volumes"] if "secret" in volume}
+
+
+def _ports_of(pod: Manifest) -> list[Manifest]:
+    return [port for container in pod["spec"]["containers"] for port in container["ports"]]
 
 
 def _pods(variant: str) -> list[Manifest]:

@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 KUBERNETES = Path(__file__).parents[2] / "deploy" / "kubernetes"
+WITH_ENVOY = "overlays/envoy"
 VARIANTS = ("base", "overlays/single", "overlays/dask", "overlays/plaintext", "overlays/signed")
 
 type Manifest = dict[str, Any]

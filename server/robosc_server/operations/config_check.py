@@ -37,6 +37,7 @@ from robosc_api.security.listening import read
 from robosc_api.security.tokens import SOON_S, TokenIndex, time_text
 from robosc_server.clock import wall_clock_s
 from robosc_server.operations.descriptors import highest_descriptor_limit, usable_connections
+from robosc_server.operations.exposure import database_exposure, tracing_exposure
 from robosc_server.operations.metrics import check_metrics_address
 from robosc_server.operations.settings import Confinement, Settings, format_value
 from robosc_server.signing import SigningError, read_signing_key
@@ -236,25 +237,9 @@ def _database(settings: Settings) -> Iterator[tuple[CheckGrade, str]]:
         yield _sqlite(Path(url.removeprefix("sqlite:///")).absolute())
     else:
         yield _postgresql(url)
-        yield from _unverified(url)
-
-
-def _unverified(text: str) -> Iterator[tuple[CheckGrade, str]]:
-    """Warn of a database on another machine whose certificate and name are not checked."""
-    with contextlib.suppress(ArgumentError, ValueError):
-        url = make_url(text)
-        hosts = [host for host in (url.host, *_words(url.query.get("host"))) if host and not host.startswith("/")]
-        is_far = any(not is_loopback_host(host.rpartition(":")[0] or host) for host in hosts)
-        if is_far and _words(url.query.get("sslmode")) != ["verify-full"]:
-            yield (
-                CheckGrade.WARNING,
-                "whoever is on the way to the database can read and change jobs: add ?sslmode=verify-full to"
-                " database_url (and sslrootcert)",
-            )
-
-
-def _words(value: str | tuple[str, ...] | None) -> list[str]:
-    return [] if value is None else [value] if isinstance(value, str) else list(value)
+        warning = database_exposure(url)
+        if warning is not None:
+            yield CheckGrade.WARNING, warning
 
 
 def _postgresql(text: str) -> tuple[CheckGrade, str]:
@@ -410,9 +395,9 @@ def _tracing(settings: Settings) -> Iterator[tuple[CheckGrade, str]]:
     if not is_there:
         yield CheckGrade.ERROR, "traces need the extra `tracing`: pip install 'robosc[tracing]'"
         return
-    scheme, _, address = endpoint.partition("://")
-    if scheme == "http" and not is_loopback_host(split_address(address.rstrip("/"))[0]):
-        yield CheckGrade.WARNING, f"{endpoint}: traces, with the names of callers, can be read on the way: use https"
-    error = _unreachable(address.rstrip("/"))
+    warning = tracing_exposure(endpoint)
+    if warning is not None:
+        yield CheckGrade.WARNING, warning
+    error = _unreachable(endpoint.partition("://")[2].rstrip("/"))
     # A server works without who takes its traces.
     yield (CheckGrade.OK, endpoint) if error is None else (CheckGrade.WARNING, error)

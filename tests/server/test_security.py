@@ -249,10 +249,11 @@ class TestTokens:
 
     def test_two_tokens_are_none(self, tmp_path: Path) -> None:
         token, tokens = token_in(tmp_path, Scope.SYNTHESIZE)
-        entry = ("authorization", f"Bearer {token.read_text().strip()}")
+        secret = token.read_text().strip()
+        entry, other = [("authorization", f"{scheme} {secret}") for scheme in ("Bearer", "Digest")]
         with serving(ServerSecurity(tokens=tokens)) as address, grpc.insecure_channel(address) as channel:
             stub = reflection_pb2_grpc.ServerReflectionStub(channel)
-            for metadata, is_admitted in (([entry], True), ([entry, entry], False), ([(entry[0], "Basic x")], False)):
+            for metadata, is_admitted in (([entry], True), ([entry, entry], False), ([other], False)):
                 request = reflection_pb2.ServerReflectionRequest(list_services="")
                 call = stub.ServerReflectionInfo(iter([request]), timeout=PATIENCE_S, metadata=metadata)
                 if is_admitted:

@@ -269,6 +269,8 @@ def test_a_resume_before_the_stop_was_put_out_is_refused() -> None:
     assert answers == [str(Reason.OPERATOR_STOP)]
     scene.live(0.1, 2.0)
     assert scene.out == STANDSTILL
+    assert scene.ask(OperatorCommand.RESUME, 0.5) == [DONE]
+    assert scene.out.linear_m_s == 0.1
 
 
 def test_a_resume_waits_until_the_motors_have_let_go() -> None:

@@ -279,7 +279,7 @@ def test_wheels_that_stood_still_may_not_rotate_by_themselves(speeds: tuple[floa
     assert unbidden(rest, *moves) == [False, False, False, True, True]
     # A wheel that comes to rest between begins anew; so does a clock that goes back.
     assert unbidden(rest, *moves[:2], rest, *moves[:2]) == [False] * 6
-    assert unbidden(rest, moves[3], *moves[:2]) == [False] * 4
+    assert unbidden(rest, moves[3], *moves[:3]) == [False, False, False, False, True]
 
 
 def test_wheels_that_have_not_stood_still_yet_are_none_that_begin_to_rotate() -> None:

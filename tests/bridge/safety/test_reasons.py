@@ -597,6 +597,20 @@ def test_wheels_are_judged_anew_after_a_pause() -> None:
     assert bench.cycles(0.2).reasons == (Reason.PAUSED, Reason.WHEEL_ASTRAY)
 
 
+def test_wheels_are_judged_anew_when_torque_comes_back() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.wheels_m_s = (0.0, 0.1)
+    bench.cycles(0.6)
+    bench.layer.disable()
+    bench.silent.add("drive")
+    assert not bench.cycles(1.1).is_torque_wanted
+    bench.silent.clear()
+    bench.layer.enable()
+    assert bench.cycles(0.7).reasons == ()
+    assert bench.cycles(0.3).reasons == (Reason.WHEEL_ASTRAY,)
+
+
 def test_a_drive_base_that_takes_its_time_is_no_pause() -> None:
     bench = Bench()
     bench.drive()

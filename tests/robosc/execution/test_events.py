@@ -129,6 +129,30 @@ def test_a_tau_that_changes_nothing_is_not_taken() -> None:
     assert b.state("A") == "home"
 
 
+def test_only_what_changes_the_state_counts_as_a_change() -> None:
+    """A stable state that stays is not judged again."""
+    system = system_of(
+        """
+        robot Still {
+          component A {
+            outgoing message m with type: none
+            outgoing message n with type: none
+            behaviour {
+              initial marked state home { on response from m  on response from n goto away }
+              marked state away { }
+            }
+          }
+        }
+        """
+    )
+    counts = [system.changes]
+    for event in ("m.response", "n.response", "n.response"):
+        assert system.step(event) in ((), None)
+        counts.append(system.changes)
+    system.restart()
+    assert [*counts, system.changes] == [0, 0, 1, 1, 2]
+
+
 def test_the_states_own_transition_comes_before_the_behaviours() -> None:
     b = bench(
         """

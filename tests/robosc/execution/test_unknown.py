@@ -326,6 +326,7 @@ def test_a_synthesis_variable_out_of_range_disables_a_controllable_event() -> No
     )
     for expected in (True, False):
         assert system.enabled("fill.request") is expected
+        assert system.is_possible("fill.request") is expected
         assert (system.step("fill.request") is not None) is expected
         system.step("fill.response")
         system.step("fill.reset")

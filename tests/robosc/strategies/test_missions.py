@@ -501,6 +501,14 @@ _ROOMS = """robot Rooms {
         # The robot leaves where the mission is asked for, and need not come back.
         ("while Base.dock or Operator.working { visit Base.kitchen }", [100]),
         ("while Operator.working { visit Base.kitchen }", []),
+        # The operator alone can keep the detour from its end.
+        ("while Operator.resting { visit Base.kitchen on Base.hall from anywhere visit Base.kitchen }", []),
+        # The assumption ends the detour.
+        (
+            "{ visit Base.kitchen on Base.hall from anywhere visit Operator.working }"
+            " assume allow Base.hall leads to Operator.working",
+            [],
+        ),
     ],
 )
 def test_a_visit_that_the_robot_itself_puts_off_is_found(mission: str, lines: list[int]) -> None:

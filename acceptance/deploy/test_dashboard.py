@@ -2,6 +2,7 @@
 
 import json
 import subprocess
+import time
 import urllib.parse
 import urllib.request
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ import pytest
 import yaml
 
 from robosc.language import load_bundle
+from robosc_api.security import Credentials, Scope, make_token
 from robosc_client import Check, Client, JobError, Synthesize
 from support.checkers import TOP, found
 from support.models import EXAMPLES
@@ -25,6 +27,8 @@ MODEL = EXAMPLES / "line_follower" / "line_follower.rscd"
 
 _RANGE = "2m"
 _INTERVAL = "1s"
+# The alert about tokens that expire soon is raised within 14 days.
+_VALID_S = 90 * 86_400
 
 
 class Prometheus:
@@ -56,14 +60,19 @@ class Prometheus:
 @pytest.fixture(scope="module")
 def prometheus(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Prometheus]:
     """A Prometheus with our configuration, but for the place of the server and for its patience."""
+    folder = tmp_path_factory.mktemp("prometheus")
+    token, line = make_token("caller", Scope, expires_s=int(time.time()) + _VALID_S)
+    token_file, tokens = folder / "token", folder / "tokens"
+    token_file.write_text(token)
+    tokens.write_text(f"{line}\n")
     with (
         _kept_port() as metrics,
-        server_process("--metrics-address", f"127.0.0.1:{metrics}") as (_, address),
-        _running(tmp_path_factory.mktemp("prometheus"), metrics) as made,
+        server_process("--metrics-address", f"127.0.0.1:{metrics}", "--tokens", str(tokens)) as (_, address),
+        _running(folder, metrics) as made,
     ):
         # An increase before the first look is not seen by it.
         assert eventually(lambda: made.values('up{job="robosc-server"}') == [1.0])
-        _work(address)
+        _work(address, Credentials(token_file=token_file))
         yield made
 
 
@@ -91,10 +100,10 @@ def _running(folder: Path, metrics: int) -> Iterator[Prometheus]:
             process.wait()
 
 
-def _work(address: str) -> None:
+def _work(address: str, credentials: Credentials) -> None:
     """Have a server do some of everything."""
     model = load_bundle(MODEL)
-    with Client(address) as client:
+    with Client(address, credentials) as client:
         client.check(model)
         client.synthesize(model)
         client.wait(client.submit(Synthesize(model)).job.id)

@@ -14,6 +14,7 @@ import contextlib
 import os
 import re
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -105,7 +106,7 @@ def read_profiles() -> Profiles:
         raise UsageError(f"{file}: the file may contain only 'default' (a name) and tables [profiles.NAME]")
     by_name = {name: _profile(file, name, entry) for name, entry in found.items()}
     if default is not None and default not in by_name:
-        raise UsageError(f"{file}: the default {default!r} is not one of its profiles")
+        raise UsageError(f"{file}: the default {default!r} is not one of its profiles ({_names(by_name)})")
     return Profiles(default, by_name)
 
 
@@ -167,9 +168,12 @@ def require_profile(known: Profiles, name: str) -> Profile:
         UsageError: There is no such profile.
     """
     if name not in known.by_name:
-        there = f"; there are {', '.join(known.by_name)}" if known.by_name else ""
-        raise UsageError(f"there is no profile {name!r}{there}")
+        raise UsageError(f"there is no profile {name!r} ({_names(known.by_name)}): see robosc-client profile --help")
     return known.by_name[name]
+
+
+def _names(by_name: Mapping[str, Profile]) -> str:
+    return f"there are {', '.join(by_name) or 'none'}"
 
 
 def _profile(file: Path, name: str, entry: Any) -> Profile:

@@ -1,10 +1,6 @@
 """Time of readable conditions: to simplify them in synthesis and to put them into words, beside the whole synthesis."""
 
-import sys
 import time
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from figures import text_table
 
@@ -82,7 +78,3 @@ def table() -> str:
     return text_table(
         "conditions in words: operands of the longest formula, nodes of the largest diagram", HEADER, rows
     )
-
-
-if __name__ == "__main__":
-    sys.stdout.write(table() + "\n")

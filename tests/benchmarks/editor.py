@@ -108,7 +108,3 @@ def table() -> str:
     rows = [*(_measured(size) for size in SIZES), _measured(1_000, NEIGHBOURS)]
     title = f"language server: from a keystroke (aim: under {AIM_MS} ms at 1,000 lines)"
     return f"{text_table(title, header, rows)}\n{_memory()}"
-
-
-if __name__ == "__main__":
-    print(table())

@@ -1,10 +1,6 @@
 """Time of checking that a strategy reaches its goals: position by position, and on sets of positions."""
 
-import sys
 import time
-from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
 
 from figures import text_table
 

@@ -1,11 +1,7 @@
 """Prints every benchmark table of the project, measured side by side in one run.
 
-Usage: run.py [NAME...]                       (all of them without an argument)
+Usage: run.py [NAME...]                       (all of them without an argument; a wrong name lists them)
        run.py cif DIR [--against FILE]    (a folder of CIF models: see cif.py)
-
-Names: cold-start, conditions, editor, execution, goal-checks, goals, gr1, language, strategies, synthesis; of the
-service: service-load, call-cpu, isolation, task-cpu; of the bridge: decoders, drive-bases, live-view, live-view-pixels,
-loop-period, maze, reaction, endurance, shipped, twin.
 """
 
 import sys
@@ -39,31 +35,14 @@ import strategies
 import synthesis
 from service import call_cpu, isolation, load, task_cpu
 
+_MODULES = (
+    *(cold_start, conditions, editor, execution, goal_checks, goals, gr1, language, strategies, synthesis),
+    *(call_cpu, isolation, task_cpu),
+    *(decoders, drive_bases, endurance, live_view, live_view_pixels, loop_period, maze, reaction, shipped, twin),
+)
 TABLES: dict[str, Callable[[], str]] = {
-    "call-cpu": call_cpu.table,
-    "cold-start": cold_start.table,
-    "conditions": conditions.table,
-    "decoders": decoders.table,
-    "drive-bases": drive_bases.table,
-    "editor": editor.table,
-    "endurance": endurance.table,
-    "execution": execution.table,
-    "goal-checks": goal_checks.table,
-    "goals": goals.table,
-    "gr1": gr1.table,
-    "isolation": isolation.table,
-    "language": language.table,
-    "live-view": live_view.table,
-    "live-view-pixels": live_view_pixels.table,
-    "loop-period": loop_period.table,
-    "maze": maze.table,
-    "reaction": reaction.table,
+    **{module.__name__.rpartition(".")[2].replace("_", "-"): module.table for module in _MODULES},
     "service-load": load.table,
-    "shipped": shipped.table,
-    "strategies": strategies.table,
-    "synthesis": synthesis.table,
-    "task-cpu": task_cpu.table,
-    "twin": twin.table,
 }
 
 

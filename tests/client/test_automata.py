@@ -242,7 +242,7 @@ class TestCommands:
         assert beside.read_bytes() != before
         assert local_main(["verify", str(made), "models/several.cif", "--signed-by", str(keys / "server.pub")]) == 0
 
-    def test_a_server_without_a_key_signs_nothing(self, folder: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    def test_a_server_without_a_key_signs_nothing(self, folder: Path) -> None:
         Path("made.rsup.sig").write_bytes(b"of another supervisor")
         with served() as address:
             assert remote_main(["synth", "models/tank.cif", "-o", "made.rsup", "--server", address]) == 0

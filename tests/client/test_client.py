@@ -3,10 +3,8 @@
 import asyncio
 import inspect
 import threading
-from collections.abc import AsyncGenerator, Callable, Iterator
+from collections.abc import AsyncGenerator
 from concurrent.futures import ThreadPoolExecutor
-from contextlib import AbstractContextManager, ExitStack, contextmanager
-from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -15,9 +13,7 @@ import pytest
 
 import robosc_client
 from robosc.errors import Diagnostic, RelatedPlace, Severity
-from robosc.model.structure import Deployment
 from robosc.source import Bundle, Location, SourceFile
-from robosc.targets import GenerateOptions, PackageMetadata, StateMessage, SupervisedController
 from robosc_api.security import Credentials
 from robosc_api.v1 import jobs_pb2
 from robosc_api.v1 import synthesis_pb2 as pb
@@ -29,24 +25,16 @@ from robosc_client import (
     ClientError,
     CredentialsError,
     DeadlineError,
-    Explore,
-    Format,
-    Generate,
     Job,
     JobError,
-    JobState,
     RequestRefusedError,
-    RetryPolicy,
     ServerBusyError,
     ServerUnavailableError,
     ServiceError,
     SynthesisOptions,
     SynthesisStatus,
-    Synthesize,
-    TaskKind,
     Verify,
 )
-from robosc_client.convert.requests import request_of
 from support.answers import (
     enveloped,
     explanation,
@@ -60,38 +48,15 @@ from support.answers import (
     verification,
     watched,
 )
-from support.both_clients import KINDS, client_of
+from support.both_clients import AWAY, KINDS, QUICK, Talk, client_of
 from support.certificates import Authority
 from support.models import bundle_of
-from support.scripted_service import Refusal, held, kept_port, scripted
+from support.scripted_service import Refusal, scripted
 from support.waiting import PATIENCE_S, eventually
 
 NOWHERE = "127.0.0.1:1"
 BUNDLE = bundle_of("robot R { }")
-QUICK = RetryPolicy(first_s=0.001, longest_s=0.01)
-AWAY = Refusal(grpc.StatusCode.UNAVAILABLE, "the server is ending", "SHUTTING_DOWN")
 BUSY = Refusal(grpc.StatusCode.RESOURCE_EXHAUSTED, "too much to do", "SERVER_BUSY", 2.0)
-
-
-@pytest.fixture(params=KINDS)
-def connect(request: Any) -> Any:
-    """Opens a client of either kind that tries again quickly."""
-    return lambda address, **options: client_of(request.param, address, **{"retries": QUICK, **options})
-
-
-Talk = Callable[..., AbstractContextManager[tuple[Any, Any]]]
-
-
-@pytest.fixture
-def talk(connect: Any) -> Talk:
-    """Opens a client, of either kind, of a server that gives these answers to its methods, with a record of them."""
-
-    @contextmanager
-    def opened(**answers: Any) -> Iterator[tuple[Any, Any]]:
-        with scripted(**answers) as (address, script), connect(address) as client:
-            yield client, script
-
-    return opened
 
 
 def test_public_names() -> None:
@@ -460,174 +425,6 @@ class TestCredentials:
             server.stop(None).wait()
 
 
-def got() -> Any:
-    return [jobs_pb2.GetJobResponse(job=job())]
-
-
-class TestWatch:
-    def states(self, *numbers: int) -> Any:
-        """A job's revisions; the last one has ended."""
-        *first, last = numbers
-        return watched(*(job(number) for number in first), job(last, jobs_pb2.JOB_STATE_SUCCEEDED))
-
-    def test_resumed_after_lost_connections(self, connect: Any) -> None:
-        """Check what ends a watch before its job: an error, and a stream that ends; nothing is reported twice."""
-        parts = [[AWAY], [*watched(job(1), job(4)), AWAY], watched(job(5)), [AWAY], [AWAY], self.states(7, 9)]
-        with (
-            scripted(WatchJob=parts) as (address, script),
-            connect(address, sleep=lambda seconds: None, retries=RetryPolicy(watch_attempts=4)) as client,
-        ):
-            assert [item.revision for item in client.watch("job-1")] == [1, 4, 5, 7, 9]
-            assert [item.after_revision for item in script.of("WatchJob")] == [0, 0, 4, 5, 5, 5]
-
-    @pytest.mark.parametrize(
-        ("code", "message"),
-        [
-            ("UNKNOWN", "Stream removed (Data frame with END_STREAM flag received)"),
-            ("INTERNAL", "Received RST_STREAM with error code 2"),
-            ("CANCELLED", "RST_STREAM (8)"),
-        ],
-    )
-    def test_resumed_when_a_proxy_has_lost_the_server(self, connect: Any, code: str, message: str) -> None:
-        lost = Refusal(grpc.StatusCode[code], message)
-        with (
-            scripted(WatchJob=[[*watched(job(1)), lost], self.states(2)], GetJob=[[lost], got()]) as (address, script),
-            connect(address, sleep=lambda seconds: None) as client,
-        ):
-            assert [item.revision for item in client.watch("job-1")] == [1, 2]
-            assert [item.after_revision for item in script.of("WatchJob")] == [0, 1]
-            assert client.get_job("job-1").revision == 1
-
-    def test_resumed_with_a_server_that_was_started_anew(self, connect: Any) -> None:
-        with kept_port() as port, ExitStack() as first:
-            address, _ = first.enter_context(scripted(port=port, WatchJob=[[*watched(job(1)), held]]))
-            with connect(address, retries=RetryPolicy(first_s=0.05, watch_attempts=50)) as client:
-                items = iter(client.watch("job-1"))
-                assert next(items).revision == 1
-                first.close()
-                with scripted(port=port, WatchJob=[self.states(2)]) as (_, script):
-                    assert [item.revision for item in items] == [2]
-                    assert script.of("WatchJob")[0].after_revision == 1
-
-    def test_a_stream_that_always_ends_is_not_asked_for_ever(self, connect: Any) -> None:
-        with (
-            scripted(WatchJob=[[]]) as (address, script),
-            connect(address, sleep=lambda seconds: None) as client,
-            pytest.raises(ServerUnavailableError),
-        ):
-            list(client.watch("job-1"))
-        assert len(script.of("WatchJob")) == QUICK.watch_attempts
-
-    @pytest.mark.parametrize(
-        "jobs", [(job(3), job(3)), (job(3), job(2)), (job(id="job-2"),), (job(0),), (job(state=0),), (job(kind=0),)]
-    )
-    def test_what_no_server_reports(self, talk: Talk, jobs: Any) -> None:
-        with talk(WatchJob=[watched(*jobs)]) as (client, _), pytest.raises(ServiceError, match="malformed"):
-            list(client.watch("job-1"))
-
-    def test_deadline(self, talk: Talk) -> None:
-        with talk(WatchJob=[[*watched(job(1)), held]]) as (client, _), pytest.raises(DeadlineError):
-            client.wait("job-1", deadline_s=0.4)
-
-    def test_wait(self, talk: Talk) -> None:
-        with talk(WatchJob=[self.states(1, 2, 3)]) as (client, _):
-            found = client.wait("job-1")
-            assert (found.state, found.revision) == (JobState.SUCCEEDED, 3)
-
-    def test_an_unread_watch_is_ended(self, talk: Talk) -> None:
-        ended = threading.Event()
-
-        def noted(context: Any) -> Any:
-            context.add_callback(ended.set)
-            return ()
-
-        with talk(WatchJob=[[noted, *watched(job(1)), held]]) as (client, _):
-            items = client.watch("job-1")
-            next(items)
-            items.close()
-            assert ended.wait(PATIENCE_S)
-
-
-class TestJobs:
-    def test_values(self, talk: Talk) -> None:
-        message = job(
-            5,
-            jobs_pb2.JOB_STATE_FAILED,
-            label="mine\x1b",
-            attempts=2,
-            from_store=True,
-            waiting_before=3,
-            progress=pb.Progress(stage="check", message="m"),
-        )
-        message.start_time.seconds = 1_700_000_001
-        message.end_time.seconds = 1_700_000_002
-        message.expire_time.seconds = 1_700_000_003
-        with talk(GetJob=[[jobs_pb2.GetJobResponse(job=message)]]) as (client, _):
-            found = client.get_job("job-1")
-        assert (found.id, found.owner, found.kind, found.state) == (
-            "job-1", "tester", TaskKind.SYNTHESIZE, JobState.FAILED
-        )  # fmt: skip
-        assert found.created == datetime.fromtimestamp(1_700_000_000, UTC)
-        assert [item.timestamp() % 10 for item in (found.started, found.ended, found.expires)] == [1, 2, 3]
-        assert (found.attempts, found.from_store, found.waiting_before, found.main_file) == (2, True, 3, "robot.rscd")
-        assert (found.failure.reason, found.failure.message) == ("CPU_LIMIT", "too long")
-        assert found.label == "mine\\x1b"
-
-    @pytest.mark.parametrize(
-        "message",
-        [
-            job(id="../x"),
-            job(id=""),
-            job(id="x" * 200),
-            job(id="other"),
-            job(failure=jobs_pb2.Failure(reason="x")),
-            job(create_time={"seconds": 2**60}),
-        ],
-    )
-    def test_what_no_server_reports(self, talk: Talk, message: Any) -> None:
-        with (
-            talk(GetJob=[[jobs_pb2.GetJobResponse(job=message)]]) as (client, _),
-            pytest.raises(ServiceError, match="malformed"),
-        ):
-            client.get_job("job-1")
-
-    def test_submission(self, talk: Talk) -> None:
-        answer = jobs_pb2.SubmitJobResponse(job=job(), existed=True)
-        with talk(SubmitJob=[[answer]]) as (client, script):
-            assert client.submit(Check(BUNDLE)).existed
-            client.submit(Check(BUNDLE))
-            client.submit(Synthesize(BUNDLE), idempotency_key="mine", label="a label", retention_s=1.5)
-            first, second, third = script.of("SubmitJob")
-        assert len(first.idempotency_key) == 32
-        assert first.idempotency_key != second.idempotency_key
-        assert first.task.WhichOneof("request") == "check"
-        assert not first.HasField("retention")
-        assert (third.idempotency_key, third.label, third.retention.ToMilliseconds()) == ("mine", "a label", 1500)
-
-    def test_pages(self, talk: Talk) -> None:
-        def page(token: str, *numbers: int) -> list[Any]:
-            return [jobs_pb2.ListJobsResponse(jobs=[job(id=f"job-{n}") for n in numbers], next_page_token=token)]
-
-        pages = [page("a", 1, 2), page("b"), page("", 3)]
-        with talk(ListJobs=pages) as (client, script):
-            chosen = {"states": (JobState.QUEUED,), "kind": TaskKind.CHECK, "all_owners": True, "page_size": 2}
-            assert [item.id for item in client.list_jobs(**chosen)] == ["job-1", "job-2", "job-3"]
-            assert [item.page_token for item in script.of("ListJobs")] == ["", "a", "b"]
-            asked = script.of("ListJobs")[2]
-        assert (list(asked.states), asked.kind, asked.all_owners, asked.page_size) == ([1], 1, True, 2)
-
-    def test_pages_without_an_end(self, talk: Talk) -> None:
-        same = [jobs_pb2.ListJobsResponse(next_page_token="a")]
-        many = [jobs_pb2.ListJobsResponse(jobs=[job() for _ in range(3)])]
-        changing = [[jobs_pb2.ListJobsResponse(next_page_token=str(number))] for number in range(200)]
-        for pages in ([same], [many], changing):
-            with (
-                talk(ListJobs=pages) as (client, _),
-                pytest.raises(ServiceError, match=r"does not end|more than 2 jobs"),
-            ):
-                list(client.list_jobs(page_size=2))
-
-
 PLACE = Location("robot.rscd", 3, 7, 4)
 FINDINGS = (
     Diagnostic(Severity.ERROR, "no-file", "there is no file", None, "Write it."),
@@ -686,94 +483,3 @@ class TestConversion:
             assert (found.version, found.engines) == ("9", ("cudd", "autoref"))
             assert (found.limits.bundle_bytes, found.limits.task_seconds) == (1, 3.5)
             assert [(item.name, item.description) for item in client.list_targets()] == [("ros2", "a package")]
-
-    def test_requests(self) -> None:
-        """Every field of every request says what was meant."""
-        bundle = Bundle(
-            SourceFile("robot.rscd", "robot \u00e9"),
-            (SourceFile("../shared/a.rscd", ""),),
-            ("here",),
-            (SourceFile("std_msgs/msg/Bool.msg", "bool data"),),
-        )
-        options = SynthesisOptions(
-            deployment=Deployment.LAYER,
-            engine="autoref",
-            allow_livelock=True,
-            allow_reordering=True,
-            maximum_nodes=5,
-            verified_states=0,
-        )
-        sent_options = pb.SynthesisOptions(
-            deployment=pb.DEPLOYMENT_LAYER,
-            engine="autoref",
-            allow_livelock=True,
-            allow_reordering=True,
-            maximum_nodes=5,
-            verified_states=0,
-        )
-        assert sent_options.HasField("verified_states")
-        sent = pb.Bundle(
-            main=pb.SourceFile(name="robot.rscd", text="robot \u00e9"),
-            libraries=[pb.SourceFile(name="../shared/a.rscd")],
-            searched=["here"],
-            interfaces=[pb.SourceFile(name="std_msgs/msg/Bool.msg", text="bool data")],
-        )
-        assert request_of(Check(bundle)) == pb.CheckRequest(bundle=sent)
-        assert request_of(Synthesize(bundle, options)) == pb.SynthesizeRequest(bundle=sent, options=sent_options)
-        plain = pb.SynthesisOptions(deployment=pb.DEPLOYMENT_CONTROLLER)
-        assert request_of(Synthesize(bundle)) == pb.SynthesizeRequest(bundle=sent, options=plain)
-        chosen = GenerateOptions("walker", True, True, SupervisedController("p", executable="x"))
-        assert request_of(Generate(bundle, "ros2", chosen, options)) == pb.GenerateRequest(
-            bundle=sent,
-            options=sent_options,
-            target="ros2",
-            generation=pb.GenerateOptions(
-                package="walker",
-                publish_state=True,
-                log_events=True,
-                supervised=pb.SupervisedController(package="p", executable="x"),
-            ),
-        )
-        metadata = PackageMetadata("Jane", "jane@example.org", "BSD-3-Clause", "1.2.3", "2024 Jane")
-        described = GenerateOptions(metadata=metadata, state_message=StateMessage.TYPED)
-        found: Any = request_of(Generate(bundle, "ros2", described))
-        assert found.generation.metadata == pb.PackageMetadata(
-            maintainer="Jane",
-            email="jane@example.org",
-            license="BSD-3-Clause",
-            version="1.2.3",
-            copyright="2024 Jane",
-        )
-        assert found.generation.state_message == "typed"
-        launched = GenerateOptions(supervised=SupervisedController("p", launch_file="x.launch.py"))
-        found = request_of(Generate(bundle, "ros2", launched))
-        assert found.generation.supervised == pb.SupervisedController(package="p", launch_file="x.launch.py")
-        assert request_of(Explore(bundle, options, 7)) == pb.ExploreRequest(
-            bundle=sent, options=sent_options, maximum_states=7
-        )
-        assert request_of(Format(bundle.main)) == pb.FormatRequest(file=sent.main)
-        assert request_of(
-            Verify(
-                model=bundle,
-                supervisor=b"x",
-                deployment=Deployment.LAYER,
-                properties=("AG a",),
-                property_files=(SourceFile("p", "AG b"),),
-                engine="cudd",
-                allow_reordering=True,
-                maximum_nodes=3,
-                maximum_states=9,
-                is_strict=True,
-            )
-        ) == pb.VerifyRequest(
-            bundle=sent,
-            options=pb.SynthesisOptions(
-                deployment=pb.DEPLOYMENT_LAYER, engine="cudd", allow_reordering=True, maximum_nodes=3
-            ),
-            supervisor=b"x",
-            properties=["AG a"],
-            property_files=[pb.SourceFile(name="p", text="AG b")],
-            maximum_states=9,
-            strict=True,
-        )
-        assert request_of(Verify(model=bundle)) == pb.VerifyRequest(bundle=sent, options=pb.SynthesisOptions())

@@ -14,7 +14,6 @@ from support.client_commands import Run
 from support.health_servers import answering
 
 Status = health_pb2.HealthCheckResponse
-IN_THE_CLEAR = ServerSecurity()
 
 
 @pytest.fixture

@@ -201,7 +201,7 @@ class TestWatch:
             assert status == 1
             assert json.loads(out)["job"]["failure"] == {"reason": "CPU_LIMIT", "message": "too long"}
 
-    def test_a_line_moves_on_a_terminal(self, tmp_path: Path) -> None:
+    def test_a_line_moves_on_a_terminal(self) -> None:
         """The text is no markup, and gone at the end."""
         states = [job(number, progress=pb.Progress(stage="check", message=f"[bold]step {number}")) for number in (1, 2)]
 
@@ -367,7 +367,7 @@ class TestGet:
                 assert "malformed" in err
         assert not (tmp_path / "out").exists()
 
-    def test_a_text_on_a_terminal_and_in_a_file(self, tmp_path: Path) -> None:
+    def test_a_text_on_a_terminal_and_in_a_file(self) -> None:
         """Check that text that would move the cursor is shown, and not obeyed; a file has every byte."""
         text = "robot R {\n\t// \x1b]0;owned\x07 \x9b2J\r\n}\n"
         with scripted(**job_answers("format", [pb.FormatResponse(text=text)])) as (address, _):

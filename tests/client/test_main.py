@@ -344,7 +344,7 @@ class TestSameAsHere:
         both("verify", *given, NAVIGATION, *chosen, *how)
 
     @pytest.mark.parametrize("how", [[], ["--check"], ["--diff"], ["--json"], ["--json", "--diff"]])
-    def test_format(self, both: Both, tmp_path: Path, how: Any) -> None:
+    def test_format(self, both: Both, how: Any) -> None:
         texts = {"a": "robot  R{ }", "b": "robot R { }\n", "c": "robot {", "d": "\ufeffrobot R{ // why\n}"}
 
         def prepare(folder: Path) -> None:
@@ -380,14 +380,7 @@ class TestSameAsHere:
         assert found.files == {}
         assert "Traceback" not in found.output + found.errors
 
-    def test_not_overwritten(
-        self,
-        both: Both,
-        tmp_path: Path,
-        monkeypatch: pytest.MonkeyPatch,
-        capfd: pytest.CaptureFixture[str],
-        server: Any,
-    ) -> None:
+    def test_not_overwritten(self, both: Both, tmp_path: Path, capfd: pytest.CaptureFixture[str], server: Any) -> None:
         model = EXAMPLES[0]
         changed = tmp_path / "out"
         assert (

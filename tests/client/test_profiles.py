@@ -139,7 +139,11 @@ def test_which_server_is_asked(monkeypatch: pytest.MonkeyPatch, run: Run) -> Non
     assert target()[0] == "b:1"
     assert target("--profile", "c")[0] == "c:1"
     assert target("--server", "d:1")[0] == "d:1"
-    assert run("version", "--profile", "none")[0] == 2
+    status, _, err = run("version", "--profile", "none")
+    assert status == 2
+    assert "'none' (there are a, b, c): see robosc-client profile --help" in err
+    profiles_file().write_text('default = "a"\n', encoding="utf-8")
+    assert "the default 'a' is not one of its profiles (there are none)" in run("version")[2]
 
 
 def test_whom_a_token_is_sent_to(monkeypatch: pytest.MonkeyPatch, run: Run, tmp_path: Path) -> None:

@@ -58,15 +58,16 @@ class TestSignatures:
         assert asked(supervisor(content))[0] == 0
         assert (place.read_bytes(), beside.exists()) == (content, False)
         place.unlink()
-        for answer, keys in (
-            (supervisor(content), trusted),
-            (supervisor(content, signature=signature), ["--signed-by", tmp_path / "wrong.pub"]),
-            (supervisor(content, signature=b"x"), trusted),
-            (supervisor(content + b" ", signature=signature), trusted),
+        refused = "the server's supervisor: "
+        for answer, keys, words in (
+            (supervisor(content), trusted, "the server has not signed the supervisor: it needs a signing_key"),
+            (supervisor(content, signature=signature), ["--signed-by", tmp_path / "wrong.pub"], refused),
+            (supervisor(content, signature=b"x"), trusted, refused),
+            (supervisor(content + b" ", signature=signature), trusted, refused),
         ):
             status, _, err = asked(answer, *keys)
             assert status == 3
-            assert err.startswith("robosc-client: the server")
+            assert err.startswith(f"robosc-client: {words}")
             assert not place.exists()
             assert not beside.exists()
 

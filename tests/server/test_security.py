@@ -194,7 +194,7 @@ class TestTls:
         caplog.clear()
         key.chmod(0o600)
         with serving(ServerSecurity(certificate=certificate, key=key)):
-            assert "may read it" not in caplog.text
+            assert "may read this file" not in caplog.text
 
 
 class TestTokens:

@@ -538,7 +538,7 @@ class TestRecentRequests:
         monkeypatch.setattr(requests_module, "accept_request", None)
         assert cache.accept(TaskKind.CHECK, "me", bytes(bytearray(content))) is task
 
-    def test_is_bounded_and_forgets_what_was_asked_for_longest_ago(self, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_is_bounded_and_forgets_what_was_asked_for_longest_ago(self) -> None:
         cache = RequestCache(LIMITS)
         requests = [
             pb.CheckRequest(bundle=pb.Bundle(main=pb.SourceFile(name="m", text=f"{number:060000}"))).SerializeToString()

@@ -2,12 +2,21 @@
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterator
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from typing import Any
 
-from robosc_client import AsyncClient, Client
+import grpc
+
+from robosc_client import AsyncClient, Client, RetryPolicy
+from support.scripted_service import Refusal
 
 KINDS = ("sync", "async")
+
+QUICK = RetryPolicy(first_s=0.001, longest_s=0.01)
+AWAY = Refusal(grpc.StatusCode.UNAVAILABLE, "the server is ending", "SHUTTING_DOWN")
+
+Talk = Callable[..., AbstractContextManager[tuple[Any, Any]]]
+"""Opens a client of a server that gives these answers to its methods, with a record of them."""
 
 
 class Blocking:

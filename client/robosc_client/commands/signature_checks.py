@@ -42,7 +42,10 @@ def require_signature(keys: "Collection[PublicKey]", supervisor: bytes, signatur
     from robosc.signatures import SignatureError, signer
 
     if not signature:
-        raise CommandError("the server has not signed the supervisor", ExitCode.SERVICE)
+        raise CommandError(
+            "the server has not signed the supervisor: it needs a signing_key, or the command no --signed-by",
+            ExitCode.SERVICE,
+        )
     try:
         signer(supervisor, signature, keys)
     except SignatureError as error:

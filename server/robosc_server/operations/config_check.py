@@ -127,7 +127,7 @@ def _listenable(path: Path) -> tuple[CheckGrade, str]:
     if problem is not None:
         return CheckGrade.ERROR, f"{path.parent} cannot be written: {problem}"
     if path.exists() and not path.is_socket():
-        return CheckGrade.ERROR, f"{path} is there, and no socket"
+        return CheckGrade.ERROR, f"{path} is there, and no socket: remove it, or choose another path"
     return CheckGrade.OK, f"{path}"
 
 

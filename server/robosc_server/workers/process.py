@@ -29,7 +29,7 @@ class WorkerProcess:
     Attributes:
         pid: Process id.
         task: Task that it runs; None before the task, and once its outcome is known.
-        end: End of the process, as soon as that is known; None: the fork server that would report it is gone.
+        exit: Exit of the process, as soon as that is known; None: the fork server that would report it is gone.
     """
 
     def __init__(self, pid: int, connection: socket.socket, descriptor: int, crash_output: int) -> None:

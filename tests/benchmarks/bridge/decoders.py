@@ -3,24 +3,17 @@
 The aim is a hundred times the line; time is that of the processor. *Frames*: bytes to frames. *Scans*: bytes to 360
 ranges. *Noise*: random bytes. *Headers*: only bytes that look like the beginning of a frame, the worst that a line
 can bring.
-
-Usage: decoders.py
 """
 
-import sys
 import time
 from collections.abc import Callable, Iterator
-from pathlib import Path
 from random import Random
 from typing import Any
 
-ROOT = Path(__file__).parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "bridge"), str(ROOT / "tests"), str(ROOT / "tests" / "benchmarks")]
-
-from figures import text_table  # noqa: E402  # found through the path above
-from robosc_bridge.devices.lidar import LDS01, LDS02, LDS03, Model  # noqa: E402
-from robosc_bridge.protocol.revolutions import RevolutionBuilder, nearest_by_degree  # noqa: E402
-from support.lidar_frames import lds01_frame, lds02_frame, lds03_frame  # noqa: E402
+from figures import text_table
+from robosc_bridge.devices.lidar import LDS01, LDS02, LDS03, Model
+from robosc_bridge.protocol.revolutions import RevolutionBuilder, nearest_by_degree
+from support.lidar_frames import lds01_frame, lds02_frame, lds03_frame
 
 RUNS = 7
 TURNS = 60
@@ -108,7 +101,3 @@ def table() -> str:
                 _row(f"{model.name}: headers", model, headers, size, _frames, 0),
             ]
     return text_table(f"LiDAR decoders, best of {RUNS} runs", HEADER, rows)
-
-
-if __name__ == "__main__":
-    sys.stdout.write(table() + "\n")

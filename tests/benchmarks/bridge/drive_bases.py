@@ -3,8 +3,6 @@
 The simulated robot is a process of its own, at the far end of a real pseudo-terminal, and moves; exchanges follow one
 another by their period. *Command*: from the call to the first byte of the command on the line. *CPU*: of the thread
 that exchanges. *Waiting*: the same while an answer does not come for a second.
-
-Usage: drive_bases.py
 """
 
 import statistics
@@ -15,17 +13,15 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from figures import text_table
+from robosc_bridge.devices.dynamixel_bus import DynamixelBus
+from robosc_bridge.devices.interface import Velocity
+from robosc_bridge.devices.robots import BURGER
+from robosc_bridge.driver_registry import make_drive_base
+from robosc_bridge.errors import DeviceSilentError
+from robosc_bridge.transport.serial_line import SerialLine
+
 ROOT = Path(__file__).parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "bridge"), str(ROOT / "tests" / "benchmarks")]
-
-from figures import text_table  # noqa: E402  # found through the path above
-from robosc_bridge.devices.dynamixel_bus import DynamixelBus  # noqa: E402
-from robosc_bridge.devices.interface import Velocity  # noqa: E402
-from robosc_bridge.devices.robots import BURGER  # noqa: E402
-from robosc_bridge.driver_registry import make_drive_base  # noqa: E402
-from robosc_bridge.errors import DeviceSilentError  # noqa: E402
-from robosc_bridge.transport.serial_line import SerialLine  # noqa: E402
-
 EXCHANGES = 1000
 PERIODS_S = {"opencr": 0.020, "dynamixel": 0.010}
 WAIT_S = 1.0
@@ -109,7 +105,3 @@ def _row(name: str) -> list[str]:
 def table() -> str:
     """One row for each drive base."""
     return text_table(f"Drive bases, {EXCHANGES} exchanges", HEADER, [_row(name) for name in PERIODS_S])
-
-
-if __name__ == "__main__":
-    sys.stdout.write(table() + "\n")

@@ -2,21 +2,14 @@
 
 The robot drives through mazes of growing size, its wheels reversed where it comes to a wall. *Steps alone*: without a
 scan. A step is 5 ms of the world; time is that of the processor.
-
-Usage: twin.py
 """
 
-import sys
 import time
-from pathlib import Path
 
-ROOT = Path(__file__).parents[3]
-sys.path[:0] = [str(ROOT), str(ROOT / "bridge"), str(ROOT / "tests"), str(ROOT / "tests" / "benchmarks")]
-
-from figures import text_table  # noqa: E402  # found through the path above
-from robosc.execution.runtime.clock import ManualClock  # noqa: E402
-from robosc_simulated import BODIES, Scene, Timebase, World, load_scene, maze_scene  # noqa: E402
-from robosc_simulated.world import STEP_S  # noqa: E402
+from figures import text_table
+from robosc.execution.runtime.clock import ManualClock
+from robosc_simulated import BODIES, Scene, Timebase, World, load_scene, maze_scene
+from robosc_simulated.world import STEP_S
 
 RUNS = 5
 STEPS = 2_000
@@ -58,7 +51,3 @@ def table() -> str:
         alone = f"{_steps_per_s(scene, False):,.0f}"
         rows.append([scene.name, str(len(scene.walls.segments)), f"{speed:,.0f}", alone, verdict])
     return text_table(f"The simulated world, best of {RUNS} runs", HEADER, rows)
-
-
-if __name__ == "__main__":
-    sys.stdout.write(table() + "\n")

@@ -4,14 +4,10 @@ The empty server is given one layer of the service after the other; the rest is 
 turns of a few hundred calls, and the least of each counts, since other work on the machine only adds to it.
 """
 
-import sys
 import tempfile
 from collections.abc import Callable
 from contextlib import ExitStack
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from figures import text_table
 from robosc_api.security import Credentials, Scope, make_token
@@ -27,7 +23,7 @@ WARM_UP = 200
 HEADER = ("line follower, cached", "Check us", "more", "Synthesize us", "more")
 
 
-def table(calls: int = CALLS, turns: int = TURNS) -> str:
+def table() -> str:
     """Return the table of both methods."""
     with ExitStack() as stack:
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory()))
@@ -47,10 +43,10 @@ def table(calls: int = CALLS, turns: int = TURNS) -> str:
         guarded = _service(stack, "--tokens", str(tokens))
         measured["the service with tokens"] = _measure(guarded, Credentials(token_file=token_file))
         found: dict[tuple[str, str], list[float]] = {}
-        for turn in range(turns + 1):
+        for turn in range(TURNS + 1):
             for method in ("Check", "Synthesize"):
                 for name, measure in measured.items():
-                    used_s = measure(f"{method}, cached", calls if turn else WARM_UP)
+                    used_s = measure(f"{method}, cached", CALLS if turn else WARM_UP)
                     if turn:
                         found.setdefault((name, method), []).append(used_s * 1e6)
     rows, before = [], {"Check": 0.0, "Synthesize": 0.0}
@@ -82,7 +78,3 @@ def _measure(server: Server, credentials: Credentials, *, is_echo: bool = False)
         return (processor_s(server.pid) - before_s) / calls
 
     return measured
-
-
-if __name__ == "__main__":
-    sys.stdout.write(table() + "\n")

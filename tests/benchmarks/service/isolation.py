@@ -5,13 +5,9 @@ Each round does the same task in all ways, one after the other, so that other wo
 
 import asyncio
 import statistics
-import sys
 import time
 from collections.abc import Awaitable, Callable
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from figures import text_table
 from robosc_api.v1 import synthesis_pb2 as pb
@@ -104,7 +100,3 @@ async def _rows() -> list[list[str]]:
 def table() -> str:
     """Medians in milliseconds; `least`: of the isolation, between the fastest rounds of both."""
     return text_table("Tasks in processes of their own, milliseconds", HEADER, asyncio.run(_rows()))
-
-
-if __name__ == "__main__":
-    sys.stdout.write(table() + "\n")

@@ -52,16 +52,16 @@ _WATCHED_S = 10.0
 _NUMBERS = itertools.count()
 
 
-def table(seconds: float = _SECONDS) -> str:
+def table() -> str:
     """All tables, of one run."""
     with (
         server_process("--worker-processes", "2", "--log-level", "warning") as (process, address),
         echo_server(answer_sizes(address)) as (echo_process, echo_address),
     ):
         echo, service = Server(echo_process.pid, echo_address), Server(process.pid, address)
-        parts = [_calls("The synthesis service under load", echo, service, seconds)]
+        parts = [_calls("The synthesis service under load", echo, service)]
         with _busy_core():
-            parts.append(_calls("The same with a busy loop on one core", echo, service, seconds))
+            parts.append(_calls("The same with a busy loop on one core", echo, service))
         parts += [_memory(address, process.pid), _watchers(address, process.pid)]
     return "\n\n".join(parts)
 
@@ -93,7 +93,7 @@ def _busy_core() -> Iterator[None]:
         process.wait()
 
 
-def _calls(title: str, echo: Server, service: Server, seconds: float) -> str:
+def _calls(title: str, echo: Server, service: Server) -> str:
     kinds = call_kinds()
     rows = []
     for load in kinds.values():
@@ -109,7 +109,7 @@ def _calls(title: str, echo: Server, service: Server, seconds: float) -> str:
         for _ in range(_TURNS):
             for name, (server, chosen) in asked.items():
                 before_s = processor_s(server.pid)
-                found[name].append(run_load(server.address, chosen, duration_s=seconds / _TURNS))
+                found[name].append(run_load(server.address, chosen, duration_s=_SECONDS / _TURNS))
                 used_s[name] += processor_s(server.pid) - before_s
         measured = {name: together(parts) for name, parts in found.items()}
         rows += [_row(name, clients, measured, used_s) for name in asked]

@@ -6,12 +6,8 @@ workers are most of what a process of its own costs: each page that a fork write
 
 import os
 import statistics
-import sys
 from dataclasses import dataclass
 from pathlib import Path
-
-sys.path.insert(0, str(Path(__file__).parents[1]))
-sys.path.insert(0, str(Path(__file__).parents[2]))
 
 from figures import text_table
 from service.load import call_kinds, processor_s, run_load
@@ -44,13 +40,13 @@ class _Used:
     workers_s: float
     faults: float
 
-    def per_task(self, before: "_Used", tasks: int) -> "_Used":
+    def per_task(self, before: "_Used") -> "_Used":
         """Return the use of one task, of all that came after another measurement."""
         return _Used(
-            (self.server_s - before.server_s) / tasks,
-            (self.fork_server_s - before.fork_server_s) / tasks,
-            (self.workers_s - before.workers_s) / tasks,
-            (self.faults - before.faults) / tasks,
+            (self.server_s - before.server_s) / TASKS,
+            (self.fork_server_s - before.fork_server_s) / TASKS,
+            (self.workers_s - before.workers_s) / TASKS,
+            (self.faults - before.faults) / TASKS,
         )
 
     @property
@@ -59,7 +55,7 @@ class _Used:
         return self.server_s + self.fork_server_s + self.workers_s
 
 
-def table(tasks: int = TASKS, rounds: int = ROUNDS) -> str:
+def table() -> str:
     """Medians of several rounds, and the least time of all processes."""
     with server_process("--worker-processes", "2", "--log-level", "warning") as (process, address):
         (fork_server,) = _children(process.pid)
@@ -69,10 +65,10 @@ def table(tasks: int = TASKS, rounds: int = ROUNDS) -> str:
                 continue
             run_load(address, load(1), count=WARM_UP)
             found = []
-            for _ in range(rounds):
+            for _ in range(ROUNDS):
                 before = _used(process.pid, fork_server)
-                assert len(run_load(address, load(1), count=tasks).times_s) == tasks
-                found.append(_used(process.pid, fork_server).per_task(before, tasks))
+                assert len(run_load(address, load(1), count=TASKS).times_s) == TASKS
+                found.append(_used(process.pid, fork_server).per_task(before))
             rows.append(_row(name, found))
     return text_table("Processor time of a task, milliseconds", HEADER, rows)
 
@@ -105,7 +101,3 @@ def _children(pid: int) -> list[int]:
 def _fields(pid: int) -> list[str]:
     """Fields of a process's state behind its name, which may hold anything."""
     return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()
-
-
-if __name__ == "__main__":
-    sys.stdout.write(table() + "\n")

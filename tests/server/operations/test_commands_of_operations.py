@@ -128,7 +128,7 @@ def test_tokens(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
     assert Checked(capsys, "--tokens", str(file)).status == 1
 
 
-def test_what_others_could_read_on_the_way(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+def test_what_others_could_read_on_the_way(capsys: pytest.CaptureFixture[str]) -> None:
     cluster = Checked(capsys, "--workers", "dask://192.0.2.1:1")
     assert cluster.grade("workers") == "error"
     assert "insecure_workers_beyond_loopback" in cluster.of("workers")[0][1]
@@ -151,6 +151,9 @@ def test_a_socket_and_the_number_of_connections(capsys: pytest.CaptureFixture[st
     assert Checked(capsys, "--socket", str(tmp_path / "s")).of("listening") == [("ok", str(tmp_path / "s"))]
     assert Checked(capsys, "--socket", str(tmp_path / "none" / "s")).grade("listening") == "error"
     assert Checked(capsys, "--socket", str(tmp_path / ("s" * 200))).grade("listening") == "error"
+    (tmp_path / "file").touch()
+    ((grade, message),) = Checked(capsys, "--socket", str(tmp_path / "file")).of("listening")
+    assert (grade, message.endswith("no socket: remove it, or choose another path")) == ("error", True)
     assert Checked(capsys, "--forwarded-identity").grade("listening") == "error"
     many = Checked(capsys, "--connections", "1000000000")
     assert "LimitNOFILE" in many.of("listening")[1][1]

@@ -19,10 +19,10 @@ def settings_table() -> str:
         rows = ["| flag | file | environment | what it is | default |", "|---|---|---|---|---|"]
         for name in Settings.model_fields:
             if group_of(name) == group:
-                cells = (f"`{flag_of(name)}`", f"`{name}`", f"`{variable_of(name)}`", description_of(name))
-                rows.append(
-                    f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} | {default_text(name)} |"
-                )
+                cells = [f"`{flag_of(name)}`", f"`{name}`", f"`{variable_of(name)}`", description_of(name)]
+                cells.append(default_text(name))
+                assert "|" not in "".join(cells)
+                rows.append(f"| {' | '.join(cells)} |")
         parts.append(f"### {group[0].upper()}{group[1:]}\n\n" + "\n".join(rows) + "\n")
     return "\n".join(parts)
 
@@ -31,11 +31,6 @@ def test_every_setting_stands_in_the_manual_as_it_is_defined() -> None:
     _, _, rest = PAGE.partition("<!-- settings: from the definition -->\n\n")
     table, _, _ = rest.partition("\n<!-- end of settings -->")
     assert table == settings_table()
-    for name in Settings.model_fields:
-        row = (
-            f"| `{flag_of(name)}` | `{name}` | `{variable_of(name)}` | {description_of(name)} | {default_text(name)} |"
-        )
-        assert table.count(row) == 1
 
 
 def test_every_metric_stands_in_the_manual() -> None:
@@ -49,8 +44,3 @@ def test_every_metric_stands_in_the_manual() -> None:
         if family.name.startswith("robosc_") and not family.name.endswith("_created")
     }
     assert listed == {name.removesuffix("_info") + "_info" if "info" in name else name for name in counted}
-
-
-def test_no_row_of_a_table_is_broken() -> None:
-    for name in Settings.model_fields:
-        assert "|" not in description_of(name) + default_text(name)

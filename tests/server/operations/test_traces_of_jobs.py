@@ -2,7 +2,6 @@
 
 import threading
 from concurrent.futures import ThreadPoolExecutor
-from pathlib import Path
 from typing import Any
 
 import grpc
@@ -42,7 +41,7 @@ class Collector(trace_service_pb2_grpc.TraceServiceServicer):
         return trace_service_pb2.ExportTraceServiceResponse()
 
 
-def test_a_job_is_one_trace_from_its_submission_to_the_worker(tmp_path: Path) -> None:
+def test_a_job_is_one_trace_from_its_submission_to_the_worker() -> None:
     collector = Collector()
     with ThreadPoolExecutor(2) as threads:
         takes = grpc.server(threads)

@@ -51,7 +51,7 @@ class TestAnswers:
             os.kill(pid, signal.SIGCONT)
             assert said(future.result(60)) == "done"
 
-    def test_noise_and_secrets_stay_out(self, running: Running, monkeypatch: pytest.MonkeyPatch) -> None:
+    def test_noise_and_secrets_stay_out(self, running: Running) -> None:
         assert said(running.run("noise\necho quiet")) == "quiet"
         found = set(said(running.run("environment")).split())
         assert {"PATH", "PYTHONPATH"} <= found

@@ -201,7 +201,10 @@ def test_strategies_in_c(tmp_path: Path) -> None:
 
 
 def _tour() -> Model:
-    """Return a robot with a mission as long as one may be, and others whose visits may all be true at once."""
+    """Return a robot with a mission as long as one may be, and others whose visits may all be true at once.
+
+    What is seen of it takes several words in C, with goals in the first of them and assumptions in a later one.
+    """
     rooms = range(7)
     requests = "\n".join(f'incoming message go_{room} with identifier: "/go_{room}", type: none' for room in rooms)
     states = "\n".join(
@@ -232,6 +235,9 @@ def _tour() -> Model:
         visit not Base.r1 then not Base.r2 then not Base.r3
         on Operator.calling from anywhere visit Base.r4 then not Base.r4 then not Base.r5
     }}
+    goal once Base.r6
+    assume always eventually Operator.working
+    assume Operator.calling leads to Operator.working
 }}""")
 
 

@@ -3,6 +3,7 @@
 import math
 import threading
 from typing import Any
+from unittest.mock import Mock
 
 import pytest
 from hypothesis import given, settings
@@ -280,6 +281,36 @@ def test_a_goal_is_cancelled_by_who_asked_and_nobody_else(scene: Scene, program:
     scene.exchange()
     assert scene.out == STANDSTILL
     assert refused(program.say(CancelRequested, "face", "g")) == ["'g' is not a goal of 'face' in progress"]
+
+
+def test_a_rotation_goes_on_when_a_program_leaves_that_asked_for_another_motion(
+    scene: Scene, program: Connected
+) -> None:
+    other = Connected(scene, "another")
+    other.say(MessageRequested, "/cmd_vel", FORWARD)
+    scene.live(0.1, 2.0)
+    program.say(GoalRequested, "face", "g", {"angle": 90})
+    scene.live(0.1, 2.0)
+    other.leave()
+    scene.live(0.5, 2.0)
+    assert scene.out.angular_rad_s > 0.0
+
+
+def test_a_goal_ends_when_the_drive_base_is_lost(scene: Scene, program: Connected) -> None:
+    program.say(GoalRequested, "face", "g", {"angle": 90})
+    scene.live(0.1, 2.0)
+    scene.daemon.post(DeviceDown(Device.DRIVE, "no answer", 0.25, True))
+    program.cycle()
+    assert program.of(GoalOver) == [GoalOver("g", "aborted", {"success": False, "message": "the drive base is lost"})]
+
+
+def test_no_end_of_a_goal_reaches_the_next_run(scene: Scene) -> None:
+    robot, executor = scene.daemon._robot, Mock()
+    robot.send_goal("face", 1, {"angle": 90.0})
+    robot.forget()
+    robot.stop("a test")
+    robot.deliver_pending(executor)
+    assert executor.mock_calls == []
 
 
 def test_an_id_that_is_in_use_is_refused_and_free_again_afterwards(scene: Scene, program: Connected) -> None:

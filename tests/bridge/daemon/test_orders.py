@@ -261,6 +261,17 @@ def test_keys_and_buttons_stop_and_let_go_on_in_standby_too() -> None:
     assert scene.out.linear_m_s == 0.1
 
 
+def test_a_button_that_is_let_go_between_two_runs_is_no_event_of_the_next() -> None:
+    scene = running()
+    scene.buttons["button_2"] = True
+    scene.live(0.1, 2.0)
+    scene.ask(OperatorCommand.STANDBY, 1.0)
+    scene.buttons["button_2"] = False
+    scene.live(0.1, 2.0)
+    assert scene.ask(OperatorCommand.START, 1.0) == [DONE]
+    assert scene.events().count("button.response") == 1
+
+
 def test_a_resume_before_the_stop_was_put_out_is_refused() -> None:
     scene = running()
     scene.order(OperatorCommand.STOP)

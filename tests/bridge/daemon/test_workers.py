@@ -277,6 +277,18 @@ def test_torque_that_was_to_go_during_an_exchange_goes_also_if_it_is_wanted_agai
     scene.step()
     assert scene.taken() == [("exchange", FORWARD)]
 
+    def wanted_again_at_once() -> None:
+        scene.command(STANDSTILL, is_torque_wanted=False)
+        assert scene.base.source.newer() == STANDSTILL
+        scene.command(FORWARD)
+
+    scene.base.meanwhile = wanted_again_at_once
+    scene.step()
+    scene.taken()
+    scene.base.meanwhile = lambda: None
+    scene.step()
+    assert scene.taken() == [("torque", False), ("torque", True), ("exchange", FORWARD)]
+
 
 def test_a_velocity_counts_as_written_when_the_drive_base_says_so() -> None:
     scene = AttentiveScene()

@@ -102,6 +102,7 @@ def _check_visits(given_missions: list[Mission], run: list[Any]) -> None:
     recorder = Recorder(system, clock, log)  # type: ignore[arg-type]  # its state is not needed
     account = ProgressAccount(system, recorder, (), 0.0)  # type: ignore[arg-type]
     made = Counter[str]()
+    assert account.at(0.0).missions == ()
     # The account need not ask the system in each state, so that its places are told by a twin.
     twin = Touring(given_missions)
     for number, state in enumerate(run):
@@ -125,7 +126,9 @@ def _check_visits(given_missions: list[Mission], run: list[Any]) -> None:
         for mission, place in zip(given_missions, twin.places, strict=True):
             own = [item.is_met for item in found.aims if item.name.endswith(f" of mission {mission.name}")]
             is_done = [place.is_asked and (place.is_round or it < place.visit) for it in range(len(mission.visits))]
-            assert own[: len(is_done)] == is_done
+            current = zip(mission.detours, place.detours, strict=True)
+            is_done += [visit is not None and it < visit for item, visit in current for it in range(len(item.visits))]
+            assert own == is_done
     assert Counter(line["aim"] for line in log.entries if line["kind"] == "reached") == made
 
 

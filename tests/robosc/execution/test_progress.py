@@ -1,5 +1,6 @@
 """Progress of a strategy, against a plain account of what happened, and on a robot whose door does not open."""
 
+import math
 from itertools import pairwise, product
 from pathlib import Path
 from typing import Any
@@ -29,12 +30,14 @@ class Scripted:
     """A system whose aims and assumptions are met as the test says."""
 
     description = Description(
-        "Scripted", "controller", "", (), (), (), 0, True, (Aim("a", "A"), Aim("b", "B")), (Aim("c", "C"),)
+        *("Scripted", "controller", "", (), (), (), 0, True),
+        (Aim("a", "A"), Aim("b", "B")),
+        (Aim("c", "C"), Aim("d", "D")),
     )
     mode = 0
 
     def __init__(self) -> None:
-        self.met = (False, False, False)
+        self.met = (False, False, False, False)
 
     def situation(self) -> tuple[bool, ...]:
         return self.met
@@ -52,13 +55,14 @@ class Scripted:
         return None
 
 
-Moment = tuple[int, tuple[bool, bool, bool]]
+Moment = tuple[int, tuple[bool, bool, bool, bool]]
 
 
-def told(history: list[Moment], now_s: int) -> tuple[list[tuple[bool, int, float | None]], list[bool]]:
-    """Return each item's standing, and whether it has not been met for too long, from all that was seen."""
-    standings, late = [], []
-    for number in range(3):
+def told(history: list[Moment], now_s: int) -> tuple[list[tuple[bool, int, float | None]], tuple[str, ...]]:
+    """Return each item's standing, and the assumptions that are not met for too long, from all that was seen."""
+    standings: list[tuple[bool, int, float | None]] = []
+    late = []
+    for number, name in enumerate("abcd"):
         seen = [(time_s, met[number]) for time_s, met in history]
         count = sum(not before and after for (_, before), (_, after) in pairwise(seen))
         unmet_s = None
@@ -68,40 +72,94 @@ def told(history: list[Moment], now_s: int) -> tuple[list[tuple[bool, int, float
                 since -= 1
             unmet_s = float(now_s - seen[since][0])
         standings.append((seen[-1][1], count, unmet_s))
-        late.append(unmet_s is not None and unmet_s >= TIMEOUT_S)
-    return standings, late
+        if number > 1 and unmet_s is not None and unmet_s >= TIMEOUT_S:
+            late.append(name)
+    return standings, tuple(late)
+
+
+class Expected:
+    """Reports of assumptions that are to be made, worked out of all that was seen.
+
+    Attributes:
+        history: All that was seen.
+        due_s: Time of the next look.
+        lines: Reports: what, of which assumption, and for how long it was owed.
+    """
+
+    def __init__(self) -> None:
+        self.history: list[Moment] = []
+        self.due_s = math.inf
+        self.lines: list[tuple[str, str, float]] = []
+        self._reported: set[str] = set()
+
+    def _unmet_s(self, now_s: int) -> dict[str, float]:
+        standings = told(self.history, now_s)[0] if self.history else []
+        return {
+            name: unmet_s for name, (_, _, unmet_s) in zip("cd", standings[2:], strict=False) if unmet_s is not None
+        }
+
+    def expire(self, now_s: int) -> None:
+        unmet_s = self._unmet_s(now_s)
+        for name in told(self.history, now_s)[1]:
+            if name not in self._reported:
+                self._reported.add(name)
+                self.lines.append(("owed", name, unmet_s[name]))
+        left = [TIMEOUT_S - owed_s for name, owed_s in unmet_s.items() if name not in self._reported]
+        self.due_s = now_s + min(left, default=math.inf)
+
+    def observe(self, now_s: int, met: tuple[bool, bool, bool, bool]) -> None:
+        before = self._unmet_s(now_s)
+        self.history.append((now_s, met))
+        after = self._unmet_s(now_s)
+        for name in sorted(self._reported - after.keys()):
+            self._reported.remove(name)
+            self.lines.append(("met", name, before[name]))
+        if after.keys() - before.keys():
+            self.due_s = min(self.due_s, now_s + TIMEOUT_S)
 
 
 @settings(max_examples=examples(200))
-@given(st.lists(st.tuples(st.integers(0, 4), st.tuples(*[st.booleans()] * 3)), min_size=1, max_size=12))
+@given(st.lists(st.tuples(st.integers(0, 4), st.tuples(*[st.booleans()] * 4)), min_size=1, max_size=12))
+@example([(1, (number % 2 > 0, True, True, True)) for number in range(6)])
+@example([(0, (True, True, False, True)), (1, (True, True, False, False)), (4, (True, True, True, True))])
 def test_the_account_tells_what_happened(steps: list[Any]) -> None:
-    system, clock, log = Scripted(), ManualClock(), MemoryLog()
-    recorder = Recorder(system, clock, log)  # type: ignore[arg-type]  # its state is not needed
-    account = ProgressAccount(system, recorder, (), TIMEOUT_S)  # type: ignore[arg-type]
-    history: list[Moment] = []
-    now_s, owed = 0, 0
+    """Two write a log and one does not; one alone is asked all the time."""
+    system, clock, logs = Scripted(), ManualClock(), (MemoryLog(), MemoryLog(), NullLog())
+    accounts = [_account(system, clock, log) for log in logs]
+    asked = accounts[0][0]
+    expected = Expected()
+    now_s = 0
     for pause_s, met in steps:
         for _ in range(pause_s):
             now_s += 1
             clock.advance(1.0)
-            if history and now_s >= account.due_s:
-                account.expire(now_s)
-            if history:
-                assert account.at(now_s).overdue == (("c",) if told(history, now_s)[1][2] else ())
-        recorder.began_s = float(now_s)
+            if now_s >= expected.due_s:
+                for account, _ in accounts:
+                    account.expire(now_s)
+                expected.expire(now_s)
+            if expected.history:
+                assert asked.at(now_s).overdue == told(expected.history, now_s)[1]
         system.met = met
-        account.observe()
-        history.append((now_s, met))
-        found = account.at(now_s)
-        standings, _ = told(history, now_s)
-        assert [item[2:5] for item in (*found.aims, *found.assumptions)] == standings
-    counts = [count for _, count, _ in told(history, now_s)[0]]
-    assert [sum(line.get("aim") == name for line in log.entries) for name in "ab"] == counts[:2]
-    kinds = [line["kind"] for line in log.entries if "assumption" in line]
-    # Each is reported once, before it is said to be met again.
-    assert kinds == [("owed", "met")[place % 2] for place in range(len(kinds))]
-    owed = sum(kind == "owed" for kind in kinds)
-    assert owed - kinds.count("met") == len(account.at(now_s).overdue)
+        for account, recorder in accounts:
+            recorder.began_s = float(now_s)
+            account.observe()
+        expected.observe(now_s, met)
+        found = asked.at(now_s)
+        assert [item[2:5] for item in (*found.aims, *found.assumptions)] == told(expected.history, now_s)[0]
+        assert [account.due_s for account, _ in accounts] == [expected.due_s] * 3
+    for log in logs[:2]:
+        counts = [count for _, count, _ in told(expected.history, now_s)[0]]
+        assert [sum(line.get("aim") == name for line in log.entries) for name in "ab"] == counts[:2]
+        lines = [line for line in log.entries if "assumption" in line]
+        assert [(line["kind"], line["assumption"], line["owed_s"]) for line in lines] == expected.lines
+    assert [account.at(now_s) for account, _ in accounts] == [asked.at(now_s)] * 3
+
+
+def test_a_look_from_before_the_last_stable_state_finds_nothing_unmet_yet() -> None:
+    account, recorder = _account(Scripted(), ManualClock(), NullLog())
+    recorder.began_s = 5.0
+    account.observe()
+    assert [item.unmet_s for item in account.at(4.0).aims] == [0.0, 0.0]
 
 
 def _account(system: Scripted, clock: ManualClock, log: EventLog) -> tuple[ProgressAccount, Recorder]:
@@ -112,7 +170,7 @@ def _account(system: Scripted, clock: ManualClock, log: EventLog) -> tuple[Progr
 @settings(max_examples=examples(200))
 @given(
     st.lists(
-        st.tuples(st.sampled_from((False, False, False, True)), st.tuples(*[st.booleans()] * 3)),
+        st.tuples(st.sampled_from((False, False, False, True)), st.tuples(*[st.booleans()] * 4)),
         min_size=1,
         max_size=24,
     ),
@@ -122,7 +180,7 @@ def _account(system: Scripted, clock: ManualClock, log: EventLog) -> tuple[Progr
 @example(
     # The same change, another one by which the same aim is not met any more, and the first one again.
     [
-        (False, (aim, other, True))
+        (False, (aim, other, True, True))
         for aim, other in ((True, True), (False, True), (True, False), (False, False), (True, True), (False, True))
     ],
     4096,
@@ -162,7 +220,7 @@ def test_the_table_of_changes_grows_up_to_its_limit_and_no_further() -> None:
     system = Scripted()
     with patch("robosc.execution.runtime.progress.MAXIMUM_CHANGES", 8):
         account, _ = _account(system, ManualClock(), NullLog())
-        seen = list(product((False, True), repeat=3))
+        seen = [(*item, True) for item in product((False, True), repeat=3)]
         for before, after in 2 * list(product(seen, repeat=2)):
             for system.met in (before, after):  # type: ignore[assignment]  # three of them
                 account.observe()

@@ -219,3 +219,24 @@ def test_a_strategy_that_is_not_there_is_refused() -> None:
 def test_another_policy_may_be_used_all_the_same() -> None:
     supervisor = next(found for seed in range(700) if (found := strategic_controller(seed)) is not None)
     assert Bench(InterpretedSystem(supervisor), policy="fair").executor.settings.policy == "fair"
+
+
+def test_a_cancel_is_due_once_a_requirement_has_held_while_its_goal_runs_and_holds_no_more() -> None:
+    # The base leaves its start by the request itself: that requirement never holds while the goal runs.
+    text = WALKER.replace("    goal", "    requirement move needs Base.start\n    goal")
+    system = InterpretedSystem(strategic(model_of(text)))
+
+    def due_after(*events: str) -> list[str | None]:
+        found = []
+        for event in events:
+            assert system.step(event) == ()
+            # Only what is observed is remembered.
+            at_once = system.due_cancel()
+            system.observe()
+            assert system.due_cancel() == at_once
+            found.append(at_once)
+        return found
+
+    system.observe()
+    assert due_after("move.request", "near.response", "far.response") == [None, "move.cancel", None]
+    assert due_after("near.response", "move.cancel") == ["move.cancel", None]

@@ -403,3 +403,47 @@ SYSTEMS = {
     name: example_system(name)
     for name in ("line_follower/line_follower", "maze_solver/maze_solver", "navigation/navigation")
 }
+
+
+def test_a_synthesis_variable_whose_update_is_unknown_does_not_leave_its_range() -> None:
+    system = system_of(
+        """
+        robot Tank {
+          interface trigger use Trigger from std_srvs
+          datatype object Empty { }
+          component A {
+            service fill with request: none, response: Empty links trigger
+            behaviour {
+              variable level: integer(0..4)
+              initial marked state only { on request to fill do level := integer(4 / level) }
+            }
+          }
+          requirement fill needs A.level >= 0
+        }
+        """
+    )
+    assert system.enabled("fill.request")
+    assert system.step("fill.request") == ("A.level",)
+
+
+def test_data_with_an_unknown_part_is_not_provided() -> None:
+    system = system_of(RADAR.replace("x: Sensor.v }", "x: 1.0 / Sensor.v }"))
+    assert system.provide("move") == (False, None)
+    system.step("speed.response", system.read("speed.response", 1.0))
+    assert system.provide("move") == (True, {"linear": {"x": 0.5}})
+
+
+def test_a_double_begins_as_one() -> None:
+    """Integers end at 32 bits, and doubles do not."""
+    system = system_of(
+        """
+        robot Count {
+          component A {
+            outgoing message more with type: none
+            behaviour { variable v: double = 2000000000 on response from more do v := v + v initial marked state s { } }
+          }
+        }
+        """
+    )
+    assert system.step("more.response") == ()
+    assert system.state()["A"]["variables"]["v"] == 4e9

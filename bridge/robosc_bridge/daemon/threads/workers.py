@@ -313,7 +313,7 @@ class DriveWorker:
             raise
 
     def _failed(self, problem: str) -> float:
-        self._is_open = self._has_torque = False
+        self._is_open = False
         self._gate.drive_failed()
         is_first = self._backoff.is_fresh
         retry_s = self._backoff.failed()

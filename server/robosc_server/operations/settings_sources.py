@@ -225,6 +225,7 @@ def make_parser() -> Parser:
     """Return the parser of the command line that serves."""
     parser = Parser(
         prog="robosc-server",
+        usage="robosc-server [--config FILE] [SETTING ...]\n       robosc-server COMMAND ...",
         description="Check models, synthesize supervisors and generate packages over gRPC.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

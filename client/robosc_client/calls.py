@@ -23,7 +23,7 @@ from robosc_client.errors import CredentialsError, malformed
 from robosc_client.jobs import Job, JobState, TaskKind
 from robosc_client.retry import Attempts, RetryPolicy
 
-KEEPALIVE_MS = 60_000
+_KEEPALIVE_MS = 60_000
 """Keepalive time of an idle connection; servers refuse more frequent pings."""
 
 CHANNEL_OPTIONS: tuple[tuple[str, int | str], ...] = (
@@ -39,7 +39,7 @@ CHANNEL_OPTIONS: tuple[tuple[str, int | str], ...] = (
     ("grpc.initial_reconnect_backoff_ms", 100),
     ("grpc.max_reconnect_backoff_ms", 5_000),
     # A watch may be idle for hours: keepalive detects a lost connection.
-    ("grpc.keepalive_time_ms", KEEPALIVE_MS),
+    ("grpc.keepalive_time_ms", _KEEPALIVE_MS),
     ("grpc.keepalive_timeout_ms", 10_000),
     ("grpc.http2.max_pings_without_data", 0),
 )

@@ -8,10 +8,10 @@ import unicodedata
 from collections.abc import Iterable
 from pathlib import PurePosixPath
 
-MAXIMUM_NAME_BYTES = 255
+_MAXIMUM_NAME_BYTES = 255
 """Maximum size of one part of a path, in bytes: the limit of the usual file systems."""
 
-MAXIMUM_PATH_BYTES = 1024
+_MAXIMUM_PATH_BYTES = 1024
 """Maximum size of a whole path, in bytes."""
 
 _DEVICES = frozenset(
@@ -21,19 +21,19 @@ _DEVICES = frozenset(
 """Device names of Windows, with any extension."""
 
 
-def path_problem(path: str) -> str:
+def _path_problem(path: str) -> str:
     """Return the problem with one path; empty: none."""
     try:
         length = len(path.encode("utf-8"))
     except UnicodeEncodeError:
         return "it is not valid Unicode"
-    if length > MAXIMUM_PATH_BYTES:
-        return f"it has more than {MAXIMUM_PATH_BYTES} bytes"
+    if length > _MAXIMUM_PATH_BYTES:
+        return f"it has more than {_MAXIMUM_PATH_BYTES} bytes"
     if not path.isprintable():
         return "it has characters that are not printable"
     for part in PurePosixPath(path).parts:
-        if len(part.encode("utf-8")) > MAXIMUM_NAME_BYTES:
-            return f"a name in it has more than {MAXIMUM_NAME_BYTES} bytes"
+        if len(part.encode("utf-8")) > _MAXIMUM_NAME_BYTES:
+            return f"a name in it has more than {_MAXIMUM_NAME_BYTES} bytes"
         if part != part.strip() or part.endswith("."):
             return "a name in it begins or ends with a blank, or ends with a full stop"
         if part.startswith("."):
@@ -54,7 +54,7 @@ def paths_problem(paths: Iterable[str]) -> str:
     files: set[str] = set()
     folders: set[str] = set()
     for path in paths:
-        problem = path_problem(path)
+        problem = _path_problem(path)
         if problem:
             return f"{path[:100]!r}: {problem}"
         folded = PurePosixPath(unicodedata.normalize("NFKC", path).casefold())

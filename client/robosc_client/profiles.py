@@ -73,7 +73,7 @@ class Profiles:
     by_name: dict[str, Profile]
 
 
-def settings_folder() -> Path:
+def _settings_folder() -> Path:
     """Return the configuration folder (XDG Base Directory Specification 0.8: relative paths are ignored)."""
     chosen = Path(os.environ.get("XDG_CONFIG_HOME", ""))
     try:
@@ -84,7 +84,7 @@ def settings_folder() -> Path:
 
 def profiles_file() -> Path:
     """Return the path of the file with the profiles."""
-    return settings_folder() / "client.toml"
+    return _settings_folder() / "client.toml"
 
 
 def read_profiles() -> Profiles:
@@ -212,7 +212,7 @@ def _is_unicode(text: str) -> bool:
 
 
 def _token_file(name: str) -> Path:
-    return settings_folder() / "tokens" / name
+    return _settings_folder() / "tokens" / name
 
 
 def _document() -> "TOMLDocument":

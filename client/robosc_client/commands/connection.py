@@ -11,7 +11,7 @@ from robosc_api.security.addresses import SYNTHESIS_PORT, with_port
 from robosc_client import Client
 from robosc_client.profiles import Profile, read_profiles, require_profile
 
-PROFILE_VARIABLE = "ROBOSC_PROFILE"
+_PROFILE_VARIABLE = "ROBOSC_PROFILE"
 
 SERVICE = "the server is unavailable, refused, failed or missed the deadline; or its answer was rejected"
 SIGNED_SERVICE = f"{SERVICE}, such\n     as a supervisor that no key of --signed-by has signed"
@@ -38,7 +38,7 @@ EPILOG = exit_statuses(
 )
 """Epilog of all commands together."""
 
-MODEL_EPILOG = exit_statuses("done; the model has no errors", "the model has errors, or no supervisor exists")
+_MODEL_EPILOG = exit_statuses("done; the model has no errors", "the model has errors, or no supervisor exists")
 
 ADDRESS, ADDRESS_HELP = "HOST[:PORT]", f"address of the server (default port: {SYNTHESIS_PORT})"
 """Placeholder and help of an argument for the server's address."""
@@ -51,7 +51,7 @@ _FIELDS = ("ca", "certificate", "key", "token_file")
 
 
 def add_connection_arguments(
-    parser: argparse.ArgumentParser, *, deadline_s: float | None = None, epilog: str = MODEL_EPILOG
+    parser: argparse.ArgumentParser, *, deadline_s: float | None = None, epilog: str = _MODEL_EPILOG
 ) -> None:
     """Add the arguments for the server and for the time limit.
 
@@ -66,7 +66,7 @@ def add_connection_arguments(
     server.add_argument(
         "--profile",
         metavar="NAME",
-        help=f"profile of the server, see 'profile --help' (default: ${PROFILE_VARIABLE}, or the default profile)",
+        help=f"profile of the server, see 'profile --help' (default: ${_PROFILE_VARIABLE}, or the default profile)",
     )
     add_client_arguments(parser)
     # Environment variables apply to --server, not to profiles, so that no token reaches another server.
@@ -109,7 +109,7 @@ def _profile(arguments: argparse.Namespace) -> Profile | None:
     if arguments.server is not None:
         return None
     known = read_profiles()
-    name = arguments.profile or os.environ.get(PROFILE_VARIABLE) or known.default
+    name = arguments.profile or os.environ.get(_PROFILE_VARIABLE) or known.default
     if name is None:
         raise UsageError("no server is given: use --server HOST or a profile (see robosc-client profile --help)")
     return require_profile(known, name)

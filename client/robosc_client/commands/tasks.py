@@ -140,7 +140,7 @@ def synthesis_options(arguments: argparse.Namespace) -> SynthesisOptions:
     )
 
 
-def property_texts(arguments: argparse.Namespace) -> tuple[list[SourceFile], list[SourceFile]]:
+def _property_texts(arguments: argparse.Namespace) -> tuple[list[SourceFile], list[SourceFile]]:
     """Return the properties that the arguments name: texts with one property each, and files.
 
     Raises:
@@ -153,7 +153,7 @@ def property_texts(arguments: argparse.Namespace) -> tuple[list[SourceFile], lis
 
 def verify_task(arguments: argparse.Namespace, bundle: Bundle, supervisor: bytes) -> Verify:
     """Return the task that the arguments of `verify` ask for."""
-    texts, listings = property_texts(arguments)
+    texts, listings = _property_texts(arguments)
     return Verify(
         model=bundle,
         supervisor=supervisor,
@@ -345,7 +345,7 @@ def _report_verdicts(
     from robosc_client.outcomes import verdicts_of
 
     if found.status in (VerificationStatus.PROPERTY_ERRORS, VerificationStatus.NO_SUPERVISOR):
-        texts, listings = property_texts(arguments)
+        texts, listings = _property_texts(arguments)
         is_about_model = found.status is VerificationStatus.NO_SUPERVISOR
         files = [*texts, *listings]
         if arguments.json:
@@ -355,7 +355,7 @@ def _report_verdicts(
             if found.reason:
                 sys.stderr.write(f"{bundle.main.name}: {visible(found.reason)}\n")
         return ExitCode.FAILED if is_about_model else ExitCode.USAGE
-    verdicts, system, model = verdicts_of(found.report, bundle, deployment, *property_texts(arguments))
+    verdicts, system, model = verdicts_of(found.report, bundle, deployment, *_property_texts(arguments))
     status = properties.report_verdicts(arguments, verdicts, system, model)
     if (status is ExitCode.OK) != (found.status is VerificationStatus.PASSED):
         raise malformed("its status contradicts its verdicts")

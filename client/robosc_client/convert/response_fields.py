@@ -26,7 +26,7 @@ from robosc_client.results import (
 MAXIMUM_SHOWN = 1000
 """Maximum number of characters of a progress line."""
 
-MAXIMUM_ITEMS = 100_000
+_MAXIMUM_ITEMS = 100_000
 """Maximum number of findings, their places, and events of one response; small messages could contain millions."""
 
 _MAXIMUM_TARGETS = 1000
@@ -81,8 +81,8 @@ def diagnostics_of(messages: Sequence[pb.Diagnostic], bundle: Bundle | None = No
     Raises:
         ServiceError: A severity is unknown, or there are too many.
     """
-    require_at_most(MAXIMUM_ITEMS, len(messages), "findings")
-    require_at_most(MAXIMUM_ITEMS, sum(len(message.related) for message in messages), "places")
+    require_at_most(_MAXIMUM_ITEMS, len(messages), "findings")
+    require_at_most(_MAXIMUM_ITEMS, sum(len(message.related) for message in messages), "places")
     return Findings(map(_diagnostic, messages), bundle)
 
 
@@ -168,7 +168,7 @@ def goal_explanation_of(message: pb.GoalExplanation) -> GoalExplanation:
     """
     nearest = message.nearest
     for items in (message.goals, message.blamed, message.helpful, nearest.events, nearest.state, nearest.missing):
-        require_at_most(MAXIMUM_ITEMS, len(items), "parts of an explanation")
+        require_at_most(_MAXIMUM_ITEMS, len(items), "parts of an explanation")
     if not message.goals:
         raise malformed("an explanation has no goals")
     return GoalExplanation(
@@ -213,7 +213,7 @@ def summary_of(message: pb.Summary) -> Summary:
     Raises:
         ServiceError: A count is invalid, or there are too many events.
     """
-    require_at_most(MAXIMUM_ITEMS, len(message.added), "events")
+    require_at_most(_MAXIMUM_ITEMS, len(message.added), "events")
     return Summary(
         controllable_events=message.controllable_events,
         uncontrollable_events=message.uncontrollable_events,
@@ -227,7 +227,7 @@ def summary_of(message: pb.Summary) -> Summary:
 
 def _goals_of(message: pb.Goals) -> GoalSummary:
     for items in (message.aims, message.assumptions):
-        require_at_most(MAXIMUM_ITEMS, len(items), "goals")
+        require_at_most(_MAXIMUM_ITEMS, len(items), "goals")
     return GoalSummary(tuple(message.aims), tuple(message.assumptions), message.has_strategy, message.modes)
 
 

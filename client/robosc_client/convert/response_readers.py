@@ -53,7 +53,7 @@ MAXIMUM_BYTES = 64 * 2**20
 MAXIMUM_FILES = 10_000
 """Maximum number of files of one result."""
 
-MAXIMUM_CHUNK_BYTES = 64 * 1024
+_MAXIMUM_CHUNK_BYTES = 64 * 1024
 """Maximum size of a piece of a file or graph, in bytes."""
 
 MAXIMUM_PROGRESS = 1_000_000
@@ -213,7 +213,7 @@ class GenerationReader(_StreamReader):
             raise malformed("the chunks of files are not in order")
         # Empty chunks could continue for ever; only an empty file may have one.
         is_empty = not chunk.data and size > 0
-        if is_empty or len(chunk.data) > MAXIMUM_CHUNK_BYTES or len(content) + len(chunk.data) > size:
+        if is_empty or len(chunk.data) > _MAXIMUM_CHUNK_BYTES or len(content) + len(chunk.data) > size:
             raise malformed("a chunk of a file is empty or too long")
         content += chunk.data
         if not size:
@@ -286,7 +286,7 @@ class ExplorationReader(_StreamReader):
         self._head = message
 
     def _take_chunk(self, chunk: bytes) -> None:
-        if not 0 < len(chunk) <= MAXIMUM_CHUNK_BYTES or len(self._content) + len(chunk) > self._head.size:
+        if not 0 < len(chunk) <= _MAXIMUM_CHUNK_BYTES or len(self._content) + len(chunk) > self._head.size:
             raise malformed("a chunk of the graph is empty or too long")
         self._content += chunk
 
@@ -448,7 +448,7 @@ class JobResultReader:
             self._kind = TaskKind(name)
             if self._expected not in (None, self._kind):
                 raise malformed(f"the job has the kind {self._expected}, but its result has the kind {self._kind}")
-            self._inner = reader_for(self._kind)
+            self._inner = _reader_for(self._kind)
         if self._kind is not TaskKind(name):
             raise malformed("it has results of two task kinds")
         if self._inner.take(getattr(message, name)) is not None:
@@ -461,7 +461,7 @@ class JobResultReader:
         return self._inner.result()
 
 
-def reader_for(kind: TaskKind) -> ResponseReader[TaskResult]:
+def _reader_for(kind: TaskKind) -> ResponseReader[TaskResult]:
     """Return a new reader for the responses of a kind of task."""
     match kind:
         case TaskKind.CHECK:

@@ -45,10 +45,10 @@ def run_command(words: Sequence[str]) -> int | None:
     """
     commands: dict[str, Callable[[Sequence[str]], int]] = {
         "health": _health,
-        "token": new_token,
-        "tokens": keep_tokens,
-        "check-config": check_config,
-        "example-config": print_example,
+        "token": _new_token,
+        "tokens": _keep_tokens,
+        "check-config": _check_config,
+        "example-config": _print_example,
     }
     command = commands.get(words[0]) if words else None
     if command is None:
@@ -80,7 +80,7 @@ def _token_parser() -> Parser:
     return parser
 
 
-def new_token(argv: Sequence[str]) -> int:
+def _new_token(argv: Sequence[str]) -> int:
     """Print a new token, and its line for the token file to standard error; returns the exit status."""
     arguments = _token_parser().parse_args(argv)
     try:
@@ -110,7 +110,7 @@ def _tokens_parser() -> Parser:
     return parser
 
 
-def keep_tokens(argv: Sequence[str]) -> int:
+def _keep_tokens(argv: Sequence[str]) -> int:
     """List, add, rotate or revoke tokens of a file; returns the exit status."""
     return run_tokens(parse(_tokens_parser(), argv))
 
@@ -123,7 +123,7 @@ def _example_parser() -> Parser:
     )
 
 
-def print_example(argv: Sequence[str]) -> int:
+def _print_example(argv: Sequence[str]) -> int:
     """Print a file with every setting; returns the exit status."""
     _example_parser().parse_args(argv)
     sys.stdout.write(example_file())
@@ -144,7 +144,7 @@ def _check_parser() -> Parser:
     return parser
 
 
-def check_config(argv: Sequence[str]) -> int:
+def _check_config(argv: Sequence[str]) -> int:
     """Print whether a server could start with such settings; returns the exit status."""
     # The database's library takes longer to import than other commands take in all.
     from robosc_server.operations.config_check import CheckGrade, check_settings

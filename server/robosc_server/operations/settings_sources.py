@@ -22,7 +22,7 @@ from robosc.cli.running import Parser
 from robosc_server.operations.settings import Settings, default_text, description_of, group_of
 
 ENVIRONMENT_PREFIX = "ROBOSC_SERVER_"
-CONFIG_VARIABLE = ENVIRONMENT_PREFIX + "CONFIG"
+_CONFIG_VARIABLE = ENVIRONMENT_PREFIX + "CONFIG"
 MAXIMUM_FILE_BYTES = 256 * 1024
 
 
@@ -179,7 +179,7 @@ exit status:
 def add_settings_arguments(parser: argparse.ArgumentParser) -> None:
     """Add a flag for each setting, and `--config`."""
     parser.add_argument(
-        "--config", type=Path, metavar="FILE", help=f"settings file in TOML (default: ${CONFIG_VARIABLE})"
+        "--config", type=Path, metavar="FILE", help=f"settings file in TOML (default: ${_CONFIG_VARIABLE})"
     )
     groups: dict[str, Any] = {}
     for name, field in Settings.model_fields.items():
@@ -217,7 +217,7 @@ def config_file_of(arguments: argparse.Namespace) -> Path | None:
     """Return the path of the settings file; None: there is none."""
     if arguments.config is not None:
         return Path(arguments.config)
-    variable = os.environ.get(CONFIG_VARIABLE)
+    variable = os.environ.get(_CONFIG_VARIABLE)
     return Path(variable) if variable else None
 
 
@@ -225,6 +225,7 @@ def make_parser() -> Parser:
     """Return the parser of the command line that serves."""
     parser = Parser(
         prog="robosc-server",
+        usage="robosc-server [--config FILE] [SETTING ...]\n       robosc-server COMMAND ...",
         description="Check models, synthesize supervisors and generate packages over gRPC.",
         epilog=_EPILOG,
         formatter_class=argparse.RawDescriptionHelpFormatter,

@@ -158,6 +158,7 @@ def test_every_setting_is_in_the_help(capsys: pytest.CaptureFixture[str]) -> Non
         load_settings(["--help"])
     assert caught.value.code == 0
     text = " ".join(capsys.readouterr().out.split())
+    assert text.startswith("usage: robosc-server [--config FILE] [SETTING ...] robosc-server COMMAND ... Check models")
     for name in Settings.model_fields:
         assert f" {flag_of(name)}" in text
         # Lines are folded at hyphens, too.

@@ -303,6 +303,8 @@ def _options(settings: Settings, request_bytes: int, connections: int) -> list[t
         ("grpc.absolute_max_metadata_size", _METADATA_BYTES),
         # The server refuses large messages with a reason; beyond this size gRPC refuses without one.
         ("grpc.max_receive_message_length", 2 * request_bytes),
+        # A few hundred bytes would become a request of megabytes before any limit is asked: nothing is unpacked.
+        ("grpc.compression_enabled_algorithms_bitset", 1 << grpc.Compression.NoCompression),
         # A probed window grows to megabytes, and so much of a message that gRPC refuses would still be received. The
         # window of a message that is read grows to its size all the same.
         ("grpc.http2.bdp_probe", 0),

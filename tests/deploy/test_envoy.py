@@ -56,6 +56,17 @@ def test_what_arrives_is_bounded(name: str) -> None:
 
 
 @pytest.mark.parametrize("name", FILES)
+def test_answers_that_are_not_read_delay_no_others(name: str) -> None:
+    """Callers share the connections to the server, whose windows unread answers take up (RFC 9113, 5.2)."""
+    (cluster,) = read(name)["static_resources"]["clusters"]
+    (options,) = cluster["typed_extension_protocol_options"].values()
+    http2 = options["explicit_http_config"]["http2_protocol_options"]
+    calls, window = http2["max_concurrent_streams"], http2["initial_stream_window_size"]
+    assert window == 64 * 1024
+    assert calls * window <= http2["initial_connection_window_size"] <= 2 * calls * window
+
+
+@pytest.mark.parametrize("name", FILES)
 def test_calls_are_bounded_by_connection_and_by_caller(name: str) -> None:
     """No client that behaves uses up the calls of others, and none needs several connections for a burst of watches."""
     filters = manager_of(read(name))["http_filters"]

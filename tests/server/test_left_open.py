@@ -117,6 +117,17 @@ def test_a_request_that_is_too_large_is_refused_with_a_reason() -> None:
             assert refusal(991, submits) == expected
 
 
+def test_a_packed_request_is_not_unpacked(quick: str) -> None:
+    """A request of a few hundred bytes would be megabytes before any limit is asked."""
+    with grpc.insecure_channel(quick) as channel:
+        stub = STUB(channel)
+        with pytest.raises(grpc.RpcError) as caught:
+            stub.GetVersion(pb.GetVersionRequest(), timeout=PATIENCE_S, compression=grpc.Compression.Gzip)
+        error: Any = caught.value
+        assert error.code() is grpc.StatusCode.UNIMPLEMENTED
+        stub.GetVersion(pb.GetVersionRequest(), timeout=PATIENCE_S)
+
+
 SHORT = [method for method in METHODS if "SynthesisService" not in method and not method.endswith("SubmitJob")]
 
 

@@ -30,7 +30,7 @@ from robosc.cli.properties import property_file
 from robosc.cli.sign import read_supervisor
 from robosc.cli.synth import add_modular_argument, refuse_modular, report_reasons
 from robosc.exploration import DEFAULT_LIMIT
-from robosc.json_documents import diagnostics_json, json_text
+from robosc.json_documents import counts_text, diagnostics_json, json_text
 from robosc.model.structure import Deployment
 from robosc.pipeline.automata_files import is_automata
 from robosc.pipeline.options import FOREIGN_STATES
@@ -395,7 +395,7 @@ def _get(arguments: argparse.Namespace, client: Client) -> int:
     if arguments.json:
         print_json({"job": job_json(job), "result": result_json(found) if arguments.result or has_nothing else None})
     elif arguments.result:
-        _print(found)
+        _print(job, found)
     elif has_nothing and not isinstance(found, tuple):
         _report_nothing(job, found)
     return ExitCode.OK if _is_success(found) else ExitCode.FAILED
@@ -505,7 +505,7 @@ def _line(job: Job) -> str:
         what = f"{job.failure.message} [{job.failure.reason}]"
     elif job.state is JobState.QUEUED and job.waiting_before:
         what = f"{job.waiting_before} before it"
-    elif job.state is JobState.RUNNING and job.progress is not None:
+    elif not job.state.has_ended and job.progress is not None:
         what = f"{job.progress.stage}: {job.progress.message}"
     parts = [job.id, f"{job.state:9}", f"{job.kind:10}", job.main_file, job.label, what]
     return "  ".join(part for part in parts if part)
@@ -571,13 +571,15 @@ def result_json(found: TaskResult) -> dict[str, Any]:
     return result
 
 
-def _print(found: TaskResult) -> None:
+def _print(job: Job, found: TaskResult) -> None:
     if isinstance(found, Formatted) and found.text is not None:
         # Byte for byte to a file or program; without control characters to a terminal.
         sys.stdout.write(_printable(found.text) if sys.stdout.isatty() else found.text)
         return
     if isinstance(found, tuple):
         print_diagnostics(found, None)
+        if not found:
+            sys.stdout.write(f"{visible(job.main_file)}: {counts_text(found)}\n")
         return
     if isinstance(found, Synthesis | Generation | Exploration) and not _is_success(found):
         print_diagnostics(found.diagnostics, None)

@@ -247,6 +247,18 @@ class TestGet:
             None,
         )
 
+    def test_a_job_that_waits_says_for_what(self, run: Run) -> None:
+        reason = pb.Progress(stage="waiting", message="the token has used up its quota")
+        message = job(4, jobs_pb2.JOB_STATE_QUEUED, progress=reason)
+        with scripted(GetJob=[[jobs_pb2.GetJobResponse(job=message)]]) as (address, _):
+            expected = "job-1  queued     synthesize  robot.rscd  waiting: the token has used up its quota\n"
+            assert run("get", "job-1", "--server", address) == (0, expected, "")
+
+    def test_a_model_without_findings_is_reported_as_such(self, run: Run) -> None:
+        with scripted(**job_answers("check", [pb.CheckResponse()])) as (address, _):
+            expected = (0, "robot.rscd: no findings\n", "")
+            assert run("get", "job-1", "--result", "--server", address) == expected
+
     @pytest.mark.parametrize(
         ("kind", "messages", "status", "word"),
         [

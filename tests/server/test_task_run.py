@@ -23,7 +23,7 @@ from robosc.targets import available_targets
 from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.tasks.convert.chunks import CHUNK_BYTES
 from robosc_server.tasks.describe import server_limits, targets_response, version_response
-from robosc_server.tasks.exceeded import memory_exceeded
+from robosc_server.tasks.exceeded import memory_exceeded, result_too_large
 from robosc_server.tasks.memory import is_lack_of_memory
 from robosc_server.tasks.requests import RequestLimits, accept_request
 from robosc_server.tasks.run import PAUSE_S, ThrottledReports, run_task
@@ -440,8 +440,11 @@ class TestFailures:
         assert isinstance(whole, Result)
         size = sum(map(len, whole.messages))
         assert outcome(kind, small_request(kind, text), replace(LIMITS, result_bytes=size)) == whole
-        found = failure(kind, small_request(kind, text), replace(LIMITS, result_bytes=size - 1))
-        assert found == Failure(Reason.RESULT_TOO_LARGE, f"the result has more than {size - 1} bytes")
+        smaller = replace(LIMITS, result_bytes=size - 1)
+        found = failure(kind, small_request(kind, text), smaller)
+        assert found == result_too_large(smaller)
+        assert f"limit of {size - 1} bytes" in found.message
+        assert found.message.endswith("raise result_bytes")
 
     def test_no_memory(self, monkeypatch: pytest.MonkeyPatch) -> None:
         def greedy(*_: Any) -> Any:

@@ -11,7 +11,7 @@ from robosc.certification.reasons import reasons_json
 from robosc.cli import automata
 from robosc.cli.output import CommandError, ExitCode, UsageError, print_diagnostics, print_json, write_bytes
 from robosc.cli.synth import report_reasons
-from robosc.json_documents import diagnostics_json, json_text
+from robosc.json_documents import counts_text, diagnostics_json, json_text
 from robosc.model.structure import Deployment
 from robosc.pipeline.results import NoSupervisor
 from robosc.source import Bundle, SourceFile, visible
@@ -118,7 +118,7 @@ def result_json(found: TaskResult) -> dict[str, Any]:
     return result
 
 
-def print_result(found: TaskResult) -> None:
+def print_result(job: Job, found: TaskResult) -> None:
     """Print the result of a job."""
     if isinstance(found, Formatted) and found.text is not None:
         # Byte for byte to a file or program; without control characters to a terminal.
@@ -126,6 +126,8 @@ def print_result(found: TaskResult) -> None:
         return
     if isinstance(found, tuple):
         print_diagnostics(found, None)
+        if not found:
+            sys.stdout.write(f"{visible(job.main_file)}: {counts_text(found)}\n")
         return
     if isinstance(found, Synthesis | Generation | Exploration) and not is_success(found):
         print_diagnostics(found.diagnostics, None)

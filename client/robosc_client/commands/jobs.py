@@ -147,7 +147,7 @@ def _get(arguments: argparse.Namespace, client: Client) -> int:
     if arguments.json:
         print_json({"job": job_json(job), "result": result_json(found) if arguments.result or has_nothing else None})
     elif arguments.result:
-        print_result(found)
+        print_result(job, found)
     elif has_nothing and not isinstance(found, tuple):
         report_nothing(job, found)
     return ExitCode.OK if is_success(found) else ExitCode.FAILED
@@ -198,7 +198,7 @@ def _line(job: Job) -> str:
         what = f"{job.failure.message} [{job.failure.reason}]"
     elif job.state is JobState.QUEUED and job.waiting_before:
         what = f"{job.waiting_before} before it"
-    elif job.state is JobState.RUNNING and job.progress is not None:
+    elif not job.state.has_ended and job.progress is not None:
         what = f"{job.progress.stage}: {job.progress.message}"
     parts = [job.id, f"{job.state:9}", f"{job.kind:10}", job.main_file, job.label, what]
     return "  ".join(part for part in parts if part)

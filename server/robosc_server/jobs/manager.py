@@ -329,7 +329,7 @@ class JobManager:
         if record.state is JobState.CANCELLED:
             raise RefusedError(Reason.JOB_CANCELLED, "the job was cancelled and has no result")
         if record.result_key is None:
-            raise RefusedError(Reason.JOB_NOT_ENDED, "the job has not ended: wait for its end with WatchJob")
+            raise RefusedError(Reason.JOB_NOT_ENDED, "the job has not ended: watch it until it has")
         if record.kind is TaskKind.SYNTHESIZE:
             # One message, and the only one that has something done to it before it is sent.
             result = await self._results.find(record.result_key)

@@ -40,5 +40,18 @@ def time_exceeded(limits: TaskLimits) -> Failure:
     return Failure(Reason.TIME_LIMIT, f"{takes}; {_way_out('task_seconds')}")
 
 
+def result_too_large(limits: TaskLimits) -> Failure:
+    """Return the failure of a task whose result has more bytes, or more messages, than are sent.
+
+    Args:
+        limits: Limits of the task.
+    """
+    exceeds = f"the result exceeds the server's limit of {limits.result_bytes} bytes"
+    return Failure(
+        Reason.RESULT_TOO_LARGE,
+        f"{exceeds}; ask for less, such as one target, or have the operator of the server raise result_bytes",
+    )
+
+
 def _way_out(setting: str) -> str:
     return f"make the model smaller, or have the operator of the server raise {setting}"

@@ -35,7 +35,7 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_server.clock import monotonic
 from robosc_server.tasks.automata import Automata
 from robosc_server.tasks.convert import chunks, from_proto, to_proto
-from robosc_server.tasks.exceeded import memory_exceeded
+from robosc_server.tasks.exceeded import memory_exceeded, result_too_large
 from robosc_server.tasks.explain import explanation
 from robosc_server.tasks.memory import is_lack_of_memory
 from robosc_server.tasks.synthesis_attempt import OnReport, SynthesisAttempt
@@ -141,7 +141,7 @@ def run_task(kind: TaskKind, request: bytes, limits: TaskLimits, on_report: OnRe
     except NodeLimitError as error:
         return Failure(Reason.NODE_LIMIT, f"{error}, up to {limits.nodes} on this server")
     except _ResultTooLargeError:
-        return Failure(Reason.RESULT_TOO_LARGE, f"the result has more than {limits.result_bytes} bytes")
+        return result_too_large(limits)
     except (UnknownTargetError, UnknownEngineError, from_proto.OptionError, NoPropertyError) as error:
         return Failure(Reason.MALFORMED_REQUEST, str(error))
     except RequestError:

@@ -7,7 +7,7 @@ import socket
 import traceback
 from collections.abc import Callable
 
-from robosc_server.tasks.exceeded import memory_exceeded
+from robosc_server.tasks.exceeded import memory_exceeded, result_too_large
 from robosc_server.tasks.memory import is_lack_of_memory
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, TaskKind, TaskLimits
 from robosc_server.workers import confinement
@@ -19,7 +19,6 @@ from robosc_server.workers.frames import (
     frame,
     report_frame,
     task_of,
-    too_large,
 )
 from robosc_server.workers.sandbox import Sandbox, close_other_descriptors
 
@@ -99,7 +98,7 @@ def _send(connection: socket.socket, outcome: Outcome, limits: TaskLimits) -> No
                 connection.sendall(message)
             connection.sendall(_RESULT_END)
             return
-        outcome = too_large(limits)
+        outcome = result_too_large(limits)
     connection.sendall(failure_frame(outcome))
 
 

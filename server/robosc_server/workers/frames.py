@@ -15,6 +15,7 @@ from enum import Enum
 from typing import Any
 
 from robosc_server.clock import monotonic
+from robosc_server.tasks.exceeded import result_too_large
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, Task, TaskKind, TaskLimits
 
 HEADER = struct.Struct(">cQ")
@@ -109,11 +110,6 @@ def failure_frame(failure: Failure) -> bytes:
     return _json_frame(Tag.FAILURE, values)
 
 
-def too_large(limits: TaskLimits) -> Failure:
-    """Return the failure of a task whose result exceeds the limit."""
-    return Failure(Reason.RESULT_TOO_LARGE, f"the result exceeds the limit of {limits.result_bytes} bytes")
-
-
 class AnswerReader:
     """Reader of the frames of one answer, in two steps: it checks a header, then it decodes the payload.
 
@@ -145,7 +141,7 @@ class AnswerReader:
             case Tag.MESSAGE:
                 self._bytes += length
                 if self._bytes > self._limits.result_bytes or len(self._messages) >= MESSAGES_LIMIT:
-                    return too_large(self._limits)
+                    return result_too_large(self._limits)
             case Tag.REPORT:
                 self._reports += 1
                 if self._reports > REPORTS_BURST + REPORTS_PER_SECOND * (self._clock() - self._begun_s):

@@ -11,13 +11,14 @@ import pytest
 from hypothesis import given
 
 from robosc import __version__
+from robosc_server.tasks.exceeded import result_too_large
 from robosc_server.tasks.task import Failure, Outcome, Reason, Result, TaskLimits
 from robosc_server.workers import WorkersError, dask_task
 from robosc_server.workers.dask_cluster import DaskWorkers
 from robosc_server.workers.dask_cpu_time import CpuTimeAccount
 from robosc_server.workers.dask_task import answer, outcome_of
 from robosc_server.workers.factory import open_workers
-from robosc_server.workers.frames import FrameError, too_large
+from robosc_server.workers.frames import FrameError
 from robosc_server.workers.local import LocalWorkers
 from support.fake_tasks import TASK_FUNCTION
 
@@ -108,7 +109,7 @@ def test_bytes_that_are_no_answer_are_one_kind_of_error(content: bytes) -> None:
     with suppress(FrameError):
         outcome = outcome_of(content, LIMITS)
         # A frame may announce more than a result may have, whatever comes then; or the bytes are an answer after all.
-        assert outcome == too_large(LIMITS) or content.startswith(answer(outcome))
+        assert outcome == result_too_large(LIMITS) or content.startswith(answer(outcome))
 
 
 def test_a_fault_of_ours_on_the_cluster_is_an_answer(monkeypatch: pytest.MonkeyPatch) -> None:

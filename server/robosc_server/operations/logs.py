@@ -16,6 +16,7 @@ from collections.abc import MutableMapping
 from types import TracebackType
 from typing import Any, TextIO
 
+import grpc.aio
 import msgspec
 import structlog
 
@@ -31,6 +32,9 @@ _LEVELS = {
 }
 # Their lines at the level info help only their developers.
 _VERBOSE_LIBRARIES = ("alembic", "asyncio", "distributed", "opentelemetry", "sqlalchemy")
+_GRPC_CALLS = "grpc._cython.cygrpc"
+"""Logger of gRPC that reports what its handlers raise."""
+
 _FRAMES = 12
 _PLAIN = re.compile(r"[A-Za-z0-9._:/+@,%'()\[\]-]+\Z")
 
@@ -113,6 +117,12 @@ def configure_logging(log_format: LogFormat, log_level: LogLevel, stream: TextIO
     root.setLevel(level)
     for name in _VERBOSE_LIBRARIES:
         logging.getLogger(name).setLevel(max(level, logging.WARNING))
+    logging.getLogger(_GRPC_CALLS).addFilter(_is_no_departure)
+
+
+def _is_no_departure(record: logging.LogRecord) -> bool:
+    """Return False for what gRPC logs as an error if a caller goes while a response is sent; the call has a line."""
+    return record.exc_info is None or not isinstance(record.exc_info[1], grpc.aio.InternalError)
 
 
 def log_fault(fault: BaseException | str, reason: str = "INTERNAL_FAULT") -> str:

@@ -5,6 +5,7 @@ import logging
 from pathlib import Path
 from typing import Any
 
+import grpc.aio
 import pytest
 import structlog
 from hypothesis import given
@@ -184,6 +185,19 @@ def test_talkative_libraries_log_warnings_alone() -> None:
             assert not logger.isEnabledFor(logging.INFO)
         logging.getLogger("robosc_server").debug("said")
     assert [line["event"] for line in log.lines()] == ["said"]
+
+
+def test_callers_that_go_while_they_are_answered_are_no_errors() -> None:
+    grpc_log = logging.getLogger("grpc._cython.cygrpc")
+    # Set up twice, as by two servers of one process.
+    with logged(LogLevel.INFO), logged(LogLevel.INFO) as log:
+        for error in (grpc.aio.InternalError("Failed grpc_call_start_batch"), ValueError("another")):
+            try:
+                raise error
+            except Exception:
+                grpc_log.exception("raised in core by servicer method [/s/M]")
+        grpc_log.error("without an exception")
+    assert [line.get("error") or line["event"] for line in log.lines()] == ["ValueError", "without an exception"]
 
 
 def test_random_request_ids_differ() -> None:

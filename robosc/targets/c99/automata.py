@@ -17,7 +17,7 @@ from robosc.expressions import (
 )
 from robosc.model.received import Path
 from robosc.model.structure import Model
-from robosc.targets.code.automata import AutomataWriter, ControlledAutomata, always, shallow
+from robosc.targets.code.automata import AutomataWriter, ControlledAutomata, always
 from robosc.targets.code.c.conditions import CDiagrams
 from robosc.targets.code.c.expressions import CWriter, number_code
 from robosc.targets.code.c.helpers import HELPERS, called
@@ -38,6 +38,7 @@ from robosc.targets.code.expressions import (
     words_of,
 )
 from robosc.targets.code.naming import require_package_name
+from robosc.targets.code.nesting import shallow
 from robosc.targets.code.statements import Block, codes
 from robosc.targets.code.templates import environment
 from robosc.targets.files import GeneratedFiles
@@ -250,7 +251,7 @@ def generate(supervised: SupervisedSystem, options: GenerateOptions) -> Generate
     """
     if options.package is not None:
         require_package_name(options.package)
-    with shallow(supervised.system):
+    with shallow(supervised.system.name, "code"):
         automata = ControlledAutomata(supervised)
         files = _files(automata, Names(automata, prefix_for(options.package or supervised.system.name)))
     if any(map(is_nested_too_deeply, files.values())):

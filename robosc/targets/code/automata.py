@@ -6,8 +6,7 @@ event cannot happen, and the written values are discarded.
 
 import re
 from abc import ABC, abstractmethod
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import cached_property
 from itertools import product
@@ -308,16 +307,3 @@ def _require_native(words: str, code: Code) -> None:
 def always(code: Code) -> Callable[[Path], Code]:
     """Return a function that reads all received data as one code."""
     return lambda path: code
-
-
-@contextmanager
-def shallow(system: System) -> Iterator[None]:
-    """Within the block an expression that is nested too deeply to become code is one that code cannot do.
-
-    Raises:
-        UnsupportedModelError: There is such an expression.
-    """
-    try:
-        yield
-    except (RecursionError, MemoryError) as error:
-        raise UnsupportedModelError(f"{system.name} has an expression that is nested too deeply for code") from error

@@ -8,10 +8,11 @@ from robosc.automata.structure import Event, System
 from robosc.expressions import EnumType, IntegerType, Type
 from robosc.model.received import Path
 from robosc.model.structure import Model
-from robosc.targets.code.automata import AutomataWriter, ControlledAutomata, always, shallow
+from robosc.targets.code.automata import AutomataWriter, ControlledAutomata, always
 from robosc.targets.code.expression_writer import read_nothing
 from robosc.targets.code.expressions import FALSE_CODE, TRUE_CODE, Code, Sort, call, place, variable
 from robosc.targets.code.naming import MAXIMUM_NAME, require_package_name, snake_case
+from robosc.targets.code.nesting import shallow
 from robosc.targets.code.python.conditions import PythonDiagrams
 from robosc.targets.code.python.expressions import Scope, constant
 from robosc.targets.code.python.folding import folded
@@ -109,7 +110,7 @@ def generate(supervised: SupervisedSystem, options: GenerateOptions) -> Generate
         require_package_name(options.package)
     system = supervised.system
     module = options.package or f"{snake_case(system.name)[:MAXIMUM_NAME].rstrip('_')}_supervisor"
-    with shallow(system):
+    with shallow(system.name, "code"):
         text = folded(_text(ControlledAutomata(supervised), module))
     return GeneratedFiles({f"{module}.py": text})
 

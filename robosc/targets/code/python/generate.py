@@ -5,13 +5,14 @@ import textwrap
 from robosc._version import __version__
 from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import communication_plant_name
-from robosc.errors import InternalError, UnsupportedModelError
+from robosc.errors import InternalError
 from robosc.execution.interpreter import describe
 from robosc.execution.runtime.protocol import Description, batches, requesting
 from robosc.expressions import DoubleType, Type
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets.code.expressions import Code
+from robosc.targets.code.nesting import shallow
 from robosc.targets.code.python.bundle import WIDTH, bundle, section_title
 from robosc.targets.code.python.changes import (
     enabled_requests_method,
@@ -93,12 +94,9 @@ def model_part(supervisor: Supervisor) -> str:
     Raises:
         UnsupportedModelError: An expression is nested too deeply for Python.
     """
-    too_deep = f"the model {supervisor.model.name} has an expression that is nested too deeply for Python"
-    try:
+    with shallow(f"the model {supervisor.model.name}", "Python"):
         text = _model_part(make_writer(supervisor))
         compile(text, "supervisor.py", "exec", dont_inherit=True)
-    except (RecursionError, MemoryError, SyntaxError) as error:
-        raise UnsupportedModelError(too_deep) from error
     return text
 
 

@@ -174,7 +174,8 @@ def test_each_call_has_a_deadline() -> None:
     with scripted(GetLoad=[[asked]], ListJobs=[[jobs_pb2.ListJobsResponse()]]) as (address, _):
         assert main(["top", "--once", "--server", address]) == 0
         assert main(["top", "--once", "--deadline", "3600", "--server", address]) == 0
-    assert left[0] <= 5 < left[1]
+    # gRPC rounds time limits up.
+    assert left[0] < 6 < left[1]
 
 
 def test_what_a_job_waits_for_is_told(run: Run) -> None:

@@ -113,7 +113,7 @@ def check_listening(address: str, security: ServerSecurity) -> None:
     if not is_secure and not security.insecure_beyond_loopback and not is_loopback_host(host):
         raise SecurityError(
             f"{address} is reachable from other machines, and a connection without TLS can be read and changed: set a "
-            "certificate and key, or allow insecure connections"
+            "certificate and key, or insecure_beyond_loopback on a trusted network"
         )
 
 

@@ -1,4 +1,4 @@
-"""Signatures of supervisor files: the owner of the key vouches for every byte of the file (semantics 3.12).
+"""Signatures of supervisor files: the owner of the key vouches for every byte of the file.
 
 A signature is in a file of its own beside the supervisor (`X.rsup.sig`), so that the supervisor's file is not changed.
 It is an Ed25519 signature (S. Josefsson, I. Liusvaara, RFC 8032, 2017) over a line that names the purpose, and the

@@ -1,6 +1,6 @@
 """The definition of a robot by its source: components, automata, communications; foreign ones are checked.
 
-The topic `/state` of generated nodes and the bridge's service send the definition in the same words (semantics 3.10).
+The topic `/state` of generated nodes and the bridge's service send the definition in the same words.
 """
 
 import json

@@ -1,4 +1,4 @@
-"""The source for a generated ROS 2 node: its topic `/state` (semantics 3.10), read by rclpy in a thread of its own.
+"""The source for a generated ROS 2 node: its topic `/state`, read by rclpy in a thread of its own.
 
 Each message holds the state, where services and actions are, the numbers of the transitions taken since the one before,
 and the robot's definition. It does not say which requests are enabled: that is computed from the rest with the model.

@@ -1,7 +1,7 @@
 """The executable system: everything that a model does, event by event, as one value.
 
-The automata of synthesis leave out code-only variables, and the order in which an executor tries transitions (language
-A.7). The executable system has both, computed once: which transition each component takes in each of its states, how
+The automata of synthesis leave out code-only variables, and the order in which an executor tries transitions. The
+executable system has both, computed once: which transition each component takes in each of its states, how
 services and actions move, and which requirements an event needs. Generators, the explanation of blocked requests, the
 replay of logs and the properties of the controller read it. The interpreter in `robosc.execution` does not read it,
 because it is the reference that the others are compared with.
@@ -212,7 +212,7 @@ class ExecutableSystem:
 
     @cached_property
     def resets_and_taus(self) -> tuple[str, ...]:
-        """The silent steps that an executor takes whenever they are enabled, in its order (semantics 3.3)."""
+        """The silent steps that an executor takes whenever they are enabled, in its order."""
         resets = (item.event(EventKind.RESET) for item in self.model.communications if item.kind in CALLED_KINDS)
         return (*resets, *self.model.taus)
 

@@ -86,7 +86,7 @@ def holds(condition: Expression) -> Expression:
 
 @dataclass(frozen=True, slots=True)
 class Cancel:
-    """A cancel that the executor issues by itself (semantics 3.4).
+    """A cancel that the executor issues by itself.
 
     Attributes:
         event: The cancel event.

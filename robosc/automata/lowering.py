@@ -1,4 +1,4 @@
-"""From a checked model to the extended finite automata of its synthesis problem (semantics part 1).
+"""From a checked model to the extended finite automata of its synthesis problem.
 
 Plants stand in one stable order: for each component, in source order, the plants of its messages,
 services and actions, then its own behaviour. Events follow the same order: those of the component's

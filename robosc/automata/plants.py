@@ -1,4 +1,4 @@
-"""The plant of a message, a service, an action, and of a component's behaviour (semantics part 1)."""
+"""The plant of a message, a service, an action, and of a component's behaviour."""
 
 from collections.abc import Iterable, Iterator
 

@@ -1,4 +1,4 @@
-"""Confluence: whether the order of silent steps matters (semantics 2).
+"""Confluence: whether the order of silent steps matters.
 
 All orders are followed, not only the executor's. They agree if they have one outcome: the same stable state, or no end
 at all. Newman's lemma says that it is enough to compare single steps, but only if every order ends (M. H. A. Newman,

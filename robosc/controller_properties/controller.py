@@ -1,4 +1,4 @@
-"""The controller automaton: what a supervisor and its executor do together, state by state (semantics 2 and 3).
+"""The controller automaton: what a supervisor and its executor do together, state by state.
 
 A state consists of a state of the system and the executor's memory of running goals: which requirements of an action
 held in some stable state since its request (3.4). The state is *stable* if no silent step is enabled. Silent steps
@@ -9,12 +9,12 @@ may send a message or answer, and any enabled request may be issued.
   order, with no silent step between them. Under the setting `on_unknown: keep` an event whose enum is unknown does
   not happen, so any part of a batch may happen as well; a *whole* batch can happen under every setting.
 - Received data takes every value that matters. Events of one message carry data that the same fields can produce
-  (`robosc.controller_properties.messages`). Code-only variables do not matter: no condition on events reads one
-  (language A.6). They only determine what is sent; a request whose data is unknown counts as possible.
-- The controller automaton omits that an action cannot be requested again before its cancelled goal has ended (3.2).
+  (`robosc.controller_properties.messages`). Code-only variables do not matter: no condition on events reads one.
+  They only determine what is sent; a request whose data is unknown counts as possible.
+- The controller automaton omits that an action cannot be requested again before its cancelled goal has ended.
   The end can become known in any state and changes nothing else, so the same states are reached.
 - If two transitions on one event apply, the executor prefers the state's own to the behaviour's, and then the first
-  one in source order (language A.7).
+  one in source order.
 """
 
 from collections.abc import Iterable, Iterator

@@ -1,6 +1,6 @@
 """Data that the events of one middleware message can carry together.
 
-Several communications may read one message (semantics 3.1): then they receive data from the same fields. Enum rules are
+Several communications may read one message: then they receive data from the same fields. Enum rules are
 read as conditions over *terms*. A term is a field that is compared with constants, or a more difficult expression,
 which may have any value. Values that no comparison distinguishes are represented by one of them, so that all choices
 can be enumerated. The result contains every possible combination, and may contain impossible ones: terms that are

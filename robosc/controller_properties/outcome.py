@@ -69,7 +69,7 @@ class Blocking:
 
 @dataclass(frozen=True, slots=True)
 class Properties:
-    """The properties of a controller (semantics 2).
+    """The properties of a controller.
 
     Attributes:
         finite_response: Result of checking that silent steps end.

@@ -204,7 +204,7 @@ def _data_cell(item: Communication) -> str:
 
 
 def _middleware_type(model: Model, item: Communication) -> str:
-    """The linked type, else what a basic type crosses as (language A.5)."""
+    """The linked type, else what a basic type crosses as."""
     if item.interface is not None:
         return f"{item.interface.package}/{item.interface.type}"
     type_ = item.request if item.kind is CommunicationKind.INCOMING_MESSAGE else item.response

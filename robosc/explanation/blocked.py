@@ -1,6 +1,6 @@
 """Requests that a supervisor allows in the current state of a robot, and the reasons why the others are blocked.
 
-A request is not enabled in five cases (semantics part 1): its service or action is not idle; a behaviour that mentions
+A request is not enabled in five cases: its service or action is not idle; a behaviour that mentions
 it has no transition on it; an update would take a variable out of its range; a requirement does not hold; or synthesis
 forbids it. Each case gives one sentence, so a request has a sentence if and only if it is not enabled. The condition
 that synthesis adds has no meaning if another case blocks the request, and is reported only if none does.

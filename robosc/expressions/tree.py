@@ -1,7 +1,7 @@
 """Resolved expressions, shared by the checked model, the automata, the supervisor and the targets.
 
 Every name in them is bound: a variable or state is given with its component (automaton). A condition *holds* only if it
-is true; it may also be unknown (language B.4). The operator `holds` turns unknown into false. The semantics needs it
+is true; it may also be unknown. The operator `holds` turns unknown into false. The semantics needs it
 inside an expression in only one place, the cancel of an action.
 """
 

@@ -117,7 +117,7 @@ def domain(type_: Type) -> tuple[Value, ...] | range:
 
 
 def default_value(type_: Type, enum_default: str | None = None) -> Value:
-    """The value an uninitialised variable starts at (language A.6)."""
+    """The value an uninitialised variable starts at."""
     match type_:
         case BooleanType():
             return False

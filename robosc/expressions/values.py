@@ -3,8 +3,7 @@ The arithmetic and logic of RoboSC on run-time values, with unknown values as No
 
 Strong Kleene logic for `and`, `or`, `not` (S. C. Kleene, Introduction to Metamathematics, 1952,
 sec. 64). Unknown are: integer results beyond 32 bits, division by zero, results that are not
-finite, a comparison with NaN, and whatever is computed from something unknown (language A.5 and
-B.4).
+finite, a comparison with NaN, and whatever is computed from something unknown.
 
 This module imports nothing and runs on Python 3.8 and later: generated code carries a copy of it.
 """

@@ -1,4 +1,4 @@
-"""Finds the files of a run: the model, and the libraries that it imports from (language A.4).
+"""Finds the files of a run: the model, and the libraries that it imports from.
 
 Libraries of a text are found without reading it by the grammar, so of broken texts, too.
 """

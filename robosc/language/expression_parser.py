@@ -1,4 +1,4 @@
-"""Expressions and types (language A.3, B.1 to B.6), read from tokens."""
+"""Expressions and types, read from tokens."""
 
 from itertools import pairwise
 from typing import NamedTuple

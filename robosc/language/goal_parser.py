@@ -1,4 +1,4 @@
-"""Goals and assumptions (language C.1 and C.2), read from tokens.
+"""Goals and assumptions, read from tokens.
 
 Their words are names everywhere else, so each is taken for a word only where no expression can begin with it.
 """

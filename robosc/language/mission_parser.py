@@ -1,4 +1,4 @@
-"""Missions and preferences (language C.3 and C.4), read from tokens.
+"""Missions and preferences, read from tokens.
 
 Their words are names everywhere else; here each stands where no expression goes on with a name.
 """

@@ -1,6 +1,6 @@
 """Tree of an expression, built from the flat sequence of operands and operators that the parser reads.
 
-Precedence climbing over the table of language A.3 replaces one grammar rule for each precedence, which a
+Precedence climbing over the table of operators replaces one grammar rule for each precedence, which a
 recursive-descent parser would pass through for every literal. Binary operators associate to the left. Long chains of
 `and` and `or` become balanced trees: both are associative, and a chain of a thousand conditions must not need a
 thousand levels of recursion.

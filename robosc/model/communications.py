@@ -1,4 +1,4 @@
-"""Builds and checks the communications of a robot, and what crosses the middleware (language A.5)."""
+"""Builds and checks the communications of a robot, and what crosses the middleware."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace

@@ -1,4 +1,4 @@
-"""Constants: names for values that are known when a model is checked (language B.3)."""
+"""Constants: names for values that are known when a model is checked."""
 
 from collections.abc import Iterator, Mapping
 

@@ -1,4 +1,4 @@
-"""Resolves and types expressions (language A.3 to A.5)."""
+"""Resolves and types expressions."""
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager

@@ -1,4 +1,4 @@
-"""Builds and checks the goals and assumptions of a robot (language C.1 and C.2)."""
+"""Builds and checks the goals and assumptions of a robot."""
 
 from collections.abc import Iterable
 

@@ -1,4 +1,4 @@
-"""Communications against the definitions of their middleware types (language A.5).
+"""Communications against the definitions of their middleware types.
 
 Whatever a generated node would refuse at its start is reported here, and is an error for the ROS packages with such
 nodes (`robosc.targets.ros.package`): a supervisor can be made all the same, for whatever runs without ROS. That holds

@@ -1,4 +1,4 @@
-"""Statements that a model must make to become a supervision layer (language B.13)."""
+"""Statements that a model must make to become a supervision layer."""
 
 from collections.abc import Iterable
 

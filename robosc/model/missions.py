@@ -1,4 +1,4 @@
-"""Builds and checks the missions and preferences of a robot (language C.3 and C.4)."""
+"""Builds and checks the missions and preferences of a robot."""
 
 from collections.abc import Iterable, Mapping, Sequence
 

@@ -1,4 +1,4 @@
-"""Options of communications: quality of service, age, stamp, condition (language B.9, B.10, B.13)."""
+"""Options of communications: quality of service, age, stamp, condition."""
 
 from robosc.language import syntax
 from robosc.model.findings import Findings

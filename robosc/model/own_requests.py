@@ -1,4 +1,4 @@
-"""Effect of the request of an action on its own requirements (semantics 3.4)."""
+"""Effect of the request of an action on its own requirements."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping

@@ -1,4 +1,4 @@
-"""Preferences among requests (language C.4), and whether they contradict each other."""
+"""Preferences among requests, and whether they contradict each other."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -13,7 +13,7 @@ def converted_paths(model: Model, event: str) -> tuple[Path, ...]:
     """Return the parts that updates on an event read, then every other enum that it carries, each part once.
 
     An enum is converted whether an update reads it or not: only then is it noticed that a datum leaves it
-    unknown (language B.4). Elements of arrays, of which there may be any number, only count where they are read.
+    unknown. Elements of arrays, of which there may be any number, only count where they are read.
     """
     return tuple(dict.fromkeys((*_read_paths(model, event), *_enum_paths(model, event))))
 

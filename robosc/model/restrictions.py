@@ -1,4 +1,4 @@
-"""Requirements, invariants and provided data of a robot, its own and imported ones (language B.7)."""
+"""Requirements, invariants and provided data of a robot, its own and imported ones."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence

@@ -1,4 +1,4 @@
-"""The scopes of a robot: which names each of its files can use (language A.4)."""
+"""The scopes of a robot: which names each of its files can use."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

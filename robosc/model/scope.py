@@ -1,4 +1,4 @@
-"""Meanings that a name can have at one place of a model (language A.4)."""
+"""Meanings that a name can have at one place of a model."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace

@@ -60,7 +60,7 @@ EVENT_KINDS: dict[CommunicationKind, tuple[EventKind, ...]] = {
         EventKind.RESET,
     ),
 }
-"""The events of each kind of communication (semantics part 1)."""
+"""The events of each kind of communication."""
 
 ISSUED_KINDS = frozenset({EventKind.REQUEST, EventKind.CANCEL, EventKind.RESET})
 """The kinds that an executor issues and a supervisor may disable. (As a layer, cancel is the caller's: see
@@ -132,8 +132,7 @@ class Communication(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
         depth: Number of messages that are kept for a slow receiver, if the model says so.
         max_age: Seconds after which an outgoing message that was not seen again is stale.
         frame: Frame with which the header of an incoming message, or an action's request, is stamped.
-        when: Condition for the messages on a shared identifier that are this one, in a supervision layer (language
-            B.13).
+        when: Condition for the messages on a shared identifier that are this one, in a supervision layer.
     """
 
     name: Name
@@ -186,7 +185,7 @@ class Variable(msgspec.Struct, frozen=True, gc=False):
         name: Its name, unique among the behaviour's states and variables.
         type: Boolean, integer, double, string or enum.
         initial: The value it starts at.
-        is_synthesis: True if it takes part in synthesis (language A.6); else it is code-only.
+        is_synthesis: True if it takes part in synthesis; else it is code-only.
     """
 
     name: Name
@@ -289,7 +288,7 @@ class GoalForm(StrEnum):
 
 
 class Goal(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """A condition that the robot is to reach (language C.1); it is looked at in stable states.
+    """A condition that the robot is to reach; it is looked at in stable states.
 
     Attributes:
         form: Form: it is to hold again and again, after each trigger, or at least once.
@@ -308,7 +307,7 @@ class Goal(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 
 class Assumption(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """A condition that the surroundings of the robot bring about (language C.2); it is looked at in stable states.
+    """A condition that the surroundings of the robot bring about; it is looked at in stable states.
 
     Attributes:
         form: Form: it holds again and again, or after each trigger; never `ONCE`.
@@ -329,7 +328,7 @@ class Assumption(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 
 class Detour(msgspec.Struct, frozen=True, gc=False):
-    """Visits that come before the others of a mission once a condition holds (language C.3).
+    """Visits that come before the others of a mission once a condition holds.
 
     Attributes:
         trigger: Condition that begins the detour, wherever the mission is.
@@ -346,7 +345,7 @@ class Detour(msgspec.Struct, frozen=True, gc=False):
 
 
 class Mission(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """Conditions that the robot is to reach one after the other, round after round (language C.3).
+    """Conditions that the robot is to reach one after the other, round after round.
 
     Attributes:
         name: Name, unique among the missions of a robot.
@@ -373,7 +372,7 @@ class Mission(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
 
 
 class Preference(msgspec.Struct, frozen=True, gc=False):
-    """Requests that a strategy chooses rather than others, where both lead to its goals (language C.4).
+    """Requests that a strategy chooses rather than others, where both lead to its goals.
 
     Attributes:
         preferred: Names of the communications whose requests are chosen.

@@ -1,4 +1,4 @@
-"""Variables that take part in synthesis, and the rules about them (language A.6; goals and missions: C.1 to C.3)."""
+"""Variables that take part in synthesis, and the rules about them."""
 
 from collections.abc import Iterable, Iterator, Mapping
 

@@ -1,4 +1,4 @@
-"""Typed expressions: compatibility of types, and the types and bounds of results (language A.5)."""
+"""Typed expressions: compatibility of types, and the types and bounds of results."""
 
 from dataclasses import dataclass
 

@@ -1,4 +1,4 @@
-"""Files as units of definitions, and where each component of a robot comes from (language A.4)."""
+"""Files as units of definitions, and where each component of a robot comes from."""
 
 from collections.abc import Collection, Iterator
 from dataclasses import dataclass

@@ -1,9 +1,9 @@
 """The game of a controller against its surroundings, on decision diagrams.
 
 A position is a stable state of the controlled system, with the memory as it was observed there. The surroundings move
-by batches (semantics 3.1): events of one message, in source order, with any data that it can hold, and no silent step
+by batches: events of one message, in source order, with any data that it can hold, and no silent step
 in between. After a batch and after each request silent steps run to their end in the executor's order: own cancels,
-resets, taus (semantics 3.3). At its turn the controller issues one enabled request, or none.
+resets, taus. At its turn the controller issues one enabled request, or none.
 
 The events of one batch carry what one message can hold (`robosc.controller_properties.messages`). Where that would make
 too many cases, their data is taken to be independent, so the surroundings can do no less than they really can.

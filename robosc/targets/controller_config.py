@@ -1,4 +1,4 @@
-"""`controller-config.json` beside a model: the original tool's settings for generated files (semantics 3.11)."""
+"""`controller-config.json` beside a model: the original tool's settings for generated files."""
 
 import json
 import re

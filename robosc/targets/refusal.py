@@ -1,4 +1,4 @@
-"""A target's refusal of a model: some warnings of the check are errors for a target (language A.7, B.11)."""
+"""A target's refusal of a model: some warnings of the check are errors for a target."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

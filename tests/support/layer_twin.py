@@ -1,4 +1,4 @@
-"""The obvious twin of the supervision layer (semantics 3.6 to 3.8): it remembers everything and looks it all up anew.
+"""The obvious twin of the supervision layer: it remembers everything and looks it all up anew.
 
 Of the product it uses the interpreted supervisor and the value of expressions, nothing of the executors.
 """

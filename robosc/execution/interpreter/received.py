@@ -1,4 +1,4 @@
-"""Received data as a model sees it: properties, elements, ranges, enums (language B.4). Nothing here raises."""
+"""Received data as a model sees it: properties, elements, ranges, enums. Nothing here raises."""
 
 from collections.abc import Mapping
 from typing import Any

@@ -1,4 +1,4 @@
-"""Rules of a supervisor, one for each event: its participants, its conditions, its updates (semantics part 1)."""
+"""Rules of a supervisor, one for each event: its participants, its conditions, its updates."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -105,7 +105,7 @@ class EventRule:
 
 @dataclass(frozen=True, slots=True)
 class WhenRule:
-    """Rule for the messages that count as an incoming message (language B.13).
+    """Rule for the messages that count as an incoming message.
 
     Attributes:
         type: Its declared type.

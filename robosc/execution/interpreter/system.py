@@ -1,4 +1,4 @@
-"""Interpreter of a supervisor: plants, ranges, requirements and added conditions exactly as in semantics part 1."""
+"""Interpreter of a supervisor: plants, ranges, requirements and added conditions, each looked at anew."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass

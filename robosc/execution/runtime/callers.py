@@ -1,4 +1,4 @@
-"""Calls and goals that a supervision layer let through, with their callers (semantics 3.7)."""
+"""Calls and goals that a supervision layer let through, with their callers."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Service calls and goals that are under way (semantics 3.2 and 3.4)."""
+"""Service calls and goals that are under way."""
 
 from __future__ import annotations
 

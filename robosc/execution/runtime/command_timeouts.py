@@ -1,4 +1,4 @@
-"""Time of the last input from the existing controller of a supervision layer (semantics 3.7)."""
+"""Time of the last input from the existing controller of a supervision layer."""
 
 from __future__ import annotations
 

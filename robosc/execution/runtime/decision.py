@@ -1,5 +1,5 @@
 """
-Choice of the enabled request that is issued: the policies of semantics 3.5 but `strategy`.
+Choice of the enabled request that is issued: all policies but `strategy`.
 
 Requests have the numbers 0 to N - 1, in source order. A decision calls `choose` with the
 candidates, and again without those that could not be issued; then `issued` for the request that

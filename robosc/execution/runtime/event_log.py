@@ -1,7 +1,7 @@
 """
 The event log.
 
-One entry for everything that happens, written without making the loop wait (semantics 3.9).
+One entry for everything that happens, written without making the loop wait.
 
 An entry is a dict with `time` (seconds since 1970-01-01 UTC), `kind` and, by kind:
 

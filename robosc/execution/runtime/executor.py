@@ -1,7 +1,7 @@
 """
 The executor of a controller.
 
-It issues the requests itself (semantics 3.5), on top of what all executors do.
+It issues the requests itself, on top of what all executors do.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """
 The executor of a supervision layer.
 
-It lets an existing controller's requests through or not (semantics 3.7).
+It lets an existing controller's requests through or not.
 
 The existing controller, the caller, communicates with the layer instead of the robot. Its messages
 come in through `on_request`, `on_call`, `on_goal` and `on_cancel`; messages for it go out through
@@ -309,7 +309,7 @@ class Layer(Runner):
 
     def _recognized(self, names: Sequence[str], message: Any) -> Optional[Request]:
         """
-        Return the request of a message: the first whose condition is true (language B.13).
+        Return the request of a message: the first whose condition is true.
 
         :raises ExecutionError: An enum of the message is unknown, and that is a fault.
         """

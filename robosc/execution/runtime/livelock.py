@@ -1,5 +1,5 @@
 """
-Runs of silent steps that do not end (semantics 3.3).
+Runs of silent steps that do not end.
 
 A run is deterministic: equal states are followed by equal steps. It ends if and only if no state
 occurs twice. R. P. Brent's algorithm finds a repeated state and remembers only one state ("An

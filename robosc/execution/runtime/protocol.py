@@ -3,7 +3,7 @@ The two interfaces of the executor: to the controlled system and to the middlewa
 
 A `ControlledSystem` is the supervisor as code: `robosc.execution.interpreter` interprets a
 `Supervisor`, a target generates a class with the same methods. The `Executor` adds the behaviour
-in time of semantics part 3: batches, silent steps, decisions, release, safe stop, log. It reaches
+in time: batches, silent steps, decisions, release, safe stop, log. It reaches
 ROS, a bridge or a test through `Middleware`. The `Layer` does the same for requests of an existing
 controller. It reaches the robot through `RobotSide`, and that controller through
 `LayerMiddleware`.

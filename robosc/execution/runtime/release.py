@@ -1,4 +1,4 @@
-"""Messages that keep acting after they were sent, and their release (semantics 3.6)."""
+"""Messages that keep acting after they were sent, and their release."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Replies to service calls and goals, and replies that do not come in time (semantics 3.2)."""
+"""Replies to service calls and goals, and replies that do not come in time."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Decisions: which request is issued, and how (semantics 3.5 and 3.6)."""
+"""Decisions: which request is issued, and how."""
 
 from __future__ import annotations
 

@@ -1,8 +1,6 @@
 """
 Common part of the executors of both deployments, around any `ControlledSystem`.
 
-It covers semantics part 3, points 1 to 4 and 8.
-
 An adapter calls an executor from one thread: `tick` once in a period, the other methods when a
 message or reply comes. The middleware must not call the executor back from within a call. No
 method raises an exception: one of the system or of the middleware becomes a fault, and the robot

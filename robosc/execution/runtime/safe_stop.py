@@ -1,7 +1,7 @@
 """
 Safe stop of the robot.
 
-It sends default messages on release identifiers, and cancels goals (semantics 3.8).
+It sends default messages on release identifiers, and cancels goals.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Outgoing messages that must keep coming: those with a `max_age` (semantics 3.8)."""
+"""Outgoing messages that must keep coming: those with a `max_age`."""
 
 from __future__ import annotations
 

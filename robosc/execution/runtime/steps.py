@@ -1,5 +1,5 @@
 """
-Events of the environment, and the silent steps that follow them (semantics 3.1 and 3.3).
+Events of the environment, and the silent steps that follow them.
 
 A state is *stable* if no silent step is enabled in it. Releases and the requirements of running
 goals are checked once in each new stable state. A stable state that was left and reached again

@@ -1,7 +1,7 @@
 """RoboSC expressions as code: native operations if no operand can be unknown, else Kleene functions.
 
 A boolean expression can be written in three ways: `truth` (is it true?), `falsity` (is it false?) and `value` (true,
-false or unknown). Conditions hold only if they are true (language B.4), so most of the generated code needs only
+false or unknown). Conditions hold only if they are true, so most of the generated code needs only
 `truth`, and stays ordinary code even over data that may be unknown.
 
 A number that is unknown as NaN is compared natively: the comparisons of IEEE 754 are false for it, as `truth` and

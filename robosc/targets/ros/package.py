@@ -84,7 +84,7 @@ def packages(found: tuple[Topic, ...], asked: tuple[Communication, ...]) -> set[
 
 
 def release_identifiers(found: tuple[Topic, ...]) -> tuple[str, ...]:
-    """The identifiers that keep acting after a message: velocities (semantics 3.6)."""
+    """The identifiers that keep acting after a message: velocities."""
     return tuple(
         topic.identifier
         for topic in found

@@ -13,7 +13,7 @@ class StateTopic:
     """Data that the generated node needs to publish its state.
 
     Attributes:
-        definition: The `definition` of semantics 3.10.
+        definition: The key `definition` of each state.
         transitions: Transition that an event takes.
     """
 

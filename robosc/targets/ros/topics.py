@@ -36,7 +36,7 @@ _BASIC_INTERFACES: dict[type[Type], Interface] = {
     IntegerType: Interface("Int16", "std_msgs"),
     DoubleType: Interface("Float32", "std_msgs"),
 }
-"""Interface for each type that crosses the middleware without `links` (language A.5)."""
+"""Interface for each type that crosses the middleware without `links`."""
 
 _BASIC_SHAPES: dict[type[Type], str] = {
     BooleanType: "boolean",
@@ -158,7 +158,7 @@ def message_data_type(communication: Communication) -> Type:
 
 
 def message_interface(model: Model, communication: Communication) -> Interface:
-    """The message type of a communication: the linked one, else the one for its basic type (language A.5)."""
+    """The message type of a communication: the linked one, else the one for its basic type."""
     if communication.interface is not None:
         return communication.interface
     type_ = message_data_type(communication)

@@ -229,7 +229,7 @@ def test_a_goal_that_turns_against_its_requirements_is_cancelled() -> None:
         stage.controller.receive("/bump", None)
         await stage.turns()
         assert ended == ["cancelled"]
-        # Its own cancel is no error of the action (semantics 3.2); the goal has ended.
+        # Its own cancel is no error of the action; the goal has ended.
         assert stage.state("Docker") == "away"
         assert stage.system.location("dock") == "idle"
 

@@ -1,7 +1,7 @@
 """Wanted motion of the wheels: keep a velocity, rotate by an angle, or stand still.
 
 A velocity that the supervisor commanded holds until its next command, as on any drive base, unless the supervisor
-releases it (semantics 3.6). The loop passes it to the safety layer anew in every cycle, so that it ends with the loop.
+releases it. The loop passes it to the safety layer anew in every cycle, so that it ends with the loop.
 """
 
 from collections.abc import Callable

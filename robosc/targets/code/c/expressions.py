@@ -1,6 +1,6 @@
 """RoboSC expressions in C: see `robosc.targets.code.expression_writer`.
 
-Unknown values (language B.4) are -1 for a boolean and an enum, INT64_MIN for an integer, NaN for a double, NULL for a
+Unknown values are -1 for a boolean and an enum, INT64_MIN for an integer, NaN for a double, NULL for a
 text. Integers are computed in 64 bits, so that a result beyond 32 bits is detected before it overflows.
 """
 

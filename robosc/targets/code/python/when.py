@@ -1,4 +1,4 @@
-"""Generated methods that decide which incoming message a message is, in a supervision layer (language B.13)."""
+"""Generated methods that decide which incoming message a message is, in a supervision layer."""
 
 from robosc.errors import InternalError
 from robosc.expressions.text import expression_text

@@ -1,7 +1,7 @@
 """
 Test whether all fields of a message have their defaults.
 
-The header does not count (semantics 3.6).
+The header does not count.
 
 Messages are compared field by field, because received messages have tuples and bytes where a new
 message has lists.

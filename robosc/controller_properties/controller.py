@@ -1,8 +1,8 @@
 """The controller automaton: what a supervisor and its executor do together, state by state.
 
 A state consists of a state of the system and the executor's memory of running goals: which requirements of an action
-held in some stable state since its request (3.4). The state is *stable* if no silent step is enabled. Silent steps
-pre-empt everything else, in the executor's order: own cancels, resets, taus (3.3). In a stable state the environment
+held in some stable state since its request. The state is *stable* if no silent step is enabled. Silent steps
+pre-empt everything else, in the executor's order: own cancels, resets, taus. In a stable state the environment
 may send a message or answer, and any enabled request may be issued.
 
 - One step of the environment is one middleware message, a *batch* (3.1): the events that stand for it, in source

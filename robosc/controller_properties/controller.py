@@ -5,7 +5,7 @@ held in some stable state since its request. The state is *stable* if no silent 
 pre-empt everything else, in the executor's order: own cancels, resets, taus. In a stable state the environment
 may send a message or answer, and any enabled request may be issued.
 
-- One step of the environment is one middleware message, a *batch* (3.1): the events that stand for it, in source
+- One step of the environment is one middleware message, a *batch*: the events that stand for it, in source
   order, with no silent step between them. Under the setting `on_unknown: keep` an event whose enum is unknown does
   not happen, so any part of a batch may happen as well; a *whole* batch can happen under every setting.
 - Received data takes every value that matters. Events of one message carry data that the same fields can produce

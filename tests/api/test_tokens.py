@@ -15,7 +15,7 @@ from robosc_api.security import (
     make_token,
     open_channel,
 )
-from robosc_api.security.tokens import MAXIMUM_BYTES, MAXIMUM_TOKEN, parse_tokens
+from robosc_api.security.tokens import MAXIMUM_BYTES, MAXIMUM_TOKEN, parse_tokens, stamp_of
 
 
 class Clock:
@@ -234,3 +234,22 @@ def test_quotas_by_flags_where_a_service_has_them() -> None:
             parser.parse_args(["a", "--waiting", wrong])
     with pytest.raises(SystemExit):
         arguments("a", "--waiting", "3")
+
+
+def test_a_file_that_is_written_or_replaced_is_another_one(tmp_path: Path) -> None:
+    """Time, size and inode: any of them tells it apart."""
+    file, other = tmp_path / "tokens", tmp_path / "other"
+    for path, text in ((file, "one"), (other, "two")):
+        path.write_text(text)
+        os.utime(path, ns=(0, 5))
+    before = stamp_of(file.stat())
+    os.utime(file, ns=(0, 6))
+    assert stamp_of(file.stat()) != before
+    file.write_text("more")
+    os.utime(file, ns=(0, 5))
+    assert stamp_of(file.stat()) != before
+    file.write_text("one")
+    os.utime(file, ns=(0, 5))
+    assert stamp_of(file.stat()) == before
+    other.replace(file)
+    assert stamp_of(file.stat()) != before

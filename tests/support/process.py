@@ -10,6 +10,7 @@ from types import TracebackType
 from typing import Self
 
 EXIT_LIMIT_S = 15.0
+_ABORT_LIMIT_S = 5.0
 
 
 class Process:
@@ -31,7 +32,7 @@ class Process:
         with self._error_file.open("wb") as error, self._output_file.open("wb") as output:
             self.popen = subprocess.Popen(
                 command,
-                env=dict(variables),
+                env={"PYTHONFAULTHANDLER": "1", **variables},
                 stdin=stdin,
                 stdout=output,
                 stderr=error,
@@ -70,10 +71,17 @@ class Process:
         self.popen.send_signal(number)
 
     def wait(self, limit_s: float = EXIT_LIMIT_S) -> int:
-        """Its exit status, waiting for its end."""
+        """Its exit status, waiting for its end.
+
+        Raises:
+            AssertionError: It did not end; a Python's says where its threads are.
+        """
         try:
             return self.popen.wait(limit_s)
         except subprocess.TimeoutExpired:
+            self.signal(signal.SIGABRT)
+            with contextlib.suppress(subprocess.TimeoutExpired):
+                self.popen.wait(_ABORT_LIMIT_S)
             raise AssertionError(f"the process did not end within {limit_s} s\n{self.stderr}") from None
 
     def __enter__(self) -> Self:

@@ -58,6 +58,9 @@ def test_a_rotation_rests_in_a_safe_stop_and_goes_on() -> None:
     rotating = motion.heads(0.0, 1.1)
     assert rotating.angular_rad_s > 0
     motion.pause(True, 1.2)
+    motion.pause(False, 1.2)
+    assert motion.commands[-2:] == [STANDSTILL, rotating]
+    motion.pause(True, 1.2)
     assert (motion.commands[-1], motion.heads(0.1, 1.3)) == (STANDSTILL, STANDSTILL)
     motion.pause(False, 1.4)
     assert motion.commands[-1] == rotating

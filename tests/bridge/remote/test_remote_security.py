@@ -124,7 +124,9 @@ def test_who_ordered_stands_in_the_log_by_name(tmp_path: Path) -> None:
         assert daemon.orders[0].by.startswith("'caller-0' at ipv4:127.0.0.1:")
 
 
-def test_client_certificates_are_enough(tmp_path: Path, authority: Authority) -> None:
+def test_client_certificates_are_enough(authority: Authority, monkeypatch: pytest.MonkeyPatch) -> None:
+    # The guard sees every caller on another machine: tests have only this one.
+    monkeypatch.setattr("robosc_api.security.guard.peer_of", lambda context: "ipv4:192.0.2.1:4711")
     certificate, key = authority.sign("bridge")
     own, own_key = authority.sign("operator")
     security = ServerSecurity(certificate=certificate, key=key, client_ca=authority.file)

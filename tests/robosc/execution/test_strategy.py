@@ -232,6 +232,7 @@ def test_a_cancel_is_due_once_a_requirement_has_held_while_its_goal_runs_and_hol
             assert system.step(event) == ()
             # Only what is observed is remembered.
             at_once = system.due_cancel()
+            assert system.is_stable() is (at_once is None)
             system.observe()
             assert system.due_cancel() == at_once
             found.append(at_once)

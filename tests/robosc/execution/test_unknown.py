@@ -431,19 +431,3 @@ def test_data_with_an_unknown_part_is_not_provided() -> None:
     assert system.provide("move") == (False, None)
     system.step("speed.response", system.read("speed.response", 1.0))
     assert system.provide("move") == (True, {"linear": {"x": 0.5}})
-
-
-def test_a_double_begins_as_one() -> None:
-    """Integers end at 32 bits, and doubles do not."""
-    system = system_of(
-        """
-        robot Count {
-          component A {
-            outgoing message more with type: none
-            behaviour { variable v: double = 2000000000 on response from more do v := v + v initial marked state s { } }
-          }
-        }
-        """
-    )
-    assert system.step("more.response") == ()
-    assert system.state()["A"]["variables"]["v"] == 4e9

@@ -2,11 +2,13 @@
 
 from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 
 import pytest
 
 from robosc.automata import System
 from robosc.automata.decision import Decision
+from robosc.expressions import StateTest
 from robosc.supervisor.predicates import state_predicate, state_predicates
 from robosc.synthesis import SynthesisStatus, synthesize
 from robosc.verification import CheckOutcome, Verification, synthesize_explicit, verify_explicitly
@@ -65,3 +67,17 @@ def test_a_supervisor_may_choose_where_to_begin() -> None:
     assert not verdicts(made, {}, state_predicate(made, begin))[0].failures
     failed, _ = verdicts(made, {}, None)
     assert (failed.nonblocking, failed.trace, failed.failures[0].state) == (CheckOutcome.FAILED, (), ("a",))
+
+
+def test_a_marker_may_ask_for_more_than_marked_locations() -> None:
+    made = system(automaton("A", ["a -go-> b"], marked=["a", "b"]))
+    assert not verdicts(made, {}, None)[0].failures
+    failed, _ = verdicts(replace(made, marker=StateTest("A", "a")), {}, None)
+    assert (failed.nonblocking, failed.trace, failed.failures[0].state) == (CheckOutcome.FAILED, ("go",), ("b",))
+
+
+def test_a_system_begins_only_where_its_plant_invariants_are_true() -> None:
+    made = system(automaton("A", ["a -u_fall-> broken", "b -go-> b"], initial=["a", "b"], marked=["b"]))
+    assert verdicts(made, {}, None)[0].failures
+    begins_well, _ = verdicts(replace(made, plant_invariants=(StateTest("A", "b"),)), {}, None)
+    assert (begins_well.failures, begins_well.states) == ((), 1)

@@ -197,3 +197,12 @@ async def test_a_result_is_the_owners_who_asked_first(tmp_path: Path) -> None:
     assert await store.find_result("k") is None
     assert await store.find_result("l") is not None
     store.close()
+
+
+def test_there_is_room_until_the_results_reach_the_limit() -> None:
+    kept = retention.Retention(None, JobLimits(results_bytes=10))  # type: ignore[arg-type]  # the database is not asked
+    kept.note(Result((b"12345", b"6789")))
+    kept.admit()
+    kept.note(Result((b"0",)))
+    with pytest.raises(RefusedError, match="the storage for job results is full"):
+        kept.admit()

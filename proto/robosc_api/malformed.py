@@ -9,6 +9,9 @@ from google.protobuf.message import DecodeError
 from robosc_api.failures import failure_metadata
 from robosc_api.layers import Layer, write_responses
 
+PLAIN_REQUESTS = ("grpc.compression_enabled_algorithms_bitset", 1 << grpc.Compression.NoCompression)
+"""Option of a server that refuses compressed requests: a few hundred bytes would become megabytes before any limit."""
+
 _MALFORMED = object()
 
 

@@ -16,7 +16,7 @@ from robosc import __version__
 from robosc_api.connection_ledger import ConnectionLimits
 from robosc_api.connection_watch import Arrivals, ConnectionWatch
 from robosc_api.layers import LayeredServices
-from robosc_api.malformed import MalformedRequests
+from robosc_api.malformed import PLAIN_REQUESTS, MalformedRequests
 from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts
 from robosc_api.security import Guard, Rule, Scope, SecurityError, TokenFile, add_port, caller_of, token_or_host_of
 from robosc_api.security.addresses import is_loopback_host, split_address
@@ -303,8 +303,7 @@ def _options(settings: Settings, request_bytes: int, connections: int) -> list[t
         ("grpc.absolute_max_metadata_size", _METADATA_BYTES),
         # The server refuses large messages with a reason; beyond this size gRPC refuses without one.
         ("grpc.max_receive_message_length", 2 * request_bytes),
-        # A few hundred bytes would become a request of megabytes before any limit is asked: nothing is unpacked.
-        ("grpc.compression_enabled_algorithms_bitset", 1 << grpc.Compression.NoCompression),
+        PLAIN_REQUESTS,
         # A probed window grows to megabytes, and so much of a message that gRPC refuses would still be received. The
         # window of a message that is read grows to its size all the same.
         ("grpc.http2.bdp_probe", 0),

@@ -17,7 +17,7 @@ from grpc_reflection.v1alpha import reflection, reflection_pb2_grpc
 from robosc_api.connection_ledger import ConnectionLimits
 from robosc_api.connection_watch import Arrivals, CallsByConnection, ConnectionWatch
 from robosc_api.layers import LayeredServices
-from robosc_api.malformed import MalformedRequests
+from robosc_api.malformed import PLAIN_REQUESTS, MalformedRequests
 from robosc_api.request_timeouts import REFLECTION_METHODS, RequestTimeouts
 from robosc_api.security import Guard, SecurityError, ServerSecurity, TokenFile, add_port
 from robosc_api.security.addresses import split_address
@@ -180,6 +180,7 @@ def _options() -> list[tuple[str, int]]:
         # Two bridges could otherwise share a port, and each would get some of the stops.
         ("grpc.so_reuseport", 0),
         ("grpc.max_receive_message_length", MAXIMUM_REQUEST_BYTES),
+        PLAIN_REQUESTS,
         ("grpc.max_metadata_size", MAXIMUM_METADATA_BYTES),
         ("grpc.absolute_max_metadata_size", MAXIMUM_METADATA_BYTES),
         ("grpc.max_allowed_incoming_connections", MAXIMUM_CONNECTIONS),

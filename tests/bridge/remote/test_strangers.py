@@ -88,6 +88,15 @@ def test_a_stream_about_what_is_served_is_ended_when_it_says_nothing_more(
         wait_until(lambda: stranger.has_received(b"each further one within 0.1"))
 
 
+def test_a_packed_request_is_not_unpacked(daemon: FakeDaemon, endpoint: RemoteEndpoint) -> None:
+    with connected(endpoint.address) as stub:
+        with pytest.raises(grpc.RpcError) as caught:
+            stub.Stop(pb.StopRequest(), timeout=PATIENCE_S, compression=grpc.Compression.Gzip)
+        error: Any = caught.value
+        assert error.code() is grpc.StatusCode.UNIMPLEMENTED
+    assert daemon.commands() == []
+
+
 def test_health_is_not_watched(endpoint: RemoteEndpoint) -> None:
     with grpc.insecure_channel(endpoint.address) as channel:
         call = health_pb2_grpc.HealthStub(channel).Watch(health_pb2.HealthCheckRequest(), timeout=PATIENCE_S)

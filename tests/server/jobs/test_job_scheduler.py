@@ -117,6 +117,27 @@ async def test_bounds_hold_and_say_when_to_come_back() -> None:
     assert (scheduler.waiting, scheduler.running) == (0, 0)
 
 
+class Spent:
+    """Accounts of callers who have used up their quotas."""
+
+    def waiting(self, caller: str) -> int | None:
+        return None
+
+    def check(self, caller: str) -> None:
+        raise RefusedError(Reason.QUOTA_EXCEEDED, "the quota is used up")
+
+    def charge(self, caller: str, cpu_s: float) -> None:
+        raise AssertionError("nothing was done")
+
+
+async def test_a_quota_that_was_used_up_meanwhile_counts_when_the_turn_comes() -> None:
+    workers = ScriptedWorkers(1)
+    scheduler = Scheduler(workers, QueueLimits(), accounts=Spent())
+    with pytest.raises(RefusedError, match="the quota is used up"):
+        await scheduler.run(task_of("a"), "me", TaskLimits(), drop)
+    assert (workers.begun, scheduler.waiting, scheduler.running) == ([], 0, 0)
+
+
 async def test_callers_take_turns_however_many_tasks_they_have() -> None:
     scheduler = Scheduler(ScriptedWorkers(1), QueueLimits())
     running = scheduler.enter("c")

@@ -196,6 +196,8 @@ def scene() -> Scene:
 
 def test_it_is_opened_and_rests_until_it_is_let(scene: Scene) -> None:
     scene.up()
+    # Opening may take long: the gate is asked before.
+    assert scene.gate.asked == [100.0]
     assert scene.step() == pytest.approx(PERIOD_S)
     assert scene.taken() == [("exchange", STANDSTILL)]
     assert scene.gate.readings == scene.reports != []

@@ -52,6 +52,9 @@ async def test_memory_is_bounded_and_what_was_asked_for_last_stays(tmp_path: Pat
     results.remember("large", _KIND, Result((bytes(5_000),)))
     assert results.in_memory("large") is None
     assert [key for key in "abcd" if results.in_memory(key)] == ["a", "c", "d"]
+    # One takes the place of several.
+    results.remember("e", _KIND, Result((bytes(3_500),)))
+    assert [key for key in "abcde" if results.in_memory(key)] == ["e"]
     store.close()
 
 

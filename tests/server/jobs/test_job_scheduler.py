@@ -117,6 +117,47 @@ async def test_bounds_hold_and_say_when_to_come_back() -> None:
     assert (scheduler.waiting, scheduler.running) == (0, 0)
 
 
+class Spent:
+    """Accounts of callers who have used up their quotas."""
+
+    def waiting(self, caller: str) -> int | None:
+        return None
+
+    def check(self, caller: str) -> None:
+        raise RefusedError(Reason.QUOTA_EXCEEDED, "the quota is used up")
+
+    def charge(self, caller: str, cpu_s: float) -> None:
+        raise AssertionError("nothing was done")
+
+
+async def test_a_quota_that_was_used_up_meanwhile_counts_when_the_turn_comes() -> None:
+    workers = ScriptedWorkers(1)
+    scheduler = Scheduler(workers, QueueLimits(), accounts=Spent())
+    with pytest.raises(RefusedError, match="the quota is used up"):
+        await scheduler.run(task_of("a"), "me", TaskLimits(), drop)
+    assert (workers.begun, scheduler.waiting, scheduler.running) == ([], 0, 0)
+
+
+async def test_callers_take_turns_however_many_tasks_they_have() -> None:
+    scheduler = Scheduler(ScriptedWorkers(1), QueueLimits())
+    running = scheduler.enter("c")
+    waiting = [scheduler.enter(name) for name in "aaaabb"]
+    order = ""
+    for _ in waiting:
+        scheduler.leave(running)
+        (running,) = (place for place in waiting if place.has_worker)
+        order += running.caller
+    assert order == "ababaa"
+
+
+async def test_who_leaves_the_line_leaves_no_gap_in_it() -> None:
+    scheduler = Scheduler(ScriptedWorkers(1), QueueLimits())
+    running, gone, last = (scheduler.enter(name) for name in "abc")
+    scheduler.leave(gone)
+    scheduler.leave(running)
+    assert (last.has_worker, scheduler.waiting) == (True, 0)
+
+
 async def test_all_addresses_of_one_network_stand_in_one_line() -> None:
     scheduler = Scheduler(ScriptedWorkers(1), QueueLimits(100, 2))
     taken = scheduler.enter("2001:db8::1")
@@ -265,8 +306,14 @@ _STEP = st.one_of(
 )
 
 
-@settings(max_examples=examples(60))
-@given(st.lists(_STEP, max_size=60), st.integers(1, 3), st.integers(1, 8), st.integers(1, 4), st.integers(0, 2))
+@settings(max_examples=examples(200))
+@given(
+    st.lists(_STEP, min_size=20, max_size=60),
+    st.integers(1, 3),
+    st.integers(1, 8),
+    st.integers(1, 4),
+    st.integers(0, 2),
+)
 def test_whatever_happens_it_does_as_the_twin(
     steps: list[tuple[str, str | int]], capacity: int, waiting: int, per_caller: int, reserved: int
 ) -> None:

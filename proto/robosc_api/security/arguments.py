@@ -177,17 +177,16 @@ def quota_of(arguments: argparse.Namespace) -> Quota:
     return Quota(arguments.waiting, arguments.per_minute, arguments.cpu_seconds_per_hour, arguments.calls)
 
 
-def issue_token(arguments: argparse.Namespace, wall_clock: Callable[[], float] = time.time) -> tuple[str, str]:
+def issue_token(arguments: argparse.Namespace) -> tuple[str, str]:
     """Create a token; return the text for standard output and the line for the token file.
 
     Args:
         arguments: Arguments of `add_token_arguments`.
-        wall_clock: Seconds since 1970.
 
     Raises:
         SecurityError: The name or expiry is invalid, or the file for the token exists or cannot be created.
     """
-    expires_s = expiry_of(arguments.expires, wall_clock())
+    expires_s = expiry_of(arguments.expires, time.time())
     scopes = tuple(arguments.scope or arguments.default_scopes)
     token, line = make_token(arguments.name, scopes, quota_of(arguments), expires_s)
     if arguments.output is None:

@@ -50,8 +50,6 @@ class ResultCache:
         self._writes_singly = False
         self._touched: set[str] = set()
         self._tasks: list[asyncio.Task[None]] = []
-        self.hits = 0
-        self.misses = 0
 
     async def __aenter__(self) -> Self:
         self._tasks = [asyncio.create_task(self._write()), asyncio.create_task(self._touch())]
@@ -75,7 +73,6 @@ class ResultCache:
         if found is not None:
             self._memory.move_to_end(key)
             self._note_use(key)
-            self.hits += 1
         return found
 
     async def find(self, key: str) -> Result | None:
@@ -85,7 +82,6 @@ class ResultCache:
             return found
         unwritten = self._unwritten.get(key)
         if unwritten is not None:
-            self.hits += 1
             return self.remember(key, *unwritten[:2])
         there = None
         # An unavailable database is not queried: its timeout may take longer than the task.
@@ -93,9 +89,7 @@ class ResultCache:
             with contextlib.suppress(StoreUnavailableError):
                 there = await self._store.find_result(key)
         if there is None:
-            self.misses += 1
             return None
-        self.hits += 1
         self._note_use(key)
         return self.remember(key, *there)
 

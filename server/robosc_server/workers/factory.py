@@ -3,21 +3,18 @@
 import re
 
 from robosc_server.workers.dask_cluster import DaskWorkers
-from robosc_server.workers.local import TASK_FUNCTION, LocalWorkers
+from robosc_server.workers.local import LocalWorkers
 
 CLUSTER = re.compile(r"dask(\+tls)?://(?P<address>(\[[0-9a-fA-F:.]+\]|[^\s/\[\]:@]+):\d{1,5})/?")
 """Form of the setting for a cluster."""
 
 
-def open_workers(
-    spec: str, processes: int, task_function: str = TASK_FUNCTION, *, must_be_confined: bool = False
-) -> LocalWorkers | DaskWorkers:
+def open_workers(spec: str, processes: int, *, must_be_confined: bool = False) -> LocalWorkers | DaskWorkers:
     """Return workers that are not started yet: enter them.
 
     Args:
         spec: `local`, `dask://HOST:PORT` or `dask+tls://HOST:PORT`.
         processes: Maximum number of tasks that this machine runs at once; a cluster has its own number.
-        task_function: Function that runs tasks, `package.module:name`.
         must_be_confined: True to start none on a machine without complete confinement.
 
     Raises:
@@ -25,8 +22,8 @@ def open_workers(
         WorkersError: A package that they need is missing.
     """
     if spec == "local":
-        return LocalWorkers(processes, task_function, must_be_confined=must_be_confined)
+        return LocalWorkers(processes, must_be_confined=must_be_confined)
     if found := CLUSTER.fullmatch(spec):
         address = f"{'tls' if found[1] else 'tcp'}://{found['address']}"
-        return DaskWorkers(address, task_function, must_be_confined=must_be_confined)
+        return DaskWorkers(address, must_be_confined=must_be_confined)
     raise ValueError(f"workers are 'local', 'dask://HOST:PORT' or 'dask+tls://HOST:PORT', and not {spec!r}")

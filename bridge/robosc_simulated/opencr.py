@@ -160,6 +160,8 @@ class OpenCr:
         self._calibration_s = calibration_s
         self._parser = RequestParser()
         self._waiting: deque[Request] = deque()
+        # Answers of passes that were done because somebody touched the board.
+        self._unsent: list[Sending] = []
         self._memory = bytearray(_SIZE)
         self._began_s = self._time.now_s()
         self._cycle_s = self._began_s
@@ -210,7 +212,7 @@ class OpenCr:
     def press(self, **changes: bool) -> None:
         """Press or release buttons and bumpers, by their names in `Panel`."""
         with self._time.lock:
-            self.update()
+            self._unsent = list(self.update())
             for name, value in changes.items():
                 if name not in ("button_1", "button_2", "bumper_1", "bumper_2"):
                     raise ValueError(f"there is no button or bumper {name!r}")
@@ -220,13 +222,13 @@ class OpenCr:
         """Let an RC-100 remote control want this velocity, until it wants another one."""
         fastest_m_s, fastest_rad_s = self._fastest()
         with self._time.lock:
-            self.update()
+            self._unsent = list(self.update())
             self._remote_goal = (_within(linear_m_s, fastest_m_s), _within(angular_rad_s, fastest_rad_s))
 
     def set_battery(self, voltage_v: float) -> None:
         """Let the battery have this voltage from now on."""
         with self._time.lock:
-            self.update()
+            self._unsent = list(self.update())
             self._battery = None
             self.panel.battery_v = voltage_v
             self._supply()
@@ -248,7 +250,7 @@ class OpenCr:
     def update(self) -> Iterable[Sending]:
         """Do all passes until now."""
         now_s = self._time.now_s()
-        found: list[Sending] = []
+        found, self._unsent = self._unsent, []
         if self._busy_until_s is not None and now_s >= self._busy_until_s:
             found += self._end_calibration(self._busy_until_s)
         while self._busy_until_s is None and now_s >= self.due_s():

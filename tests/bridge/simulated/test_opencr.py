@@ -10,6 +10,7 @@ from dynamixel_sdk import PacketHandler
 
 from robosc.execution.runtime.clock import ManualClock
 from robosc_simulated import Noise, OpenCr, Scene, SimulatedTurtleBot3, Walls
+from robosc_simulated.packets import crc16
 from support.wire import SdkPort
 
 OPEN_SPACE = Walls(())
@@ -331,6 +332,22 @@ def test_buttons_and_bumpers_are_reported(station: Station) -> None:
     assert station.read(27, "B") == 0
     with pytest.raises(ValueError, match="no button"):
         station.opencr.press(battery_v=True)
+
+
+def test_who_touches_it_takes_no_answer_from_its_host() -> None:
+    clock = ManualClock()
+    with SimulatedTurtleBot3("burger", "opencr", walls=OPEN_SPACE, clock=clock) as robot:
+        board = OpenCr(robot.world, robot.left, robot.right, pass_s=0.005)
+        head = b"\xff\xff\xfd\x00" + struct.pack("<BHBHH", 200, 7, 2, 26, 1)
+        acts = (lambda: board.press(button_1=True), lambda: board.steer(0.0, 0.0), lambda: board.set_battery(12.0))
+        for touch in acts:
+            clock.advance(0.001)
+            assert list(board.receive(head + struct.pack("<H", crc16(head)), 1_000_000)) == []
+            clock.advance(0.012)
+            touch()
+            (answer,) = board.update()
+            assert answer.data[7:9] == b"\x55\x00"
+            assert list(board.update()) == []
 
 
 def test_the_imu_reports_the_heading(station: Station) -> None:

@@ -2,7 +2,7 @@
 
 import math
 import struct
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 import pytest
@@ -339,7 +339,11 @@ def test_who_touches_it_takes_no_answer_from_its_host() -> None:
     with SimulatedTurtleBot3("burger", "opencr", walls=OPEN_SPACE, clock=clock) as robot:
         board = OpenCr(robot.world, robot.left, robot.right, pass_s=0.005)
         head = b"\xff\xff\xfd\x00" + struct.pack("<BHBHH", 200, 7, 2, 26, 1)
-        acts = (lambda: board.press(button_1=True), lambda: board.steer(0.0, 0.0), lambda: board.set_battery(12.0))
+        acts: tuple[Callable[[], None], ...] = (
+            lambda: board.press(button_1=True),
+            lambda: board.steer(0.0, 0.0),
+            lambda: board.set_battery(12.0),
+        )
         for touch in acts:
             clock.advance(0.001)
             assert list(board.receive(head + struct.pack("<H", crc16(head)), 1_000_000)) == []

@@ -110,8 +110,6 @@ class Rover:
         self._first_s = {_HEARTBEAT: heartbeat_s, _SYS_STATUS: _SYS_STATUS_S}
         self._interval_s = dict(self._first_s)
         self._due_s = dict.fromkeys(self._first_s, self._began_s)
-        # Packets that came due when a person acted.
-        self._unsent: list[Sending] = []
         for wheel in (world.left, world.right):
             wheel.acceleration_rad_s2 = 40.0
             # It has motors of its own, and cruises at half of their throttle (ArduPilot's CRUISE_THROTTLE).
@@ -122,7 +120,7 @@ class Rover:
     def take_over(self, mode: int = MANUAL, linear_m_s: float = 0.0, angular_rad_s: float = 0.0) -> None:
         """An operator with a remote control changes the mode, and drives if it is MANUAL."""
         with self._time.lock:
-            self._unsent = list(self.update())
+            self.update()
             self._remote = (linear_m_s, angular_rad_s)
             self._enter(mode)
             self._drive()
@@ -130,14 +128,14 @@ class Rover:
     def disarm(self) -> None:
         """An operator, or a failsafe, takes the power from the motors."""
         with self._time.lock:
-            self._unsent = list(self.update())
+            self.update()
             self.is_armed = False
             self._drive()
 
     def restart(self) -> None:
         """The autopilot starts anew."""
         with self._time.lock:
-            self._unsent = list(self.update())
+            self.update()
             self._began_s = self._time.now_s()
             self.is_armed = False
             self._enter(HOLD)
@@ -166,7 +164,6 @@ class Rover:
         """Drive until now, and return the packets that are due."""
         self._world.catch_up()
         now_s = self._time.now_s()
-        found, self._unsent = self._unsent, []
         packets: list[bytes] = []
         if self._target is not None and now_s - self._target_s >= TARGET_LIMIT_S:
             self._target = None
@@ -177,7 +174,7 @@ class Rover:
                 interval_s = self._interval_s[number]
                 self._due_s[number] = due_s + interval_s * (math.floor((now_s - due_s) / interval_s) + 1)
                 packets += self._telemetry(number)
-        return [] if self.is_silent else found + [Sending(packet) for packet in packets]
+        return [] if self.is_silent else [Sending(packet) for packet in packets]
 
     def due_s(self) -> float:
         """Return the time when its next message or the expiry of its target is due."""

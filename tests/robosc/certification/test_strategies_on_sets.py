@@ -19,6 +19,7 @@ from robosc.errors import SynthesisCancelled
 from robosc.model.structure import Deployment
 from robosc.supervisor import AddedCondition, Choice, DecisionDiagram, Strategy, Supervisor
 from robosc.verification import CheckOutcome, Limits
+from support.battery_readers import BATTERY_READERS
 from support.effort import examples
 from support.missions import strategic
 from support.models import bundle_of, model_of
@@ -235,7 +236,8 @@ def test_the_executor_cancels_what_may_not_go_on() -> None:
     assert min(met["passed"], met["failed"]) > 5, met
 
 
-WATCH = """robot Watch {
+WATCH = (
+    """robot Watch {
     interface battery use BatteryState from sensor_msgs
     datatype object Charge { percentage: double voltage: double }
     datatype enum Level from Charge to { value.percentage < 0.2 -> low default -> good }
@@ -244,22 +246,9 @@ WATCH = """robot Watch {
         value.percentage < 0.2 -> small
         default -> large
     }
-    component Battery {
-        outgoing message level with identifier: "/battery", type: Level links battery
-        behaviour {
-            variable level: Level = good
-            on response from level do level := value
-            initial marked state ready { }
-        }
-    }
-    component Planner {
-        outgoing message reserve with identifier: "/battery", type: Reserve links battery
-        behaviour {
-            variable reserve: Reserve = large
-            on response from reserve do reserve := value
-            initial marked state ready { }
-        }
-    }
+"""
+    + BATTERY_READERS
+    + """\
     component Base {
         incoming message dock with identifier: "/dock", type: none
         incoming message leave with identifier: "/leave", type: none
@@ -271,6 +260,7 @@ WATCH = """robot Watch {
     goal Battery.level = low leads to Base.docked or Battery.level = good
     goal always eventually Base.away or Battery.level = low or Planner.reserve = small
 }"""
+)
 
 
 def test_an_event_that_may_not_happen_is_left_out_of_its_message() -> None:

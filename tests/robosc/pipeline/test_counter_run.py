@@ -12,6 +12,7 @@ import robosc
 from robosc.certification.goals import GoalExplanation
 from robosc.pipeline.counter_run import CounterRun, NoCounterStrategyError
 from robosc.strategies import CounterStrategy
+from support.battery_readers import BATTERY_READERS
 from support.random_goals import random_text
 
 MODEL = """robot Porter {
@@ -139,27 +140,15 @@ def test_random_robots_are_denied_a_goal(record_property: Callable[[str, object]
     assert min(met["played"], met["requested"]) > 20 and met["surroundings moved"] > 5, met
 
 
-PATROL = """robot Patrol {
+PATROL = (
+    """robot Patrol {
     interface battery use BatteryState from sensor_msgs
     datatype object Charge { percentage: double }
     datatype enum Level from Charge to { value.percentage < 0.2 -> low default -> good }
     datatype enum Reserve from Charge to { value.percentage < 0.3 -> small default -> large }
-    component Battery {
-        outgoing message level with identifier: "/battery", type: Level links battery
-        behaviour {
-            variable level: Level = good
-            on response from level do level := value
-            initial marked state ready { }
-        }
-    }
-    component Planner {
-        outgoing message reserve with identifier: "/battery", type: Reserve links battery
-        behaviour {
-            variable reserve: Reserve = large
-            on response from reserve do reserve := value
-            initial marked state ready { }
-        }
-    }
+"""
+    + BATTERY_READERS
+    + """\
     component Base {
         incoming message dock with type: none
         incoming message leave with type: none
@@ -174,6 +163,7 @@ PATROL = """robot Patrol {
     goal always eventually Base.away
 }
 """
+)
 
 
 def test_what_several_components_read_in_a_message_comes_together() -> None:

@@ -6,29 +6,18 @@ from robosc.certification import make_supervisor, strategies
 from robosc.certification.strategies import verify_strategy
 from robosc.strategies import arena
 from robosc.verification import CheckOutcome, Limits
+from support.battery_readers import BATTERY_READERS
 from support.models import bundle_of
 
-PATROL = """robot Patrol {
+PATROL = (
+    """robot Patrol {
     interface battery use BatteryState from sensor_msgs
     datatype object Charge { percentage: double }
     datatype enum Level from Charge to { value.percentage < 0.2 -> low default -> good }
     datatype enum Reserve from Charge to { value.percentage < 0.3 -> small default -> large }
-    component Battery {
-        outgoing message level with identifier: "/battery", type: Level links battery
-        behaviour {
-            variable level: Level = good
-            on response from level do level := value
-            initial marked state ready { }
-        }
-    }
-    component Planner {
-        outgoing message reserve with identifier: "/battery", type: Reserve links battery
-        behaviour {
-            variable reserve: Reserve = large
-            on response from reserve do reserve := value
-            initial marked state ready { }
-        }
-    }
+"""
+    + BATTERY_READERS
+    + """\
     component Base {
         incoming message dock with identifier: "/dock", type: none
         incoming message leave with identifier: "/leave", type: none
@@ -42,6 +31,7 @@ PATROL = """robot Patrol {
     goal Battery.level = low leads to Base.docked or Battery.level = good
     goal always eventually Base.away or Battery.level = low
 }"""
+)
 
 
 def codes() -> list[str]:

@@ -138,7 +138,7 @@ ENDS_OF_CANCELLED = (
     *("cancel", "response", "feedback", "cancel_overdue", "fault"),
     *(f"error: {why}" for why in ("cancelled", "aborted", "rejected", "lost", "timeout")),
 )
-"""Everything that may become of a goal that is being cancelled."""
+"""Fates of a goal that is being cancelled."""
 
 
 def test_goals_that_are_being_cancelled_in_python() -> None:

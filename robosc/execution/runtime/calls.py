@@ -87,8 +87,8 @@ class Goal:
         after a restart.
     :ivar is_accepted: True if its server accepted it.
     :ivar is_cancelling: True if its cancel was decided.
-    :ivar cancelled_by: Whose cancel is an event of the model when the goal has ended:
-        `supervisor` or `caller`; empty: nobody's so far.
+    :ivar cancelled_by: The one whose cancel is an event of the model when the goal has ended:
+        `supervisor` or `caller`; empty: nobody so far.
     :ivar asked_s: Reading of the clock when its cancel was decided.
     :ivar is_cancel_sent: True if its server was asked to cancel it.
     :ivar is_overdue: True if it was reported that it has not ended in time after that.

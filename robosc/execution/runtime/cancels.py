@@ -63,8 +63,8 @@ class Cancels:
 
     def decide(self, goal: Goal, why: str, by: str) -> None:
         """Decide on the cancel of a goal; the caller of this sends it. Never raises."""
-        # What a caller has asked for is an event of the model even if the robot came to rest
-        # first.
+        # A cancel that the caller asks for is an event of the model even if the robot came to
+        # rest first.
         goal.cancelled_by = goal.cancelled_by or by
         if goal.is_cancelling:
             return

@@ -212,7 +212,7 @@ def test_a_requirement_that_turns_cancels_the_goal() -> None:
     b = driving()
     b.executor.on_goal_accepted(1)
     assert b.receive("safe", False) == [CANCEL]
-    # To ask ends nothing: the goal is executing until its server has ended it.
+    # Asking ends nothing: the goal is executing until its server has ended it.
     assert b.events == ["drive.request", "safe.response"]
     assert b.executor.cancelling == ("drive",)
     (entry,) = b.entries("cancelling")
@@ -282,7 +282,7 @@ def overdue_periods(cancel_timeout_s: float) -> list[float]:
     b.receive("safe", False)
     b.tick(100)
     assert b.executor.overdue_cancels == (("drive",) if b.entries("cancel_overdue") else ())
-    # What it blocks stays blocked, and nothing is wrong with the controller itself.
+    # It goes on blocking what it blocks, and nothing is wrong with the controller itself.
     assert b.status() is Status.RUNNING
     assert b.system.location("drive") == "executing"
     b.executor.on_goal_ended(1, "cancelled")

@@ -389,7 +389,7 @@ def test_a_caller_may_cancel_while_the_robot_is_stopped() -> None:
     b.cancel("drive", "g")
     assert b.during(b.executor.on_goal_accepted, 1) == [("cancel", "drive", 1)]
     assert b.end(1, "cancelled") == end("cancelled")
-    # What its caller has asked for is an event of the model.
+    # The cancel that its caller has asked for is an event of the model.
     assert b.events[-1] == "drive.cancel"
 
 

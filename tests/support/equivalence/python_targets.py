@@ -83,7 +83,7 @@ def observation(seen: Mapping[str, Any]) -> Observation:
         locations=seen["locations"],
         status=tuple(seen["status"]),
         counters=tuple(seen["counters"]),
-        cancelling=seen["cancelling"],
+        cancelling=tuple(map(tuple, seen["cancelling"])),
         progress=seen["progress"],
     )
 

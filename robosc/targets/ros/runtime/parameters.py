@@ -211,9 +211,8 @@ def declarations(
         Parameter(
             'cancel_timeout',
             5.0,
-            'Seconds after a cancel was asked for until it is reported, in the event log and as an '
-            'error on /diagnostics, that its goal has not ended; it goes on executing. 0 for '
-            'never.',
+            'Seconds after a cancel was asked for until it is reported, in the event log and as '
+            'an error on /diagnostics, that its goal has not ended; 0 for never.',
             _SECONDS,
         ),
         Parameter(

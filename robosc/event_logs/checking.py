@@ -24,7 +24,7 @@ MAXIMUM_VIOLATIONS = 1000
 KINDS = frozenset(
     (
         *("event", "unexpected", "unknown", "release", "blocked", "fault", "stop", "resume", "restart", "dropped"),
-        *("reached", "approach", "owed", "met"),
+        *("reached", "approach", "owed", "met", "cancelling", "cancel_overdue"),
     )
 )
 """Kinds of entries."""

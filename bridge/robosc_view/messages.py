@@ -332,8 +332,17 @@ def run_text(run: "ManualRun", entries: int, report: RunReport, beginning: int =
             "choice": None if report.choice is None else asdict(report.choice),
             "beginning": beginning,
             "opposition": opposition,
+            "ends": [] if isinstance(run, CounterRun) else [_ends(run, action) for action in run.cancelling],
         }
     )
+
+
+def _ends(run: "ManualRun", action: str) -> dict[str, Any]:
+    """Return the ends that the goal of an action can have that is being cancelled, each with its event."""
+    cancel, error = f"{action}.cancel", f"{action}.error"
+    ended = cancel if cancel in run.enabled else error
+    ways = [["as cancelled", ended], ["succeeded in spite of it", f"{action}.response"], ["with an error", error]]
+    return {"action": action, "ways": ways}
 
 
 def saved_text(name: str, text: str) -> str:

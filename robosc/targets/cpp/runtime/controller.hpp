@@ -531,6 +531,8 @@ private:
         if (!news.empty()) {
             news = "since the last report: " + news;
         }
+        result.values.emplace_back("cancelling", joined(cancelled(false)));
+        const std::string overdue = overdue_text();
 #if ROBOT_HAS_STRATEGY
         const std::string owed = add_progress(result);
         if (!owed.empty()) {
@@ -541,6 +543,9 @@ private:
         if (!reasons_.empty()) {
             result.level = Level::FAULTY;
             result.message = "stopped: " + reasons_text();
+        } else if (!overdue.empty()) {
+            result.level = Level::FAULTY;
+            result.message = overdue;
         } else if (status == ROBOT_STATUS_NEW) {
             result.message = missing_.empty() ? "not started" : "waiting for servers: " + joined(missing_);
         } else if (status == ROBOT_STATUS_WAITING) {
@@ -564,6 +569,7 @@ private:
         }
         model::visit_state(robot_.state, report);
         model::visit_communications(robot_.state, report);
+        report.cancelling = cancelled(false);
         report.transitions = std::exchange(transitions_, {});
 #if ROBOT_HAS_STRATEGY
         report.progress = progress_json();
@@ -834,6 +840,19 @@ private:
             reasons_.clear();
             write("restart", "what", "");
             return;
+#if ROBOT_ACTION_COUNT > 0
+        case ROBOT_LOG_CANCELLING:
+            put_json(rest, cancel_text(what));
+            write_cancel("cancelling", what, "why", rest);
+            return;
+        case ROBOT_LOG_CANCEL_OVERDUE:
+            write_cancel("cancel_overdue", what, "asked_s", number_text(asked_s(what)));
+            return;
+#else
+        case ROBOT_LOG_CANCELLING:
+        case ROBOT_LOG_CANCEL_OVERDUE:
+            return;
+#endif
 #if ROBOT_HAS_STRATEGY
         case ROBOT_LOG_REACHED:
             write_item("reached", "aim", what);
@@ -851,6 +870,79 @@ private:
         }
     }
 
+    /* The actions whose goal is to be cancelled and has not ended; or those for which that takes too long. */
+    Texts cancelled(bool is_overdue) const
+    {
+        Texts found;
+#if ROBOT_ACTION_COUNT > 0
+        for (int action = 0; action < ROBOT_COMMUNICATION_COUNT; action++) {
+            if (is_overdue ? cancelling(action).is_overdue : cancelling(action).why != ROBOT_CANCEL_NONE) {
+                found.emplace_back(robot_communication_name(action));
+            }
+        }
+#else
+        static_cast<void>(is_overdue);
+#endif
+        return found;
+    }
+
+    /* The cancels that take too long, in words. */
+    std::string overdue_text() const
+    {
+        std::string text;
+#if ROBOT_ACTION_COUNT > 0
+        for (int action = 0; action < ROBOT_COMMUNICATION_COUNT; action++) {
+            if (cancelling(action).is_overdue) {
+                text += (text.empty() ? "" : "; ") + std::string(robot_communication_name(action))
+                    + " has not ended since its cancel";
+            }
+        }
+#endif
+        return text;
+    }
+
+#if ROBOT_ACTION_COUNT > 0
+    robot_cancelling_t cancelling(int action) const
+    {
+        return robot_cancelling(&robot_, static_cast<robot_communication_t>(action));
+    }
+
+    /* Seconds since the cancel of an action's goal was decided. */
+    double asked_s(int action) const
+    {
+        return static_cast<double>((robot_.now_us - cancelling(action).asked_us + 500) / 1000) / 1000.0;
+    }
+
+    /* Why an action's goal is to be cancelled. */
+    std::string cancel_text(int action) const
+    {
+        const robot_cancelling_t found = cancelling(action);
+        if (found.why == ROBOT_CANCEL_TIMEOUT) {
+            return "timeout";
+        }
+        if (found.why == ROBOT_CANCEL_STOP) {
+            return "stop";
+        }
+        std::string numbers;
+        for (int place = 0; place < ROBOT_REQUIREMENT_COUNT; place++) {
+            if (found.turned[place]) {
+                numbers += (numbers.empty() ? "" : ", ") + std::to_string(place + 1);
+            }
+        }
+        const bool is_one = numbers.find(',') == std::string::npos;
+        return is_one ? "requirement " + numbers + " no longer holds" : "requirements " + numbers + " no longer hold";
+    }
+
+    void write_cancel(const char* kind, int action, const char* key, const std::string& json)
+    {
+        if (log_.is_active()) {
+            std::string line = head(kind) + ",\"action\":";
+            put_json(line, robot_communication_name(action));
+            log_.write(line + ",\"" + key + "\":" + json + "}");
+        }
+    }
+
+#endif
 #if ROBOT_HAS_STRATEGY
     /* Write what has happened to an aim or an assumption; -1: there is none. */
     void write_item(const char* kind, const char* key, int number)

@@ -45,6 +45,8 @@ struct StateReport {
     std::vector<ComponentState> components;
     /* Location of each service and action. */
     std::vector<NamedValue> communications;
+    /* Actions whose goal is to be cancelled and has not ended. */
+    std::vector<std::string> cancelling;
     /* Numbers of the transitions taken since the last report. */
     std::vector<int> transitions;
     /* Progress of the strategy as JSON; empty: there is none. */
@@ -130,7 +132,14 @@ inline std::string state_json(const StateReport& report)
     }
     text += "}, \"communications\": ";
     detail::put_values(text, report.communications);
-    text += ", \"transitions\": [";
+    text += ", \"cancelling\": [";
+    between = "";
+    for (const std::string& name : report.cancelling) {
+        text += between;
+        put_json(text, name);
+        between = ", ";
+    }
+    text += "], \"transitions\": [";
     between = "";
     for (const int number : report.transitions) {
         text += between + std::to_string(number);

@@ -191,15 +191,10 @@ static void cancel_for_caller(robot_t *r, uint64_t now_us, int action, uint32_t 
     look_at_clock(r, now_us);
     if (!goal->is_awaited || goal->caller_id != caller_id) {
         unexpected(r, ROBOT_NO_EVENT);
-    } else if (!goal->is_cancelled_by_caller) {
-        bool is_well = true;
+    } else {
         goal->is_cancelled_by_caller = true;
-        goal->is_running = false;
-        happened(r, ACTIONS[action].cancel, take_event(&r->state, ACTIONS[action].cancel));
-        is_well = end_batch(r);
-        /* The cancel is forwarded, whatever went wrong. */
-        is_well = request_cancel(r, action) && is_well;
-        guard(r, is_well);
+        begin_cancel(r, action, ROBOT_CANCEL_CALLER);
+        guard(r, request_cancel(r, action));
     }
     finish(r);
 }

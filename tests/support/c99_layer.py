@@ -13,6 +13,7 @@ from robosc.execution.runtime.layer import (
     _NOT_ALLOWED,
     _NOT_FINITE,
     _NOT_KNOWN,
+    _OLD_GOALS,
     _STILL_RUNNING,
     Layer,
 )
@@ -35,6 +36,7 @@ REFUSALS = (
     _STILL_RUNNING,
     _AT_REST[Status.NEW],
     _AT_REST[Status.WAITING],
+    _OLD_GOALS,
     _AT_REST[Status.STOPPED],
     _A_FAULT,
 )

@@ -17,7 +17,7 @@ from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from support.c99 import GCC, SANITIZERS, WARNINGS, lonely_end, replay
-from support.c99_layer import LayerReference, compare_layer, compiled_layer
+from support.c99_layer import REFUSALS, LayerReference, compare_layer, compiled_layer
 from support.c99_main import events_back
 from support.effort import examples
 from support.execution import supervisor_of
@@ -139,7 +139,7 @@ def test_requests_of_every_kind_behave_as_the_reference(everything: Path) -> Non
         assert seen[f"log {what}"] > 5, seen
     for what in "publish default call goal cancel pass blocked answer no_answer accept reject feedback end".split():
         assert seen[what] > 5, seen
-    for reason in range(8):
+    for reason in range(len(REFUSALS)):
         assert seen[f"log blocked {reason}"] > 2, (reason, seen)
     for end in range(3):
         assert seen[f"end {end}"] > 5, (end, seen)

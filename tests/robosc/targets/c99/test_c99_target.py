@@ -239,6 +239,12 @@ def test_the_end_of_a_goal_is_taken_whatever_else_is_over(outcome: str, tmp_path
     reference.let_fail()
     executor.restart()
     reference.command("R")
+    # Nothing is requested before the other goal has ended, of which the model knows nothing now.
+    executor.tick()
+    reference.command("t")
+    (other,) = (number for number, name in reference.goals.items() if name == "two")
+    executor.on_goal_ended(other, "cancelled")
+    reference.command("e", other, OUTCOMES.index("cancelled"))
     for _ in range(4):
         executor.tick()
         reference.command("t")

@@ -20,7 +20,7 @@ typedef enum {
 #endif
 typedef enum {
     ROBOT_STATUS_NEW,      /* not started */
-    ROBOT_STATUS_WAITING,  /* for the first message of every sensor with a maximum age */
+    ROBOT_STATUS_WAITING,  /* for the first message of every sensor with a maximum age, or the end of old goals */
     ROBOT_STATUS_RUNNING,
     ROBOT_STATUS_STOPPING, /* at rest; the ends of cancelled goals are awaited */
     ROBOT_STATUS_STOPPED
@@ -93,6 +93,7 @@ typedef enum {
     ROBOT_REFUSAL_STILL_RUNNING, /* the last goal of the action may still be under way */
     ROBOT_REFUSAL_NOT_STARTED,
     ROBOT_REFUSAL_WAITING,       /* for the first message of a sensor with a maximum age */
+    ROBOT_REFUSAL_OLD_GOALS,     /* from before a restart, which have not ended */
     ROBOT_REFUSAL_STOPPED,
     ROBOT_REFUSAL_FAULT          /* something failed while it was let through; the robot is stopped now */
 } robot_refusal_t;
@@ -240,6 +241,7 @@ typedef struct {
     robot_cancel_t why;
     bool turned[ROBOT_REQUIREMENT_COUNT + 1]; /* the requirements that no longer hold, in source order */
     bool is_overdue;                          /* it has been reported that the goal did not end in time */
+    bool is_old;                              /* it is of before a restart: nothing is requested until it has ended */
     uint64_t asked_us;                        /* time since which it is to be cancelled */
 } robot_cancelling_t;
 
@@ -354,7 +356,7 @@ void robot_watch(robot_t *r, uint64_t now_us);
 /* Come to rest until `robot_restart`; is_fault says whether the program found a fault. */
 void robot_stop(robot_t *r, uint64_t now_us, bool is_fault);
 
-/* Begin again in the initial state, whatever happened. */
+/* Begin again in the initial state, whatever happened. Nothing is requested before the goals under way have ended. */
 void robot_restart(robot_t *r, uint64_t now_us);
 
 robot_status_t robot_status(const robot_t *r, uint64_t now_us);

@@ -11,6 +11,17 @@ static bool is_any_goal_open(const robot_t *r)
     return false;
 }
 
+/* Return true if a goal from before a restart has not ended. */
+static bool is_any_goal_old(const robot_t *r)
+{
+    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
+        if (r->goals[action].is_open && r->goals[action].cancelling.is_old) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Begin a goal with a new id and the requirements that hold now. */
 static robot_goal_t *open_goal(robot_t *r, int action)
 {

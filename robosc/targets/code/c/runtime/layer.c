@@ -19,7 +19,15 @@ static int refusal(const robot_t *r, const robot_sent_t *sent_by_caller)
     if (is_at_rest(r)) {
         return (int)ROBOT_REFUSAL_STOPPED;
     }
-    return r->is_started ? (int)ROBOT_REFUSAL_WAITING : (int)ROBOT_REFUSAL_NOT_STARTED;
+    if (!r->is_started) {
+        return (int)ROBOT_REFUSAL_NOT_STARTED;
+    }
+#if ROBOT_ACTION_COUNT > 0
+    if (is_any_goal_old(r)) {
+        return (int)ROBOT_REFUSAL_OLD_GOALS;
+    }
+#endif
+    return (int)ROBOT_REFUSAL_WAITING;
 }
 
 /* The request happens, if it is allowed, with all that follows from it, before its message goes out. */

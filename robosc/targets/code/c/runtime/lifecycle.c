@@ -10,6 +10,7 @@ static bool begin(robot_t *r)
 #if ROBOT_ACTION_COUNT > 0
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
         r->goals[action].is_running = false;
+        r->goals[action].cancelling.is_old = true;
     }
 #endif
 #if ROBOT_SENSOR_COUNT > 0

@@ -102,6 +102,7 @@ static bool has_goal(robot_t *r, int action, uint32_t id)
 static void close_goal(robot_t *r, int action)
 {
     r->goals[action].is_open = false;
+    update_may_request(r);
 #if !ROBOT_IS_LAYER
     r->is_enabled_known = false;
 #endif

@@ -3,6 +3,9 @@
 static void update_may_request(robot_t *r)
 {
     r->may_request = r->is_started && !is_at_rest(r);
+#if ROBOT_ACTION_COUNT > 0
+    r->may_request = r->may_request && !is_any_goal_old(r);
+#endif
 #if ROBOT_SENSOR_COUNT > 0
     for (int sensor = 0; sensor < ROBOT_SENSOR_COUNT; sensor++) {
         if (r->settings.max_age_us[SENSORS[sensor]] > 0 && !r->sensors[sensor].was_seen) {

@@ -439,7 +439,12 @@ private:
                     unseen.emplace_back(item.identifier);
                 }
             }
-            middleware_.info("waiting for the first message of " + joined(unseen));
+            if (!unseen.empty()) {
+                middleware_.info("waiting for the first message of " + joined(unseen));
+            }
+            if (!cancelled(Stage::OLD).empty()) {
+                middleware_.info("waiting for the end of the last goal of " + joined(cancelled(Stage::OLD)));
+            }
         } else if (status == ROBOT_STATUS_RUNNING && reported_status_ <= ROBOT_STATUS_WAITING) {
             middleware_.info("running");
         }
@@ -516,6 +521,7 @@ private:
             {"unexpected", std::to_string(robot_.counters.unexpected)},
             {"faults", std::to_string(robot_.counters.faults)},
             {"dropped", std::to_string(dropped)},
+            {"cancelling", joined(cancelled(Stage::ASKED))},
             {"last decision (us)", decision_us_ < 0.0 ? "" : number_text(decision_us_)},
         };
         std::string news;
@@ -531,8 +537,6 @@ private:
         if (!news.empty()) {
             news = "since the last report: " + news;
         }
-        result.values.emplace_back("cancelling", joined(cancelled(false)));
-        const std::string overdue = overdue_text();
 #if ROBOT_HAS_STRATEGY
         const std::string owed = add_progress(result);
         if (!owed.empty()) {
@@ -540,21 +544,27 @@ private:
         }
 #endif
         result.level = Level::WARN;
-        if (!reasons_.empty()) {
+        std::string faults = reasons_.empty() ? "" : "stopped: " + reasons_text();
+        for (const std::string& action : cancelled(Stage::OVERDUE)) {
+            faults += (faults.empty() ? "" : "; ") + ("the goal of " + action)
+                + " has not ended although its cancel was asked for";
+        }
+        const Texts old_goals = cancelled(Stage::OLD);
+        if (!faults.empty()) {
             result.level = Level::FAULTY;
-            result.message = "stopped: " + reasons_text();
-        } else if (!overdue.empty()) {
-            result.level = Level::FAULTY;
-            result.message = overdue;
+            result.message = faults;
         } else if (status == ROBOT_STATUS_NEW) {
             result.message = missing_.empty() ? "not started" : "waiting for servers: " + joined(missing_);
+        } else if (status == ROBOT_STATUS_WAITING && !old_goals.empty()) {
+            result.message = "waiting for the end of goals from before the restart: " + joined(old_goals);
         } else if (status == ROBOT_STATUS_WAITING) {
             result.message = "waiting for the first message of every sensor with a maximum age";
         } else if (!news.empty()) {
             result.message = news;
         } else {
+            const Texts cancelling = cancelled(Stage::ASKED);
             result.level = Level::OK;
-            result.message = "running";
+            result.message = cancelling.empty() ? "running" : "running, cancelling " + joined(cancelling);
         }
         return result;
     }
@@ -569,7 +579,7 @@ private:
         }
         model::visit_state(robot_.state, report);
         model::visit_communications(robot_.state, report);
-        report.cancelling = cancelled(false);
+        report.cancelling = cancelled(Stage::ASKED);
         report.transitions = std::exchange(transitions_, {});
 #if ROBOT_HAS_STRATEGY
         report.progress = progress_json();
@@ -870,35 +880,24 @@ private:
         }
     }
 
-    /* The actions whose goal is to be cancelled and has not ended; or those for which that takes too long. */
-    Texts cancelled(bool is_overdue) const
+    /* Stages of the cancel of a goal that has not ended. */
+    enum class Stage { ASKED, OVERDUE, OLD };
+
+    /* The actions whose goal is to be cancelled and has reached a stage. */
+    Texts cancelled([[maybe_unused]] Stage stage) const
     {
         Texts found;
 #if ROBOT_ACTION_COUNT > 0
         for (int action = 0; action < ROBOT_COMMUNICATION_COUNT; action++) {
-            if (is_overdue ? cancelling(action).is_overdue : cancelling(action).why != ROBOT_CANCEL_NONE) {
+            const robot_cancelling_t cancel = cancelling(action);
+            if (stage == Stage::ASKED         ? cancel.why != ROBOT_CANCEL_NONE
+                    : stage == Stage::OVERDUE ? cancel.is_overdue
+                                              : cancel.is_old) {
                 found.emplace_back(robot_communication_name(action));
             }
         }
-#else
-        static_cast<void>(is_overdue);
 #endif
         return found;
-    }
-
-    /* The cancels that take too long, in words. */
-    std::string overdue_text() const
-    {
-        std::string text;
-#if ROBOT_ACTION_COUNT > 0
-        for (int action = 0; action < ROBOT_COMMUNICATION_COUNT; action++) {
-            if (cancelling(action).is_overdue) {
-                text += (text.empty() ? "" : "; ") + std::string(robot_communication_name(action))
-                    + " has not ended since its cancel";
-            }
-        }
-#endif
-        return text;
     }
 
 #if ROBOT_ACTION_COUNT > 0

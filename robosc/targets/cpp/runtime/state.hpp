@@ -132,17 +132,17 @@ inline std::string state_json(const StateReport& report)
     }
     text += "}, \"communications\": ";
     detail::put_values(text, report.communications);
-    text += ", \"cancelling\": [";
+    text += ", \"transitions\": [";
+    between = "";
+    for (const int number : report.transitions) {
+        text += between + std::to_string(number);
+        between = ", ";
+    }
+    text += "], \"cancelling\": [";
     between = "";
     for (const std::string& name : report.cancelling) {
         text += between;
         put_json(text, name);
-        between = ", ";
-    }
-    text += "], \"transitions\": [";
-    between = "";
-    for (const int number : report.transitions) {
-        text += between + std::to_string(number);
         between = ", ";
     }
     text += "], ";
@@ -173,6 +173,7 @@ void fill_state(Message& message, const StateReport& report)
         fill_values(message.components[k].variables, report.components[k].variables);
     }
     fill_values(message.communications, report.communications);
+    message.cancelling = report.cancelling;
     message.transitions.assign(report.transitions.begin(), report.transitions.end());
 }
 

@@ -313,6 +313,8 @@ class SafetyTwin:
             reasons.add(Reason.MOTOR_SILENT)
         if limits.is_stopped_when_blind and self._is_blind():
             reasons.add(Reason.SCAN_BLIND)
+        if 0.0 in self._seen_ahead():
+            reasons.add(Reason.SCAN_TOUCHING)
         velocity = STANDSTILL
         if not reasons and wanted != STANDSTILL:
             velocity = self._limited(
@@ -336,6 +338,12 @@ class SafetyTwin:
 
     def _is_blind(self) -> bool:
         """Return True if the last scan that reports ranges shows nothing where the last command leads to."""
+        seen = self._seen_ahead()
+        valid = [range_m for range_m in seen if math.isfinite(range_m)]
+        return bool(seen) and len(valid) < self.limits.min_valid_share * 61
+
+    def _seen_ahead(self) -> list[float]:
+        """Return the ranges where the last command leads to; none for a rotation on the spot, or without a scan."""
         asked_m_s, scan = 0.0, list[float]()
         for each in self.past:
             if each.name == "disable" or (each.name == "reset" and each.value):
@@ -346,9 +354,7 @@ class SafetyTwin:
             if each.name == "scan" and each.value:
                 scan = each.value
         middle = 0 if asked_m_s > 0 else 180
-        seen = [scan[degree % 360] for degree in range(middle - 30, middle + 31)] if scan else []
-        valid = [range_m for range_m in seen if math.isfinite(range_m)]
-        return asked_m_s != 0 and bool(scan) and len(valid) < self.limits.min_valid_share * 61
+        return [scan[degree % 360] for degree in range(middle - 30, middle + 31)] if scan and asked_m_s != 0 else []
 
     def _is_command_stale(self, now_s: float) -> bool:
         # A command that was refused is no sign of life.

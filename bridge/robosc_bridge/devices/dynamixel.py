@@ -10,12 +10,14 @@ Source: ROBOTIS e-Manual, pages XL430-W250, XM430-W210 and "DYNAMIXEL Protocol 2
 import contextlib
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, BusCounters, DynamixelBus, exchange_limit_s
 from robosc_bridge.devices.interface import CONSTANT, DriveLimits, DriveReading, MotorFault, Velocity, VelocitySource
 from robosc_bridge.devices.kinematics import body_velocity, wheel_goals
 from robosc_bridge.devices.odometry import Odometry, velocity_variances
+from robosc_bridge.devices.plausibility import Verdict, WheelCounts, wheel_judge
 from robosc_bridge.devices.robots import ACCELERATION_RAW_RAD_S2, SERVOS, Body, Robot, Wheels
 from robosc_bridge.devices.servo_pair import ServoPair
 from robosc_bridge.devices.wheel_following import FOLLOWING_LIMIT_S, FollowingMonitor
@@ -33,6 +35,10 @@ CHECK_PERIOD_S = 0.1
 
 DriveMode = Literal["normal", "reverse"]
 _MODES: dict[DriveMode, int] = {"normal": 0, "reverse": servo.REVERSE}
+# Measurements in an exchange: what cannot be is asked for again.
+_READS = 2
+# An answer comes late by up to the time for which an adapter may keep bytes back, twice.
+_COUNTS_LAG_S = 0.05
 # A limit that was rounded to three digits is kept.
 _ROUNDED = 1.001
 
@@ -104,6 +110,7 @@ class DynamixelBase:
         self._exchange_limit_s = exchange_limit_s(answer_limit_s)
         self._limits = robot.limits if isinstance(robot, Body) else robot.limits(robot.motor.velocity_limit_raw)
         self._odometry = Odometry(self._wheels.tick_m, self._wheels.separation_m)
+        self._judge = wheel_judge(path, _COUNTS_LAG_S)
         self._following = FollowingMonitor(FOLLOWING_LIMIT_S + ramp_s)
         self._host = host
         self._line: Port | None = None
@@ -129,7 +136,9 @@ class DynamixelBase:
     def counters(self) -> BusCounters:
         """Health of the line since it was opened."""
         bus = self._bus
-        return BusCounters() if bus is None else bus.counters
+        if bus is None:
+            return BusCounters()
+        return replace(bus.counters, implausible=self._judge.refused, begun_anew=self._judge.begun_anew)
 
     # Each drive base with a bus has its own `attend` and `wake`: when it asks its source, only its line decides.
     def attend(self, source: VelocitySource) -> None:
@@ -152,6 +161,7 @@ class DynamixelBase:
         """
         self.close()
         self._odometry = self._odometry.rebased()
+        self._judge = wheel_judge(self._path, _COUNTS_LAG_S)
         self._is_torque_wanted = self._is_torque_on = self._is_doubtful = False
         self._stops = frozenset()
         try:
@@ -244,6 +254,7 @@ class DynamixelBase:
         pair.halt()
         is_left, is_right = pair.restart_faulty()
         self._odometry = self._odometry.rebased(is_left, is_right)
+        self._judge.forget()
         pair.release_torque()
         pair.set_up()
         self._stops = frozenset()
@@ -294,19 +305,41 @@ class DynamixelBase:
             self._is_doubtful = False
             velocity = self._source.newer() or velocity
         goals = self._commanded(pair, velocity)
-        answers = pair.measure()
+        measured, goals = self._measured(pair, bus, goals)
         time_s = bus.received_s
-        for motor, (_, is_alert) in zip(pair.motors, answers, strict=True):
-            self._look_at(pair, motor, is_alert)
-        measured = [measurement for measurement, _ in answers]
-        if any(self._odometry.jumps(*(one.ticks for one in measured))):
-            # A jump comes of the motor's own motion, or of a restart.
-            goals = self._renewed(pair, goals)
-            self._check_torque(pair)
         if self._host.monotonic() >= self._check_s:
             goals = self._renewed(pair, goals)
             self._check_alternately(pair)
         return self._reading(pair, measured, goals, time_s)
+
+    def _measured(
+        self, pair: ServoPair, bus: DynamixelBus, goals: tuple[int, int]
+    ) -> tuple[list[Measurement], tuple[int, int]]:
+        """Return a measurement of each motor that can be, and the goals now; asks again for what cannot be.
+
+        Raises:
+            DeviceSilentError: The motors do not answer with what can be.
+        """
+        for _ in range(_READS):
+            answers = pair.measure()
+            for motor, (_, is_alert) in zip(pair.motors, answers, strict=True):
+                self._look_at(pair, motor, is_alert)
+            left, right = (measurement for measurement, _ in answers)
+            counts = WheelCounts((left.ticks, right.ticks), (left.velocity_raw, right.velocity_raw))
+            verdict = self._judge.judge(counts, bus.received_s)
+            if verdict is Verdict.REFUSED:
+                goals = self._renewed(pair, goals)
+                if self._check_torque(pair) and len(self._judge.excess) == len(counts.ticks):
+                    # One that has restarted counts anew.
+                    self._judge.begin_anew(counts, bus.received_s)
+                    return [left, right], goals
+                continue
+            if verdict is Verdict.ANEW:
+                is_left, is_right = map(bool, self._judge.excess)
+                self._odometry = self._odometry.rebased(is_left, is_right)
+            return [left, right], goals
+        reason = "; ".join(filter(None, self._judge.excess))
+        raise DeviceSilentError(f"{self._path}: the motors do not answer with what can be: {reason}")
 
     def _commanded(self, pair: ServoPair, velocity: Velocity) -> tuple[int, int]:
         """Command a velocity, where the motors are to obey; returns their goals."""
@@ -348,12 +381,15 @@ class DynamixelBase:
             self._check_torque(pair)
         self._is_watchdog_next = not self._is_watchdog_next
 
-    def _check_torque(self, pair: ServoPair) -> None:
+    def _check_torque(self, pair: ServoPair) -> bool:
+        """Find out whether the motors have torque; returns whether one has restarted."""
         self._is_torque_on, (has_left, has_right) = pair.read_torque()
         if has_left or has_right:
             self._odometry = self._odometry.rebased(has_left, has_right)
+            self._judge.forget()
         if not self._is_torque_on:
             self._stop_for(pair, frozenset({MotorFault.TORQUE_LOST}))
+        return has_left or has_right
 
     def _check_watchdogs(self, pair: ServoPair) -> None:
         if pair.has_tripped():
@@ -388,6 +424,7 @@ class DynamixelBase:
             goals_m_s=self._goals_m_s(goals) if self._is_torque_wanted else None,
             wheels_m=self._odometry.wheels_m,
             wheel_radius_m=self._wheels.radius_m,
+            refused=self._judge.refused,
             pose_covariance=self._odometry.covariance,
             velocity_variances=velocity_variances(left_m_s, right_m_s, self._wheels.raw_m_s, self._wheels.separation_m),
         )

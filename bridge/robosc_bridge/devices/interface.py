@@ -93,6 +93,7 @@ class DriveReading:
         wheels_m: Distance that the left and the right wheel have rolled since the odometry began; None: encoders are
             not read.
         wheel_radius_m: Radius of both wheels; None: not known.
+        refused: Number of readings that were refused since the drive base was opened, as no body moves like that.
     """
 
     time_s: float
@@ -113,6 +114,7 @@ class DriveReading:
     velocity_variances: tuple[float, float] | None = None
     wheels_m: tuple[float, float] | None = None
     wheel_radius_m: float | None = None
+    refused: int = 0
 
 
 @dataclass(frozen=True)
@@ -148,8 +150,11 @@ class DriveBase(Protocol):
     def set_torque(self, is_on: bool) -> None:
         """Switch torque on, from a standstill; or switch it off, after a goal of zero.
 
+        Torque that could not be switched on for sure is off afterwards, or `close` switches it off.
+
         Raises:
             LineError: The line is gone.
+            StoppedError: A stop came meanwhile (`VelocitySource.is_stopped`); torque is off.
             DeviceError: The device does not switch torque.
         """
 
@@ -176,7 +181,11 @@ class DriveBase(Protocol):
         """
 
     def close(self) -> None:
-        """Stop the wheels, switch torque off, close the line; never raises, may be called at any time and again."""
+        """Stop the wheels, switch torque off, close the line; never raises, may be called at any time and again.
+
+        A driver that tries for some time to switch torque off, and is not sure of it afterwards, says so in an
+        attribute `leftover`: what may still hold or move, in one line; empty: nothing does.
+        """
 
 
 class VelocitySource(Protocol):
@@ -188,6 +197,9 @@ class VelocitySource(Protocol):
     def written(self) -> None:
         """Note that the line has taken the bytes of the last velocity, or that the device has that velocity already."""
 
+    def is_stopped(self) -> bool:
+        """Return True if torque is no longer to be switched on: what has not begun must not begin then."""
+
 
 class _ConstantSource:
     """Source for a drive base that is used alone: each velocity holds until the next exchange."""
@@ -198,6 +210,12 @@ class _ConstantSource:
     def written(self) -> None:
         pass
 
+    def is_stopped(self) -> bool:
+        return False
+
+
+UNDO_LIMIT_S = 5.0
+"""Time for which a driver tries to undo what it may have begun, when it is closed, in seconds."""
 
 CONSTANT: VelocitySource = _ConstantSource()
 
@@ -222,7 +240,7 @@ class RawScan:
 
     Attributes:
         angles_rad: Of each point, counter-clockwise from the front, within [0, 2 pi).
-        ranges_m: NaN where nothing valid was measured.
+        ranges_m: 0 where something is nearer than the device measures; NaN where nothing valid was measured.
         intensities: As the device gives them.
     """
 
@@ -241,7 +259,8 @@ class Scan:
     Attributes:
         time_s: Time when its last byte had come, in seconds.
         ranges_m: `BINS` bins of one degree, counter-clockwise, the first straight ahead and half a degree to both
-            sides of it; the smallest valid range of each, NaN if none.
+            sides of it; the smallest valid range of each: 0 where something is nearer than the device measures, NaN
+            if none.
         raw: The scan as it was measured.
         revolutions_per_s: Speed of the motor as the device reports it.
         min_m: Shortest distance that the device measures; 0: unknown.
@@ -265,12 +284,14 @@ class ScannerCounters:
         frames: Well-formed frames.
         bad_frames: Frames with a wrong checksum or impossible contents.
         skipped_bytes: Bytes that belong to no frame.
+        invalid: Measurements that the device itself marks as invalid.
     """
 
     scans: int = 0
     frames: int = 0
     bad_frames: int = 0
     skipped_bytes: int = 0
+    invalid: int = 0
 
 
 class RangeScanner(Protocol):

@@ -14,14 +14,30 @@ from dataclasses import replace
 from typing import Literal
 
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, BusCounters, DynamixelBus, exchange_limit_s
-from robosc_bridge.devices.interface import CONSTANT, DriveLimits, DriveReading, MotorFault, Velocity, VelocitySource
+from robosc_bridge.devices.interface import (
+    CONSTANT,
+    UNDO_LIMIT_S,
+    DriveLimits,
+    DriveReading,
+    MotorFault,
+    Velocity,
+    VelocitySource,
+    has_stopped,
+)
 from robosc_bridge.devices.kinematics import body_velocity, wheel_goals
 from robosc_bridge.devices.odometry import Odometry, velocity_variances
 from robosc_bridge.devices.plausibility import Verdict, WheelCounts, wheel_judge
 from robosc_bridge.devices.robots import ACCELERATION_RAW_RAD_S2, SERVOS, Body, Robot, Wheels
 from robosc_bridge.devices.servo_pair import ServoPair
 from robosc_bridge.devices.wheel_following import FOLLOWING_LIMIT_S, FollowingMonitor
-from robosc_bridge.errors import BridgeError, DeviceError, DeviceSilentError, WrongDeviceError
+from robosc_bridge.errors import (
+    BridgeError,
+    DeviceError,
+    DeviceSilentError,
+    LineError,
+    StoppedError,
+    WrongDeviceError,
+)
 from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol import servo
 from robosc_bridge.protocol.servo import Measurement
@@ -64,6 +80,9 @@ class DynamixelBase:
             exchanges.
         answer_limit_s: Longest wait for one answer.
         host: Parts of its computer that it uses.
+
+    Attributes:
+        leftover: What the motors may still do after `close`; empty: nothing.
 
     Raises:
         ValueError: An argument is out of its range.
@@ -119,6 +138,10 @@ class DynamixelBase:
         self._source: VelocitySource = CONSTANT
         self._is_torque_wanted = False
         self._is_torque_on = False
+        # True from the first order to switch torque on until both motors are known to have none, or until it is known
+        # whether they have.
+        self._may_hold = self._is_uncertain = False
+        self.leftover = ""
         # Faults that keep the motors at a standstill until torque is switched on anew.
         self._stops: frozenset[MotorFault] = frozenset()
         # A motor may have restarted.
@@ -173,7 +196,7 @@ class DynamixelBase:
             )
             self._check_model(self._pair)
             self._limits = self._limits_of(self._pair)
-            self._pair.release_torque()
+            self._release_torque(self._pair)
             self._pair.set_up()
         except BaseException:
             self._release()
@@ -206,24 +229,41 @@ class DynamixelBase:
             LineError: The line is gone.
             DeviceSilentError: A motor does not answer.
             DeviceFaultError: A motor has shut down, or does not switch its torque.
+            StoppedError: A stop came meanwhile.
             DeviceError: The wheels still rotate, or a motor refuses its settings.
         """
         pair, _ = self._opened()
         self._is_torque_wanted = self._is_torque_on = False
         if not is_on:
-            pair.release_torque()
+            self._release_torque(pair)
             self._stops = frozenset()
             return
         try:
-            pair.arm(self._acceleration_raw, self._watchdog)
+            pair.arm(self._acceleration_raw, self._watchdog, self._begin)
         except BridgeError:
             with contextlib.suppress(BridgeError):
-                pair.release_torque()
+                self._release_torque(pair)
             raise
         self._is_torque_wanted = self._is_torque_on = True
+        self._is_uncertain = False
         self._stops = frozenset()
         self._following.forget()
         self._commanded_s = self._host.monotonic()
+
+    def _begin(self) -> None:
+        """Note that torque goes on.
+
+        Raises:
+            StoppedError: A stop came; it must not.
+        """
+        if has_stopped(self._source):
+            raise StoppedError(f"{self._path}: torque is not switched on, as a stop came meanwhile")
+        self._may_hold = self._is_uncertain = True
+
+    def _release_torque(self, pair: ServoPair) -> None:
+        pair.release_torque()
+        self._may_hold = self._is_uncertain = False
+        self.leftover = ""
 
     def exchange(self, velocity: Velocity) -> DriveReading:
         """Command and read both wheels, in at most `exchange_limit_s` of the bus.
@@ -255,18 +295,45 @@ class DynamixelBase:
         is_left, is_right = pair.restart_faulty()
         self._odometry = self._odometry.rebased(is_left, is_right)
         self._judge.forget()
-        pair.release_torque()
+        self._release_torque(pair)
         pair.set_up()
         self._stops = frozenset()
 
     def close(self) -> None:
         """Stop the wheels, switch torque and watchdogs off, and close the line."""
-        if self._pair is not None:
+        pair = self._pair
+        if pair is not None:
+            with contextlib.suppress(LineError):
+                self._let_go(*self._opened())
             with contextlib.suppress(BridgeError):
-                self._pair.release_torque()
-            with contextlib.suppress(BridgeError):
-                self._pair.switch_leds_off()
+                pair.switch_leds_off()
+            names = " and ".join(self._names.values())
+            self.leftover = (
+                f"{names} may hold: they have not confirmed that torque is off; cut their power"
+                if self._may_hold
+                else ""
+            )
         self._release()
+
+    def _let_go(self, pair: ServoPair, bus: DynamixelBus) -> None:
+        """Switch torque off; after a stop again and again for a time, where that is of use.
+
+        Raises:
+            LineError: The line is gone.
+        """
+        end_s = self._host.monotonic() + UNDO_LIMIT_S
+        while True:
+            began_s = self._host.monotonic()
+            try:
+                self._release_torque(pair)
+            except DeviceError as error:
+                _log.debug("%s", error)
+            if not (self._may_hold and has_stopped(self._source)):
+                return
+            is_heard = bus.received_s > began_s
+            if not (is_heard or self._is_uncertain) or self._host.monotonic() > end_s:
+                return
+            self._host.sleep(CHECK_PERIOD_S)
 
     def _release(self) -> None:
         if self._line is not None:

@@ -150,11 +150,10 @@ class DriveBase(Protocol):
     def set_torque(self, is_on: bool) -> None:
         """Switch torque on, from a standstill; or switch it off, after a goal of zero.
 
-        Torque that could not be switched on for sure is off afterwards, or `close` switches it off.
-
         Raises:
             LineError: The line is gone.
-            StoppedError: A stop came meanwhile (`VelocitySource.is_stopped`); torque is off.
+            StoppedError: A stop came meanwhile (`StoppableSource.is_stopped`), after which nothing was begun; what was
+                begun before ends when torque is switched off, or with `close`.
             DeviceError: The device does not switch torque.
         """
 
@@ -183,8 +182,9 @@ class DriveBase(Protocol):
     def close(self) -> None:
         """Stop the wheels, switch torque off, close the line; never raises, may be called at any time and again.
 
-        A driver that tries for some time to switch torque off, and is not sure of it afterwards, says so in an
-        attribute `leftover`: what may still hold or move, in one line; empty: nothing does.
+        What may have been begun is undone after a stop (`StoppableSource.is_stopped`) for up to `UNDO_LIMIT_S`, as long
+        as the device is heard or it is not known whether it has begun. A driver that is not sure of it afterwards says
+        so in an attribute `leftover`: what may still hold or move, in one line; empty: nothing does.
         """
 
 
@@ -196,6 +196,11 @@ class VelocitySource(Protocol):
 
     def written(self) -> None:
         """Note that the line has taken the bytes of the last velocity, or that the device has that velocity already."""
+
+
+@runtime_checkable
+class StoppableSource(VelocitySource, Protocol):
+    """Source that also says when a stop has come."""
 
     def is_stopped(self) -> bool:
         """Return True if torque is no longer to be switched on: what has not begun must not begin then."""
@@ -210,14 +215,16 @@ class _ConstantSource:
     def written(self) -> None:
         pass
 
-    def is_stopped(self) -> bool:
-        return False
-
 
 UNDO_LIMIT_S = 5.0
 """Time for which a driver tries to undo what it may have begun, when it is closed, in seconds."""
 
 CONSTANT: VelocitySource = _ConstantSource()
+
+
+def has_stopped(source: VelocitySource) -> bool:
+    """Return True if a source says that a stop has come; one that cannot say so never does."""
+    return isinstance(source, StoppableSource) and source.is_stopped()
 
 
 @runtime_checkable

@@ -23,6 +23,7 @@ from robosc_bridge.devices.interface import (
     MotorFault,
     Velocity,
     VelocitySource,
+    has_stopped,
 )
 from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
 from robosc_bridge.devices.mavlink_link import (
@@ -84,6 +85,8 @@ _REST_LIMIT_S = 3.0
 _REST_M_S = 0.05
 _REST_RAD_S = 0.1
 _CLOSE_TRIALS = 1
+# Orders are carried out one after the other: a rover that is disarmed so long after an order to disarm stays it.
+_UNANSWERED_S = 2.0
 # Five times a second is asked for. A new velocity goes out at once, but no more than one each 16 ms in the long run,
 # and no more than one ahead of that, so that a slow radio is not filled: at 57600 baud a signed target takes 14 ms.
 _TARGET_S = 0.1
@@ -170,8 +173,8 @@ class MavlinkRover:
         self._restarts = 0
         self._is_torque_wanted = False
         self._is_torque_lost = False
-        # True from the first order to arm until the rover is known to be disarmed.
-        self._may_be_armed = False
+        # True from the first order to arm until the rover is known to be disarmed, or until it is known whether it is.
+        self._may_be_armed = self._is_uncertain = False
         self.leftover = ""
         self._target = STANDSTILL
         self._target_s = -math.inf
@@ -214,8 +217,8 @@ class MavlinkRover:
             self._restarts = self._link.state.restarts
             heartbeat = self._heartbeat(self._link.state)
             self._check_ours(heartbeat)
-            if self._may_be_armed and not self._undo():
-                raise DeviceSilentError(f"{self._path}: the rover does not confirm that it is disarmed")
+            if self._may_be_armed:
+                self._must_undo()
             self.leftover = ""
             self._leave_at_rest(heartbeat)
             for telemetry in _TELEMETRY:
@@ -236,23 +239,22 @@ class MavlinkRover:
             LineError: The line is gone.
             DeviceSilentError: The vehicle does not answer.
             DeviceFaultError: It refuses, with its reason, or another operator drives it.
-            StoppedError: A stop came meanwhile; it is disarmed.
+            StoppedError: A stop came meanwhile; it may be armed until this is called again to disarm it.
         """
         link = self._used_link
         self._is_torque_wanted = False
         heartbeat = self._heartbeat(link.state)
         if not is_on:
-            if not self._is_another_s(heartbeat):
+            if self._is_another_s(heartbeat):
+                self._may_be_armed = self._is_uncertain = False
+            elif heartbeat.is_armed:
                 self._leave_at_rest(heartbeat)
+            elif self._may_be_armed:
+                # An order to arm may still be on its way.
+                self._must_undo()
             return
         self._check_ours(heartbeat)
-        try:
-            self._begin(link, heartbeat)
-        except StoppedError:
-            if self._may_be_armed and not self._undo():
-                # The end will try again, and name it.
-                raise DeviceSilentError(f"{self._path}: the rover does not confirm that it is disarmed") from None
-            raise
+        self._begin(link, heartbeat)
         self._send_target(STANDSTILL)
         self._is_torque_wanted = True
         self._is_torque_lost = False
@@ -269,18 +271,18 @@ class MavlinkRover:
         self._send_target(STANDSTILL)
         if not self._heartbeat(link.state).is_armed:
             self._require_no_stop()
-            self._may_be_armed = True
+            self._may_be_armed = self._is_uncertain = True
             try:
                 self._command(MavCommand.ARM_DISARM, arming(True), "arm", is_beginning=True)
             except DeviceFaultError:
-                self._may_be_armed = False
+                self._may_be_armed = self._is_uncertain = False
                 raise
             try:
                 self._must_show(lambda heartbeat: heartbeat.is_armed, "show that it is armed", is_beginning=True)
             except DeviceFaultError:
                 self._disarm(_CLOSE_TRIALS)
                 raise
-        self._may_be_armed = True
+        self._may_be_armed, self._is_uncertain = True, False
 
     def _require_no_stop(self) -> None:
         """Raise if what has not begun must not begin any more.
@@ -288,7 +290,7 @@ class MavlinkRover:
         Raises:
             StoppedError: A stop came.
         """
-        if self._source.is_stopped():
+        if has_stopped(self._source):
             raise StoppedError(f"{self._path}: the rover is not armed, as a stop came meanwhile")
 
     def exchange(self, velocity: Velocity) -> DriveReading:
@@ -359,18 +361,28 @@ class MavlinkRover:
         report = self._used_link.state.heartbeat
         is_heard = report is not None and self._host.monotonic() - report.time_s <= HEARTBEAT_LIMIT_S
         if report is not None and is_heard and self._is_another_s(report.content):
-            self._may_be_armed = False
+            self._may_be_armed = self._is_uncertain = False
             return True
         self._send_target(STANDSTILL)
         if is_heard:
             self._comes_to_rest()
         return self._undo()
 
+    def _must_undo(self) -> None:
+        """Disarm as `_undo`.
+
+        Raises:
+            DeviceSilentError: It is not known whether the rover is disarmed.
+        """
+        if not self._undo():
+            raise DeviceSilentError(f"{self._path}: the rover does not confirm that it is disarmed")
+
     def _undo(self) -> bool:
         """Disarm a rover that may be armed, or may become so by an order that is still on its way.
 
         Returns:
-            Whether a heartbeat that came after the answer shows that it is disarmed, or another operator drives it.
+            Whether a heartbeat shows that it is disarmed, which came after the answer, or long enough after the order;
+            or whether another operator drives it.
         """
         link, began_s = self._used_link, self._host.monotonic()
         end_s, is_forced, confirmation = began_s + UNDO_LIMIT_S, False, 0
@@ -382,7 +394,8 @@ class MavlinkRover:
             if self._is_another_s(report.content):
                 return True
             is_answered = answer is not None and began_s <= answer.time_s < report.time_s
-            return is_answered and not report.content.is_armed
+            is_late = report.time_s > began_s + _UNANSWERED_S
+            return (is_answered or is_late) and not report.content.is_armed
 
         while (left_s := end_s - self._host.monotonic()) > 0.0:
             state = link.state
@@ -391,8 +404,11 @@ class MavlinkRover:
             parameters = arming(False, is_forced=is_forced)
             link.send(command(state.system, state.component, MavCommand.ARM_DISARM, confirmation, *parameters))
             if self._waits(is_over, min(left_s, _ANSWER_LIMIT_S)):
-                self._may_be_armed = False
+                self._may_be_armed = self._is_uncertain = False
                 return True
+            is_heard = self._host.monotonic() - link.state.heard_s <= _ANSWER_LIMIT_S
+            if not (is_heard or self._is_uncertain):
+                break
             # Stopping is not refused: what a polite command does not reach, a forced one does.
             is_forced, confirmation = True, confirmation + 1
         return False
@@ -470,7 +486,7 @@ class MavlinkRover:
         except DeviceFaultError:
             self._command(MavCommand.ARM_DISARM, arming(False, is_forced=True), "disarm by force", trials)
         self._must_show(lambda heartbeat: not heartbeat.is_armed, "show that it is disarmed")
-        self._may_be_armed = False
+        self._may_be_armed = self._is_uncertain = False
 
     def _comes_to_rest(self) -> bool:
         def is_at_rest(state: VehicleState) -> bool:

@@ -1,5 +1,6 @@
 """State of a vehicle, as reported so far."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
@@ -142,6 +143,12 @@ class VehicleState:
     def at_end(self) -> "VehicleState":
         """Return the state when nothing more comes."""
         return self._ended(list(self._unfinished))
+
+    @property
+    def heard_s(self) -> float:
+        """Time when the vehicle was heard last, in seconds; minus infinity: it was not."""
+        reports = (self.heartbeat, self.attitude, self.position, self.motion)
+        return max((report.time_s for report in reports if report is not None), default=-math.inf)
 
     @property
     def is_text_awaited(self) -> bool:

@@ -40,18 +40,27 @@ from robosc_bridge.devices.dynamixel_bus import (
 from robosc_bridge.devices.interface import (
     CONSTANT,
     STANDSTILL,
+    UNDO_LIMIT_S,
     DriveLimits,
     DriveReading,
     MotorFault,
     Velocity,
     VelocitySource,
+    has_stopped,
 )
 from robosc_bridge.devices.kinematics import body_velocity, opencr_words, wheel_speeds
 from robosc_bridge.devices.odometry import Odometry, velocity_variances
 from robosc_bridge.devices.plausibility import Verdict, WheelCounts, measurable, wheel_judge
 from robosc_bridge.devices.robots import Robot
 from robosc_bridge.devices.wheel_following import ExcessMonitor, FollowingMonitor
-from robosc_bridge.errors import BridgeError, DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
+from robosc_bridge.errors import (
+    DeviceError,
+    DeviceFaultError,
+    DeviceSilentError,
+    LineError,
+    StoppedError,
+    WrongDeviceError,
+)
 from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol import opencr
 from robosc_bridge.protocol.opencr import Block, decode_block, encode_command
@@ -100,6 +109,7 @@ class OpenCrBase:
 
     Attributes:
         limits: Limits of the drive base.
+        leftover: What the motors may still do after `close`; empty: nothing.
     """
 
     def __init__(
@@ -138,6 +148,10 @@ class OpenCrBase:
         self._uptime: tuple[int, float, float] | None = None
         self._is_torque_wanted = False
         self._is_torque_lost = False
+        # True from the first order to switch torque on until both motors are known to have none, or until it is known
+        # whether they have.
+        self._may_hold = self._is_uncertain = False
+        self.leftover = ""
         # Exchanges in a row without an answer, and what was so when the first of them began.
         self._silent = 0
         self._late = 0
@@ -252,6 +266,7 @@ class OpenCrBase:
             LineError: The line is gone.
             DeviceSilentError: The board does not answer.
             DeviceFaultError: A motor does not hold.
+            StoppedError: A stop came meanwhile.
             DeviceError: The wheels do not come to rest.
         """
         self._is_torque_wanted = False
@@ -370,19 +385,53 @@ class OpenCrBase:
 
     def close(self) -> None:
         """Stop the wheels, switch torque off, and close the line."""
-        if self._bus is not None and self._is_slow:
-            self._is_torque_wanted = False
-            with contextlib.suppress(BridgeError):
-                # No answer is awaited: the wheels have stopped when the board comes to the second packet.
-                self._bus.write_unanswered(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
-                self._bus.write_unanswered(opencr.DEVICE, opencr.TORQUE, b"\0")
-        elif self._bus is not None:
-            self._is_torque_wanted = False
-            with contextlib.suppress(BridgeError):
-                self._comes_to_rest()
-            with contextlib.suppress(BridgeError):
-                self._switch_torque(False)
+        bus, self._is_torque_wanted = self._bus, False
+        if bus is not None:
+            with contextlib.suppress(LineError):
+                self._let_go(bus)
+            self.leftover = (
+                f"{self._path}: the wheel motors may hold: OpenCR has not confirmed that torque is off; switch the "
+                "robot off"
+                if self._may_hold
+                else ""
+            )
         self._release()
+
+    def _let_go(self, bus: DynamixelBus) -> None:
+        """Switch torque off; after a stop again and again for a time, where that is of use.
+
+        Raises:
+            LineError: The line is gone.
+        """
+        end_s = self._host.monotonic() + UNDO_LIMIT_S
+        while True:
+            began_s = self._host.monotonic()
+            if self._lets_go(bus) or not self._may_hold or not has_stopped(self._source):
+                return
+            is_heard = bus.received_s > began_s
+            if not (is_heard or self._is_uncertain) or self._host.monotonic() > end_s:
+                return
+            self._host.sleep(_POLL_S)
+
+    def _lets_go(self, bus: DynamixelBus) -> bool:
+        """Stop the wheels and switch torque off; returns whether that is known.
+
+        Raises:
+            LineError: The line is gone.
+        """
+        try:
+            if self._is_slow:
+                # No answer is awaited: the wheels have stopped when the board comes to the second packet.
+                bus.write_unanswered(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
+                bus.write_unanswered(opencr.DEVICE, opencr.TORQUE, b"\0")
+                self._host.sleep(_SLOW_LIMIT_S)
+                return False
+            with contextlib.suppress(DeviceError):
+                self._comes_to_rest()
+            self._switch_torque(False)
+        except DeviceError:
+            return False
+        return True
 
     def _release(self) -> None:
         if self._line is not None:
@@ -453,10 +502,17 @@ class OpenCrBase:
         return self._cycles_until(lambda block: max(map(abs, block.velocities_raw)) <= _REST_RAW, _REST_LIMIT_S)
 
     def _switch_torque(self, is_on: bool) -> None:
+        if is_on:
+            if has_stopped(self._source):
+                raise StoppedError(f"{self._path}: torque is not switched on, as a stop came meanwhile")
+            self._may_hold = self._is_uncertain = True
         self._write_torque(is_on)
         if not self._cycles_until(lambda block: block.is_torque_on == is_on, _TORQUE_LIMIT_S):
             done = "hold" if is_on else "let go"
             raise DeviceFaultError(f"{self._path}: a wheel motor does not {done}; switch the robot off and on")
+        self._is_uncertain = False
+        if not is_on:
+            self._may_hold, self.leftover = False, ""
 
     def _write_torque(self, is_on: bool) -> None:
         bus = self._used_bus
@@ -579,7 +635,7 @@ class OpenCrBase:
 
     def _give_up(self, problem: str) -> NoReturn:
         # The board switches torque on by itself when it starts, and its motors count anew.
-        self._is_torque_wanted = False
+        self._is_torque_wanted, self._may_hold = False, True
         self._used_bus.write_unanswered(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
         raise DeviceError(f"{self._path}: {problem}; it must be opened again")
 

@@ -24,7 +24,7 @@ FASTEST_BODY_M_S, FASTEST_BODY_RAD_S = 5.0, 2 * math.pi
 """Speeds that any body may have while a person drives or pushes it, whatever the bridge commands it at most."""
 
 FASTEST_SHARE = 2.0
-"""Speed that a body may have, by the fastest that it is commanded, where that is more: downhill, or driven by others."""
+"""Speed that a body may have, by the fastest that it is commanded, where that is more, such as downhill."""
 
 MOST_LAG_S = 1.0
 """Longest time by which reports may come late, so that several come at once, in seconds."""

@@ -158,7 +158,8 @@ class SafetyLayer:
 
     def _judge_wheels(self, reading: DriveReading) -> None:
         if not reading.is_torque_on:
-            if self._is_torque_seen:
+            # Torque that is to go off anyway is not lost.
+            if self._is_torque_seen and self._letting_go_s is None:
                 self._latched.add(Reason.TORQUE_LOST)
             return
         self._is_torque_seen = True

@@ -59,7 +59,10 @@ class Rover:
         refuses_disarming: True if it refuses to disarm until it is forced.
         answers_commands: True if it acknowledges commands.
         obeys_commands: True if it does what it acknowledges.
+        arms_after_s: Time after which it carries out an order to arm; it answers at once.
         is_silent: True if it reports nothing at all.
+        reported_cm: Distances that its sensors report whatever is there, by the number of their sector.
+        signal_quality: Quality of the signal of its single sensors: 0 unknown, 1 invalid, up to 100.
         resets: Number of times that its estimator has begun anew.
         shift_m: Shift by which its estimate is off since: north, west.
         commands: Commands that it has heard: number and parameters.
@@ -90,7 +93,10 @@ class Rover:
         self.refuses_disarming = False
         self.answers_commands = True
         self.obeys_commands = True
+        self.arms_after_s = 0.0
         self.is_silent = False
+        self.reported_cm: dict[int, int] = {}
+        self.signal_quality = 0
         self.resets = 0
         self.shift_m = (0.0, 0.0)
         self.commands: list[tuple[int, tuple[float, ...]]] = []
@@ -105,6 +111,7 @@ class Rover:
         self._remote = (0.0, 0.0)
         self._target: tuple[float, float] | None = None
         self._target_s = 0.0
+        self._arms_at_s = math.inf
         self._long_texts = 0
         self._began_s = self._time.now_s()
         self._first_s = {_HEARTBEAT: heartbeat_s, _SYS_STATUS: _SYS_STATUS_S}
@@ -165,6 +172,9 @@ class Rover:
         self._world.catch_up()
         now_s = self._time.now_s()
         packets: list[bytes] = []
+        if now_s >= self._arms_at_s:
+            self._arm(True)
+            self._drive()
         if self._target is not None and now_s - self._target_s >= TARGET_LIMIT_S:
             self._target = None
             self._drive()
@@ -179,7 +189,7 @@ class Rover:
     def due_s(self) -> float:
         """Return the time when its next message or the expiry of its target is due."""
         expiry_s = math.inf if self._target is None else self._target_s + TARGET_LIMIT_S
-        return min(expiry_s, *self._due_s.values())
+        return min(expiry_s, self._arms_at_s, *self._due_s.values())
 
     def plug_in(self) -> None:
         """A line that was plugged in again changes nothing."""
@@ -250,10 +260,16 @@ class Rover:
             return FAILED
         if not is_armed and self.refuses_disarming and not is_forced:
             return DENIED
-        if self.obeys_commands:
-            self.is_armed = is_armed
-            self._target = None
+        if self.obeys_commands and is_armed and self.arms_after_s > 0.0:
+            self._arms_at_s = self._time.now_s() + self.arms_after_s
+        elif self.obeys_commands:
+            self._arm(is_armed)
         return ACCEPTED
+
+    def _arm(self, is_armed: bool) -> None:
+        self.is_armed = is_armed
+        self._target = None
+        self._arms_at_s = math.inf
 
     def _after_interval(self, number: int, interval_s: float) -> int:
         known = {layout.number for layout in BY_NAME.values()}
@@ -286,9 +302,9 @@ class Rover:
                     )
                 ]
             case 30:
-                return [self._encoder.encode("ATTITUDE", time_ms=int(boot_s * 1000), **self._yaw())]
+                return [self._encoder.encode("ATTITUDE", time_ms=int(boot_s * 1000) % 2**32, **self._yaw())]
             case 32 if self.has_origin:
-                return [self._encoder.encode("LOCAL_POSITION_NED", time_ms=int(boot_s * 1000), **self._place())]
+                return [self._encoder.encode("LOCAL_POSITION_NED", time_ms=int(boot_s * 1000) % 2**32, **self._place())]
             case 132 if self.obstacles == "sensors":
                 return self._sensors(boot_s)
             case 147:
@@ -358,9 +374,10 @@ class Rover:
         parts_deg = [(part / (_RAYS - 1) - 0.5) * width_deg for part in range(_RAYS)]
         ranges_m = self._world.ranges([math.radians(-(middle + part)) for middle in middles_deg for part in parts_deg])
         nearest_m = [min(ranges_m[first : first + _RAYS]) for first in range(0, len(ranges_m), _RAYS)]
-        return [
+        found = [
             min(round(range_m * 100), _MOST_CM + 1) if math.isfinite(range_m) else _MOST_CM + 1 for range_m in nearest_m
         ]
+        return [self.reported_cm.get(sector, distance_cm) for sector, distance_cm in enumerate(found)]
 
     def _ring(self, boot_s: float) -> bytes:
         increment_deg = 360 // _SECTORS
@@ -380,13 +397,14 @@ class Rover:
         return [
             self._encoder.encode(
                 "DISTANCE_SENSOR",
-                time_ms=int(boot_s * 1000),
+                time_ms=int(boot_s * 1000) % 2**32,
                 min=_LEAST_CM,
                 max=_MOST_CM,
                 current=distance_cm,
                 id=eighth,
                 orientation=eighth,
                 covariance=255,
+                quality=self.signal_quality,
             )
             for eighth, distance_cm in enumerate(self._distances_cm([eighth * 45.0 for eighth in range(8)], 45.0))
         ]

@@ -148,6 +148,7 @@ class Driven:
         messages: Messages to a person, warnings and worse.
         thread: Thread of the loop.
         error: Error that has ended the loop.
+        has_ended_well: True if it has ended, gave back all its devices, and nothing that was begun is left.
     """
 
     host: Host
@@ -158,6 +159,7 @@ class Driven:
     trace: Recorded
     messages: list[str]
     error: Exception | None = None
+    has_ended_well: bool = False
     thread: Thread = field(init=False)
 
     def __post_init__(self) -> None:
@@ -165,7 +167,7 @@ class Driven:
 
     def _run(self) -> None:
         try:
-            self.machine.run()
+            self.has_ended_well = self.machine.run()
         except Exception as error:
             self.error = error
 

@@ -87,8 +87,8 @@ _POLL_S = 0.01
 # as restarted.
 _LEAD_S = 0.7
 _LAG_S = 1.0
-# Reads of the block in an exchange: what cannot be is asked for again.
-_READS = 2
+# Reads of the block in an exchange: what cannot be is asked for again, and a third time in other parts.
+_READS = 3
 # Two refreshes.
 _COUNTS_LAG_S = 0.04
 
@@ -551,8 +551,9 @@ class OpenCrBase:
         """
         spoilt: int | None = None
         for trial in range(_READS):
+            is_last = trial == _READS - 1
             asked_s = self._host.monotonic()
-            data = self._data(bus, spoilt)
+            data = self._data(bus, spoilt if is_last else None)
             problem = opencr.impossibility(data)
             if problem:
                 spoilt = opencr.spoilt_from(data)
@@ -561,7 +562,7 @@ class OpenCrBase:
             block = decode_block(data)
             passed_s, problem = self._passed_s(block.uptime_ms, asked_s)
             if problem:
-                if trial == _READS - 1:
+                if trial > 0:
                     self._give_up(problem)
                 self._judge.refuse(problem, self._board_s)
             elif self._counts(block, self._board_s + passed_s):
@@ -570,12 +571,14 @@ class OpenCrBase:
                 return block
             else:
                 problem = "; ".join(filter(None, self._judge.excess))
+            if trial > 0:
+                break
         raise DeviceSilentError(f"{self._path}: OpenCR does not answer with what can be: {problem}")
 
     def _data(self, bus: DynamixelBus, spoilt: int | None) -> bytes:
-        """Read the block, in two parts if its firmware spoils what follows an index."""
+        """Read the block, in two parts if its firmware spoils what follows an index, where an item begins."""
         address, length = opencr.BLOCK_ADDRESS, opencr.BLOCK_LENGTH
-        if spoilt is None or spoilt in SETTLING_LENGTHS:
+        if spoilt is None or address + spoilt not in opencr.MOTOR_ITEMS:
             return bus.read(opencr.DEVICE, address, length).data
         # The last bytes are of no use here.
         rest = next(count for count in range(length - spoilt, 0, -1) if count not in SETTLING_LENGTHS)

@@ -40,6 +40,9 @@ _BLOCK = struct.Struct(
     "8x"  # 174: profile accelerations
 )
 _COMMAND = struct.Struct("<i16xi")
+MOTOR_ITEMS = frozenset({120, 124, 128, 132, 136, 140})
+"""Addresses of what the motors report, four bytes each; the board does not answer with parts of an item."""
+
 _TRUTH_VALUES = tuple(address - BLOCK_ADDRESS for address in (26, 27, 28, 29, MOTORS_CONNECTED, TORQUE))
 _HEADER, _STUFFED = b"\xff\xff\xfd", 0xFD
 # The block ends with what was written to it, which is never eight bytes of this kind.

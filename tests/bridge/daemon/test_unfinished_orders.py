@@ -1,4 +1,4 @@
-"""A whole bridge that is told to end while its motors are being switched on: nothing more begins, nothing stays begun."""
+"""A whole bridge that is told to end while its motors go on: nothing more begins, and nothing stays begun."""
 
 from collections.abc import Callable
 

@@ -258,9 +258,11 @@ def configured(robot: SimulatedTurtleBot3, base: str, lidar: str, sections: Mapp
     """A configuration for a simulated robot; sections in YAML by name add to it."""
     options = sections.get("options", PATIENT if base != "mavlink-rover" else "{}")
     rest = "".join(f"{key}: {text}\n" for key, text in {"robot": "burger", **sections}.items() if key != "options")
+    # The obstacles of a rover come over its own line.
+    scanner_path = robot.base_path if lidar == "mavlink-rover" else robot.scanner_path
     return (
         f"drive: {{driver: {base}, port: {robot.base_path}, options: {options}}}\n"
-        f"scanner: {{driver: {lidar}, port: {robot.scanner_path}}}\n{rest}{CHANNELS}"
+        f"scanner: {{driver: {lidar}, port: {scanner_path}}}\n{rest}{CHANNELS}"
     )
 
 
@@ -278,7 +280,7 @@ def driven(
 
     Args:
         base: Driver of its drive base.
-        lidar: Its LiDAR.
+        lidar: Its LiDAR; `mavlink-rover`: what the rover reports of its surroundings.
         velocity: Velocity that its supervisor always wants.
         host: Host on which it runs; None: a virtual one.
         before: Action on the robot before the bridge starts.
@@ -292,7 +294,7 @@ def driven(
     host = VirtualHost() if host is None else host
     with (
         host if isinstance(host, VirtualHost) else nullcontext(),
-        SimulatedTurtleBot3("burger", base, lidar, clock=host) as robot,
+        SimulatedTurtleBot3("burger", base, "lds03" if lidar == base else lidar, clock=host) as robot,
     ):
         trace = Recorded(robot.base_line.device, robot)
         robot.base_line.device = trace

@@ -244,7 +244,7 @@ def test_measurements_that_never_can_be_are_a_silent_motor_that_is_stopped(bench
     with pytest.raises(DeviceSilentError, match="the motors do not answer with what can be: a wheel would turn at"):
         bench.base.exchange(FORWARD)
     assert bench.stops_within(0.1)
-    assert bench.base.counters.implausible == 2  # type: ignore[attr-defined]
+    assert bench.base.counters.implausible == 2
 
 
 def test_an_overloaded_motor_is_restarted_when_asked_to_and_has_not_jumped(bench: Rig) -> None:

@@ -128,12 +128,12 @@ def test_each_wheel_is_judged_and_named() -> None:
     assert judge.excess == ("", "the right wheel would have turned by -8224.13 revolutions in 0.020 s")
     assert judge.judge(_wheels(0, 0, (0, FASTEST_RAW)), 0.04) is SOUND
     assert judge.judge(_wheels(0, 0, (-FASTEST_RAW - 1, 0)), 0.06) is REFUSED
-    assert judge.excess == ("a wheel would turn at -234 rpm",)
+    assert list(judge.excess) == ["a wheel would turn at -234 rpm"]
 
 
 def _estimate(x_m: float = 0.0, heading_rad: float = 0.0, vehicle_s: float = 0.0, **more: float) -> MotionEstimate:
-    speeds = {"linear_m_s": 0.0, "angular_rad_s": 0.0} | more
-    return MotionEstimate(x_m, 0.0, heading_rad, **speeds, place_s=vehicle_s, heading_s=vehicle_s)
+    speeds = more.get("linear_m_s", 0.0), more.get("angular_rad_s", 0.0)
+    return MotionEstimate(x_m, 0.0, heading_rad, *speeds, place_s=vehicle_s, heading_s=vehicle_s)
 
 
 @pytest.mark.parametrize(
@@ -222,7 +222,7 @@ def test_an_estimator_that_is_reset_without_a_word_does_not_move_the_body() -> N
     way = [(0.0, _estimate()), (0.05, _estimate(0.1, vehicle_s=0.05))]
     jump = [(0.1, _estimate(112.0, math.pi / 2, 0.1)), (0.15, _estimate(112.0, math.pi / 2, 0.15))]
     tracker = _tracked(*way, *jump)
-    assert (tracker.odometry.pose.x_m, tracker.odometry.pose.heading_rad) == (pytest.approx(0.1), 0.0)
+    assert (tracker.odometry.pose.x_m, tracker.odometry.pose.heading_rad) == pytest.approx((0.1, 0.0))
     assert (tracker.judge.refused, tracker.judge.begun_anew, tracker.odometry.rebases) == (1, 1, 0)
     # It is followed from there: it looks to the left now, and goes on ahead.
     on = MotionEstimate(112.0, 0.1, math.pi / 2, 0.5, 0.0, place_s=0.2, heading_s=0.2)

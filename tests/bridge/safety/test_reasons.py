@@ -509,7 +509,7 @@ def test_what_touches_beside_the_way_does_not_stop_it(degree: int, speed_m_s: fl
 def test_a_person_learns_of_a_refused_reading_for_a_while() -> None:
     bench = Bench()
     bench.drive()
-    assert bench.last.warnings == ()
+    assert not bench.last.warnings
     bench.refused = 1
     assert bench.cycle().warnings == (Caution.READING_REFUSED,)
     assert bench.last.velocity == Velocity(0.1)

@@ -519,7 +519,7 @@ def test_a_person_learns_of_a_refused_reading_for_a_while() -> None:
     assert bench.last.warnings == ()
     # A drive base that was opened anew counts anew.
     bench.refused = 0
-    assert bench.cycle().warnings == ()
+    assert not bench.cycle().warnings
     bench.refused = 1
     assert bench.cycle().warnings == (Caution.READING_REFUSED,)
 

@@ -60,8 +60,8 @@ UDEV_FOLDERS = tuple(map(Path, ("/etc/udev/rules.d", "/run/udev/rules.d", "/usr/
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
 _EPILOG = (
-    "exit status: 0 all is well, or the bridge was ended by a signal; 1 a fault stopped it, or its motors may not have let "
-    "go; 2 wrong use or files"
+    "exit status: 0 all is well, or the bridge was ended by a signal; 1 a fault stopped it, or motors may still hold; "
+    "2 wrong use or files"
 )
 
 

@@ -178,8 +178,8 @@ class _Servos(_Player):
         self._out, self._in = PacketDecoder(), PacketDecoder()
         self._wheels = _wheels_of(info)
         self._odometry = Odometry(self._wheels.tick_m, self._wheels.separation_m)
-        self._judge = wheel_judge(info.name, _COUNTS_LAG_S)
-        self._yaw = BoardYaw(info.name) if info.options.get("heading", "fused") == "fused" else None
+        self._judge = wheel_judge("", _COUNTS_LAG_S)
+        self._yaw = BoardYaw("") if info.options.get("heading", "fused") == "fused" else None
         motors = info.options.get("motors", (1, 2))
         self._motors: tuple[int, ...] = tuple(motors) if isinstance(motors, (list, tuple)) else (1, 2)
         mirrored = info.options.get("mirrored")
@@ -353,7 +353,7 @@ class _Vehicle(_Player):
         system = options.get("system")
         state = VehicleState(system if isinstance(system, int) else None)
         decoder = Decoder(Codec(*own), vehicle_message)
-        tracker, rounds = VehicleTracker(self.info.name, _ANY_BODY), ObstacleRounds()
+        tracker, rounds = VehicleTracker("", _ANY_BODY), ObstacleRounds()
         for record in records:
             self.time_s = (record.time_ns - self.begin_ns) / _NS
             if record.kind is Kind.EVENTS:

@@ -62,7 +62,7 @@ class ReadingJudge[Reading]:
     """Judge of the successive readings of one device.
 
     Args:
-        name: Name of the device, for warnings.
+        name: Name of the device, for warnings; empty: nobody is warned.
         excess: Function that returns why a reading cannot follow an earlier one within a time in seconds.
         absurdity: Function that returns why a reading is impossible on its own; empty: it is not.
 
@@ -112,7 +112,8 @@ class ReadingJudge[Reading]:
         candidate = self._candidate
         if candidate is not None and time_s > candidate[1] and not any(self._since(candidate, reading, time_s)):
             self.begin_anew(reading, time_s)
-            _log.warning("%s: it counts from another place, and is followed from there: %s", self._name, reason)
+            if self._name:
+                _log.warning("%s: it counts from another place, and is followed from there: %s", self._name, reason)
             return Verdict.ANEW
         self._candidate = reading, time_s
         self._refuse(reason, time_s)
@@ -132,7 +133,7 @@ class ReadingJudge[Reading]:
 
     def _refuse(self, reason: str, time_s: float) -> None:
         self.refused += 1
-        if not 0.0 <= time_s - self._told_s < TOLD_S:
+        if self._name and not 0.0 <= time_s - self._told_s < TOLD_S:
             self._told_s = time_s
             _log.warning("%s: a reading is refused (%d so far): %s", self._name, self.refused, reason)
 

@@ -3,6 +3,7 @@
 import contextlib
 import dataclasses
 import inspect
+import logging
 import math
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -84,8 +85,11 @@ SWITCH_S = 0.0005
 """After how long a thread that computes lets others run. With Python's own 5 ms, a remote endpoint that is busy
 would hold up a stop three times: the scanner's thread, the loop, and the drive base's thread follow one another."""
 
-# Longer than anything that a device's thread does at once, such as calibrating a gyroscope.
-_THREAD_LIMIT_S = 10.0
+# Longer than anything that a device's thread does at once, such as calibrating a gyroscope, or bringing a rover to rest
+# and undoing what may have begun.
+_THREAD_LIMIT_S = 15.0
+
+_log = logging.getLogger(__name__)
 
 
 class AssemblyError(BridgeError):
@@ -276,6 +280,7 @@ class Machine:
         operations: The daemon as remote endpoints see it.
         liveness: Monitor of threads and endpoints that must not end while the robot runs.
         manager: Service manager that the bridge notifies that it is alive.
+        worker: Worker of the drive base.
     """
 
     daemon: Daemon
@@ -285,12 +290,14 @@ class Machine:
     operations: Operations
     liveness: LivenessMonitor
     manager: ServiceManager
+    worker: DriveWorker
 
     def run(self, endpoints: Sequence[Endpoint] = ()) -> bool:
         """Start the remote endpoints and the threads, run the loop to its end, and stop them.
 
         Returns:
-            Whether all threads gave back their devices in time.
+            Whether all threads gave back their devices in time, and nothing that was begun may still hold or move; what
+            is left is logged.
 
         Raises:
             BridgeError: An endpoint cannot be started; no device was opened then.
@@ -312,8 +319,13 @@ class Machine:
             finally:
                 self.manager.stopping()
                 # The drive base first: whatever else hangs, the wheels stop.
+                self.worker.end()
                 ended = [thread.stop(_THREAD_LIMIT_S) for thread in threads]
-        return all(ended)
+        if not all(ended):
+            _log.error("a device was not given back within %g s; its motors may hold or move", _THREAD_LIMIT_S)
+        if self.worker.leftover:
+            _log.error("%s", self.worker.leftover)
+        return all(ended) and not self.worker.leftover
 
     def quit(self) -> None:
         """Let `run` end; from any thread or signal handler."""
@@ -442,7 +454,7 @@ def assemble(
     )
     manager = ServiceManager(lambda now_s: drive.is_alive and worker.is_cycling(now_s))
     daemon.beat = lambda now_s: manager.beat(now_s, daemon.state)
-    return Machine(daemon, drive, scanner, camera, operations, liveness, manager)
+    return Machine(daemon, drive, scanner, camera, operations, liveness, manager, worker)
 
 
 def _line_counts(base: DriveBase, lidar: RangeScanner | None) -> dict[str, Callable[[], dict[str, int]]]:

@@ -8,6 +8,7 @@
     |   `-- LineLostError       it was open and is gone: unplugged, hung up
     `-- DeviceError             something answers, and not as the device should
         |-- DeviceSilentError   it does not answer in time
+        |-- StoppedError        it was not begun, as a stop came meanwhile
         |-- WrongDeviceError    another kind of device, another id, firmware or setting than can be driven
         `-- DeviceFaultError    it reports a fault of its own, which a person must see to
 
@@ -56,6 +57,10 @@ class DeviceError(BridgeError):
 
 class DeviceSilentError(DeviceError, TimeoutError):
     """The device does not answer in time."""
+
+
+class StoppedError(DeviceError):
+    """Something was not begun, or was undone, as a stop came meanwhile."""
 
 
 class WrongDeviceError(DeviceError):

@@ -59,7 +59,10 @@ UDEV_FOLDERS = tuple(map(Path, ("/etc/udev/rules.d", "/run/udev/rules.d", "/usr/
 
 _SIGNALS = (signal.SIGTERM, signal.SIGINT, signal.SIGHUP)
 
-_EPILOG = "exit status: 0 all is well, or the bridge was ended by a signal; 1 a fault stopped it; 2 wrong use or files"
+_EPILOG = (
+    "exit status: 0 all is well, or the bridge was ended by a signal; 1 a fault stopped it, or motors may still hold; "
+    "2 wrong use or files"
+)
 
 
 def main(argv: Sequence[str] | None = None) -> int:

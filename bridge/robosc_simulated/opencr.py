@@ -135,6 +135,7 @@ class OpenCr:
     Attributes:
         panel: Buttons, bumpers, battery.
         answers_as: The ID that every answer carries; None: its own.
+        stuffs_in_place: True for firmware that spoils an answer which contains a packet's header.
     """
 
     baud: int | None = None
@@ -153,6 +154,7 @@ class OpenCr:
     ) -> None:
         self.panel = Panel()
         self.answers_as: int | None = None
+        self.stuffs_in_place = False
         self._world = world
         self._time = world.time
         self._servos = (left, right)
@@ -293,7 +295,8 @@ class OpenCr:
         return [] if answer is None else [self._sending(*answer)]
 
     def _sending(self, error: int, data: bytes) -> Sending:
-        return Sending(status(DEVICE_ID if self.answers_as is None else self.answers_as, error, data))
+        sender = DEVICE_ID if self.answers_as is None else self.answers_as
+        return Sending(status(sender, error, data, stuffs_in_place=self.stuffs_in_place))
 
     def _answer(self, request: Request) -> tuple[int, bytes] | None:
         if request.device_id != DEVICE_ID or not request.is_intact:

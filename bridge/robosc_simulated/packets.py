@@ -84,9 +84,22 @@ def crc16(data: bytes) -> int:
     return crc
 
 
-def status(device_id: int, error: int, parameters: bytes = b"") -> bytes:
-    """A status packet, stuffed and signed."""
-    body = (bytes((Instruction.STATUS, error)) + parameters).replace(_STUFFED, _STUFFED + b"\xfd")
+def status(device_id: int, error: int, parameters: bytes = b"", *, stuffs_in_place: bool = False) -> bytes:
+    """A status packet, stuffed and signed.
+
+    Args:
+        device_id: ID of the sender.
+        error: Error byte.
+        parameters: Parameters without stuffing.
+        stuffs_in_place: True to stuff it as Dynamixel2Arduino did before 0.6.2: the byte behind a header within the
+            packet is copied over all bytes that follow.
+    """
+    body = bytes((Instruction.STATUS, error)) + parameters
+    begin = body.find(_STUFFED)
+    if stuffs_in_place and begin >= 0:
+        body = body[: begin + 3] + b"\xfd" * (len(body) - begin - 2)
+    else:
+        body = body.replace(_STUFFED, _STUFFED + b"\xfd")
     packet = _HEADER + bytes((device_id,)) + (len(body) + 2).to_bytes(2, "little") + body
     return packet + crc16(packet).to_bytes(2, "little")
 

@@ -54,14 +54,21 @@ class Rover:
         obstacles: `ring`, `north ring`, `sensors`, or nothing.
         battery_v: Voltage of its battery.
         charge_state: Judgement of its own failsafe on the battery: 1 ok, 2 low, 3 critical.
+        more_batteries: Voltages of further batteries, and the judgements on them.
         refusal: Reason why it does not arm; empty: it does.
+        lost_pieces: Pieces of long texts that get lost on their way, by number.
+        text_between: Text that comes behind the first piece of a long one; empty: none.
         refused_modes: Modes that it does not enter.
         refuses_disarming: True if it refuses to disarm until it is forced.
         answers_commands: True if it acknowledges commands.
         obeys_commands: True if it does what it acknowledges.
+        arms_after_s: Time after which it carries out an order to arm; it answers at once.
         is_silent: True if it reports nothing at all.
+        reported_cm: Distances that its sensors report whatever is there, by the number of their sector.
+        signal_quality: Quality of the signal of its single sensors: 0 unknown, 1 invalid, up to 100.
         resets: Number of times that its estimator has begun anew.
         shift_m: Shift by which its estimate is off since: north, west.
+        shift_rad: Angle by which it is off since, counter-clockwise.
         commands: Commands that it has heard: number and parameters.
         targets: Targets that it has followed or ignored: their fields.
         heartbeats: Heartbeats of others that it has heard: system and component.
@@ -85,14 +92,21 @@ class Rover:
         self.obstacles = "ring"
         self.battery_v = 12.0
         self.charge_state = 1
+        self.more_batteries: list[tuple[float, int]] = []
         self.refusal = ""
+        self.lost_pieces: frozenset[int] = frozenset()
+        self.text_between = ""
         self.refused_modes: tuple[int, ...] = ()
         self.refuses_disarming = False
         self.answers_commands = True
         self.obeys_commands = True
+        self.arms_after_s = 0.0
         self.is_silent = False
+        self.reported_cm: dict[int, int] = {}
+        self.signal_quality = 0
         self.resets = 0
         self.shift_m = (0.0, 0.0)
+        self.shift_rad = 0.0
         self.commands: list[tuple[int, tuple[float, ...]]] = []
         self.targets: list[dict[str, Any]] = []
         self.heartbeats: list[tuple[int, int]] = []
@@ -105,6 +119,7 @@ class Rover:
         self._remote = (0.0, 0.0)
         self._target: tuple[float, float] | None = None
         self._target_s = 0.0
+        self._arms_at_s = math.inf
         self._long_texts = 0
         self._began_s = self._time.now_s()
         self._first_s = {_HEARTBEAT: heartbeat_s, _SYS_STATUS: _SYS_STATUS_S}
@@ -165,6 +180,9 @@ class Rover:
         self._world.catch_up()
         now_s = self._time.now_s()
         packets: list[bytes] = []
+        if now_s >= self._arms_at_s:
+            self._arm(True)
+            self._drive()
         if self._target is not None and now_s - self._target_s >= TARGET_LIMIT_S:
             self._target = None
             self._drive()
@@ -179,7 +197,7 @@ class Rover:
     def due_s(self) -> float:
         """Return the time when its next message or the expiry of its target is due."""
         expiry_s = math.inf if self._target is None else self._target_s + TARGET_LIMIT_S
-        return min(expiry_s, *self._due_s.values())
+        return min(expiry_s, self._arms_at_s, *self._due_s.values())
 
     def plug_in(self) -> None:
         """A line that was plugged in again changes nothing."""
@@ -250,10 +268,16 @@ class Rover:
             return FAILED
         if not is_armed and self.refuses_disarming and not is_forced:
             return DENIED
-        if self.obeys_commands:
-            self.is_armed = is_armed
-            self._target = None
+        if self.obeys_commands and is_armed and self.arms_after_s > 0.0:
+            self._arms_at_s = self._time.now_s() + self.arms_after_s
+        elif self.obeys_commands:
+            self._arm(is_armed)
         return ACCEPTED
+
+    def _arm(self, is_armed: bool) -> None:
+        self.is_armed = is_armed
+        self._target = None
+        self._arms_at_s = math.inf
 
     def _after_interval(self, number: int, interval_s: float) -> int:
         known = {layout.number for layout in BY_NAME.values()}
@@ -286,13 +310,13 @@ class Rover:
                     )
                 ]
             case 30:
-                return [self._encoder.encode("ATTITUDE", time_ms=int(boot_s * 1000), **self._yaw())]
+                return [self._encoder.encode("ATTITUDE", time_ms=int(boot_s * 1000) % 2**32, **self._yaw())]
             case 32 if self.has_origin:
-                return [self._encoder.encode("LOCAL_POSITION_NED", time_ms=int(boot_s * 1000), **self._place())]
+                return [self._encoder.encode("LOCAL_POSITION_NED", time_ms=int(boot_s * 1000) % 2**32, **self._place())]
             case 132 if self.obstacles == "sensors":
                 return self._sensors(boot_s)
             case 147:
-                return [self._battery()]
+                return self._batteries()
             case 330 if self.obstacles.endswith("ring"):
                 return [self._ring(boot_s)]
             case 331 if self.has_origin:
@@ -314,27 +338,32 @@ class Rover:
     def _percent(self) -> int:
         return max(0, min(100, round((self.battery_v - 10.0) / 2.6 * 100)))
 
-    def _battery(self) -> bytes:
-        voltages = (round(self.battery_v * 1000), *(_UNKNOWN_CM,) * 9)
-        words = {"function": 1, "type": 1, "charge_state": self.charge_state}
-        return self._encoder.encode("BATTERY_STATUS", voltages=voltages, remaining=self._percent, **words)
+    def _batteries(self) -> list[bytes]:
+        packets = []
+        for number, (voltage_v, charge_state) in enumerate([(self.battery_v, self.charge_state), *self.more_batteries]):
+            voltages = (round(voltage_v * 1000), *(_UNKNOWN_CM,) * 9)
+            words = {"function": 1, "type": 1, "charge_state": charge_state, "id": number}
+            share = self._percent if number == 0 else -1
+            packets.append(self._encoder.encode("BATTERY_STATUS", voltages=voltages, remaining=share, **words))
+        return packets
 
     def _yaw(self) -> dict[str, float]:
-        yaw_rad = math.remainder(-self._world.heading_rad, 2 * math.pi)
+        yaw_rad = math.remainder(-self._world.heading_rad - self.shift_rad, 2 * math.pi)
         return {"yaw": yaw_rad, "yawspeed": -self._world.floor_yaw_rate_rad_s}
 
     def _place(self) -> dict[str, float]:
-        world = self._world
-        speed_m_s = world.floor_speed_m_s
+        world, speed_m_s = self._world, self._world.floor_speed_m_s
+        cosine, sine = math.cos(self.shift_rad), math.sin(self.shift_rad)
+        heading_rad = world.heading_rad + self.shift_rad
         return {
-            "x": world.x_m + self.shift_m[0],
-            "y": -(world.y_m + self.shift_m[1]),
-            "vx": speed_m_s * math.cos(world.heading_rad),
-            "vy": -speed_m_s * math.sin(world.heading_rad),
+            "x": world.x_m * cosine - world.y_m * sine + self.shift_m[0],
+            "y": -(world.x_m * sine + world.y_m * cosine + self.shift_m[1]),
+            "vx": speed_m_s * math.cos(heading_rad),
+            "vy": -speed_m_s * math.sin(heading_rad),
         }
 
     def _odometry(self, boot_s: float) -> bytes:
-        half_rad = -self._world.heading_rad / 2
+        half_rad = -(self._world.heading_rad + self.shift_rad) / 2
         place = self._place()
         unknown = (math.nan, *(0.0,) * 20)
         return self._encoder.encode(
@@ -358,9 +387,10 @@ class Rover:
         parts_deg = [(part / (_RAYS - 1) - 0.5) * width_deg for part in range(_RAYS)]
         ranges_m = self._world.ranges([math.radians(-(middle + part)) for middle in middles_deg for part in parts_deg])
         nearest_m = [min(ranges_m[first : first + _RAYS]) for first in range(0, len(ranges_m), _RAYS)]
-        return [
+        found = [
             min(round(range_m * 100), _MOST_CM + 1) if math.isfinite(range_m) else _MOST_CM + 1 for range_m in nearest_m
         ]
+        return [self.reported_cm.get(sector, distance_cm) for sector, distance_cm in enumerate(found)]
 
     def _ring(self, boot_s: float) -> bytes:
         increment_deg = 360 // _SECTORS
@@ -380,13 +410,14 @@ class Rover:
         return [
             self._encoder.encode(
                 "DISTANCE_SENSOR",
-                time_ms=int(boot_s * 1000),
+                time_ms=int(boot_s * 1000) % 2**32,
                 min=_LEAST_CM,
                 max=_MOST_CM,
                 current=distance_cm,
                 id=eighth,
                 orientation=eighth,
                 covariance=255,
+                quality=self.signal_quality,
             )
             for eighth, distance_cm in enumerate(self._distances_cm([eighth * 45.0 for eighth in range(8)], 45.0))
         ]
@@ -398,7 +429,11 @@ class Rover:
         self._long_texts += 1
         # A text that fills its last piece needs an empty one.
         pieces = [data[begin : begin + _CHUNK] for begin in range(0, len(data) + 1, _CHUNK)]
-        return [
+        packets = [
             self._encoder.encode("STATUSTEXT", severity=severity, text=piece, id=self._long_texts, chunk=index)
             for index, piece in enumerate(pieces)
         ]
+        packets = [packet for index, packet in enumerate(packets) if index not in self.lost_pieces]
+        if self.text_between:
+            packets.insert(1, self._encoder.encode("STATUSTEXT", severity=6, text=self.text_between.encode()))
+        return packets

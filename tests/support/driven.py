@@ -148,6 +148,7 @@ class Driven:
         messages: Messages to a person, warnings and worse.
         thread: Thread of the loop.
         error: Error that has ended the loop.
+        has_ended_well: True if it has ended, gave back all its devices, and nothing that was begun is left.
     """
 
     host: Host
@@ -158,6 +159,7 @@ class Driven:
     trace: Recorded
     messages: list[str]
     error: Exception | None = None
+    has_ended_well: bool = False
     thread: Thread = field(init=False)
 
     def __post_init__(self) -> None:
@@ -165,7 +167,7 @@ class Driven:
 
     def _run(self) -> None:
         try:
-            self.machine.run()
+            self.has_ended_well = self.machine.run()
         except Exception as error:
             self.error = error
 
@@ -256,9 +258,11 @@ def configured(robot: SimulatedTurtleBot3, base: str, lidar: str, sections: Mapp
     """A configuration for a simulated robot; sections in YAML by name add to it."""
     options = sections.get("options", PATIENT if base != "mavlink-rover" else "{}")
     rest = "".join(f"{key}: {text}\n" for key, text in {"robot": "burger", **sections}.items() if key != "options")
+    # The obstacles of a rover come over its own line.
+    scanner_path = robot.base_path if lidar == "mavlink-rover" else robot.scanner_path
     return (
         f"drive: {{driver: {base}, port: {robot.base_path}, options: {options}}}\n"
-        f"scanner: {{driver: {lidar}, port: {robot.scanner_path}}}\n{rest}{CHANNELS}"
+        f"scanner: {{driver: {lidar}, port: {scanner_path}}}\n{rest}{CHANNELS}"
     )
 
 
@@ -276,7 +280,7 @@ def driven(
 
     Args:
         base: Driver of its drive base.
-        lidar: Its LiDAR.
+        lidar: Its LiDAR; `mavlink-rover`: what the rover reports of its surroundings.
         velocity: Velocity that its supervisor always wants.
         host: Host on which it runs; None: a virtual one.
         before: Action on the robot before the bridge starts.
@@ -290,7 +294,7 @@ def driven(
     host = VirtualHost() if host is None else host
     with (
         host if isinstance(host, VirtualHost) else nullcontext(),
-        SimulatedTurtleBot3("burger", base, lidar, clock=host) as robot,
+        SimulatedTurtleBot3("burger", base, "lds03" if lidar == base else lidar, clock=host) as robot,
     ):
         trace = Recorded(robot.base_line.device, robot)
         robot.base_line.device = trace

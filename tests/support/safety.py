@@ -48,6 +48,7 @@ class Bench:
         holds: True if the motors hold; None: as ordered.
         ranges_m: Ranges of a full scan, in metres.
         acceleration_m_s2: Acceleration that the motors report; None: as fast as they can.
+        refused: Number of readings that the drive base has refused.
     """
 
     def __init__(self, **changes: Any) -> None:
@@ -61,6 +62,7 @@ class Bench:
         self.battery_v: float | None = 12.0
         self.ranges_m: tuple[float, ...] = ()
         self.acceleration_m_s2: float | None = None
+        self.refused = 0
         self.last = Output(STANDSTILL, False, (), ())
 
     def report(self) -> None:
@@ -87,6 +89,7 @@ class Bench:
                     is_torque_on=self.last.is_torque_wanted if self.holds is None else self.holds,
                     battery_v=self.battery_v,
                     acceleration_m_s2=self.acceleration_m_s2,
+                    refused=self.refused,
                 )
             )
         self.now_s += step_s

@@ -102,14 +102,17 @@ class SafetyTwin:
                 mean_v, window = sum(voltage for voltage, _ in window) / len(window), []
         return mean_v
 
-    def _torque_story(self) -> tuple[bool, bool, list[tuple[tuple[float, float], DriveReading]]]:
-        """Return whether the motors reported that they hold, whether they let go since, and what was read meanwhile."""
+    def _torque_story(self) -> tuple[bool, DriveReading | None, list[tuple[tuple[float, float], DriveReading]]]:
+        """Return whether the motors reported that they hold, the last reading if they had let go by then.
+
+        The third part is what was read while they held.
+        """
         began = [each for each in self.past if each.name in ("output", "drive", "pause")]
         for index in reversed(range(len(began))):
             if began[index].name == "output" and began[index].torque_since_s is None:
                 began = began[index + 1 :]
                 break
-        is_seen = is_lost = False
+        is_seen, lost = False, None
         read: list[tuple[tuple[float, float], DriveReading]] = []
         since_s: float | None = None
         velocity = STANDSTILL
@@ -119,14 +122,12 @@ class SafetyTwin:
             elif each.name == "pause":
                 read = []
             elif since_s is not None and each.value.time_s > since_s:
-                is_seen, is_lost = (
-                    is_seen or each.value.is_torque_on,
-                    is_lost or (is_seen and not each.value.is_torque_on),
-                )
+                lost = each.value if is_seen and not each.value.is_torque_on else None
+                is_seen = is_seen or each.value.is_torque_on
                 if each.value.is_torque_on:
                     turn = velocity.angular_rad_s * self.limits.separation_m / 2
                     read.append(((velocity.linear_m_s - turn, velocity.linear_m_s + turn), each.value))
-        return is_seen, is_lost, read
+        return is_seen, lost, read
 
     def _is_astray(self, read: list[tuple[tuple[float, float], DriveReading]]) -> bool:
         """Return True if a wheel is off its goal, as its motor goes there, in all readings of too long a time."""
@@ -186,11 +187,16 @@ class SafetyTwin:
     def answers(self, reading: DriveReading) -> None:
         """The drive base has answered; what latches of it is noted at once."""
         self.happens("drive", reading, reading.time_s)
-        _, is_lost, read = self._torque_story()
+        _, lost, read = self._torque_story()
+        last = self._last("output")
         is_judged = bool(read) and read[-1][1] is reading and self._is_wanted()
         latched = {
             Reason.BATTERY_LOW: self.is_empty(),
-            Reason.TORQUE_LOST: is_lost and self._is_wanted(),
+            # Torque that is to go off anyway is not lost.
+            Reason.TORQUE_LOST: lost is reading
+            and last is not None
+            and last.letting_go_s is None
+            and self._is_wanted(),
             Reason.WHEEL_ASTRAY: is_judged and self._is_astray(read),
             Reason.UNBIDDEN_MOTION: is_judged and self._is_unbidden(read),
         }
@@ -313,6 +319,8 @@ class SafetyTwin:
             reasons.add(Reason.MOTOR_SILENT)
         if limits.is_stopped_when_blind and self._is_blind():
             reasons.add(Reason.SCAN_BLIND)
+        if 0.0 in self._seen_ahead():
+            reasons.add(Reason.SCAN_TOUCHING)
         velocity = STANDSTILL
         if not reasons and wanted != STANDSTILL:
             velocity = self._limited(
@@ -336,6 +344,12 @@ class SafetyTwin:
 
     def _is_blind(self) -> bool:
         """Return True if the last scan that reports ranges shows nothing where the last command leads to."""
+        seen = self._seen_ahead()
+        valid = [range_m for range_m in seen if math.isfinite(range_m)]
+        return bool(seen) and len(valid) < self.limits.min_valid_share * 61
+
+    def _seen_ahead(self) -> list[float]:
+        """Return the ranges where the last command leads to; none for a rotation on the spot, or without a scan."""
         asked_m_s, scan = 0.0, list[float]()
         for each in self.past:
             if each.name == "disable" or (each.name == "reset" and each.value):
@@ -346,9 +360,7 @@ class SafetyTwin:
             if each.name == "scan" and each.value:
                 scan = each.value
         middle = 0 if asked_m_s > 0 else 180
-        seen = [scan[degree % 360] for degree in range(middle - 30, middle + 31)] if scan else []
-        valid = [range_m for range_m in seen if math.isfinite(range_m)]
-        return asked_m_s != 0 and bool(scan) and len(valid) < self.limits.min_valid_share * 61
+        return [scan[degree % 360] for degree in range(middle - 30, middle + 31)] if scan and asked_m_s != 0 else []
 
     def _is_command_stale(self, now_s: float) -> bool:
         # A command that was refused is no sign of life.

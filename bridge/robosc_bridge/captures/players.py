@@ -7,19 +7,21 @@ the odometry of the drivers.
 
 import math
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 from dynamixel_sdk import INST_PING, INST_READ, INST_SYNC_READ, INST_SYNC_WRITE, INST_WRITE
 
 from robosc_bridge.captures.capture_file import Kind, LineInfo, Record
 from robosc_bridge.devices.board_yaw import BoardYaw
-from robosc_bridge.devices.interface import Pose, Scan, Velocity
+from robosc_bridge.devices.interface import DriveLimits, Pose, Scan, Velocity
 from robosc_bridge.devices.kinematics import body_velocity
 from robosc_bridge.devices.lidar import Lidar
-from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
+from robosc_bridge.devices.mavlink_odometry import VehicleTracker, estimate
 from robosc_bridge.devices.mavlink_state import VehicleState
-from robosc_bridge.devices.odometry import Odometry, Rotation
+from robosc_bridge.devices.obstacle_rounds import ObstacleRounds
+from robosc_bridge.devices.odometry import Odometry
+from robosc_bridge.devices.plausibility import Verdict, WheelCounts, wheel_judge
 from robosc_bridge.devices.robots import ROBOTS, Wheels
 from robosc_bridge.driver_registry import Kind as DriverKind
 from robosc_bridge.driver_registry import available_drivers, make_range_scanner
@@ -34,14 +36,16 @@ from robosc_bridge.protocol.mavlink_messages import (
     Message,
     ObstacleRing,
     SectorDistance,
-    Text,
     vehicle_message,
 )
-from robosc_bridge.protocol.mavlink_obstacles import nearest_in_sectors, ring_sectors, sensor_sector
 from robosc_bridge.transport.system_host import SystemHost
 
 _NS = 1_000_000_000
 _SILENCE_S = 0.5
+# Time by which answers may come late.
+_COUNTS_LAG_S = 0.1
+# A capture does not say what the vehicle may be commanded; what any body may do holds.
+_ANY_BODY = DriveLimits(0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True)
@@ -174,7 +178,8 @@ class _Servos(_Player):
         self._out, self._in = PacketDecoder(), PacketDecoder()
         self._wheels = _wheels_of(info)
         self._odometry = Odometry(self._wheels.tick_m, self._wheels.separation_m)
-        self._yaw = BoardYaw() if info.options.get("heading", "fused") == "fused" else None
+        self._judge = wheel_judge("", _COUNTS_LAG_S)
+        self._yaw = BoardYaw("") if info.options.get("heading", "fused") == "fused" else None
         motors = info.options.get("motors", (1, 2))
         self._motors: tuple[int, ...] = tuple(motors) if isinstance(motors, (list, tuple)) else (1, 2)
         mirrored = info.options.get("mirrored")
@@ -194,6 +199,9 @@ class _Servos(_Player):
                 case Kind.EVENTS:
                     if record.event.get("event") in ("open", "close", "lost line", "lost"):
                         yield self.item("event", **record.event)
+                    if record.event.get("event") == "open":
+                        self._judge.forget()
+                        self._odometry = self._odometry.rebased()
                     self._in.forget()
                     self._out.forget()
                 case Kind.OUT:
@@ -258,7 +266,7 @@ class _Servos(_Player):
     def _data(self, device: int, address: int, data: bytes) -> Iterator[Item]:
         if self.info.driver == "opencr":
             if (address, len(data)) == (opencr.BLOCK_ADDRESS, opencr.BLOCK_LENGTH):
-                yield self._board(opencr.decode_block(data))
+                yield from self._board(data)
             return
         if address <= servo.DRIVE_MODE < address + len(data) and device in self._signs:
             is_reverse = bool(data[servo.DRIVE_MODE - address] & servo.REVERSE)
@@ -266,38 +274,60 @@ class _Servos(_Player):
         if (address, len(data)) == (servo.MEASUREMENT_ADDRESS, servo.MEASUREMENT_LENGTH):
             self._measured[device] = servo.decode_measurement(data)
             if set(self._measured) == set(self._motors):
-                yield self._pair([self._measured[motor] for motor in self._motors])
+                yield from self._pair([self._measured[motor] for motor in self._motors])
                 self._measured = {}
 
-    def _moved(self, ticks: tuple[int, int], raw: tuple[int, int], measured: Rotation | None = None) -> dict[str, Any]:
-        jumps = self._odometry.jumps(*ticks)
-        self._odometry = self._odometry.rebased(*jumps).advanced(*ticks, measured)
+    def _moved(self, ticks: tuple[int, int], raw: tuple[int, int], block: opencr.Block | None = None) -> Iterator[Item]:
+        """Yield the problem of counts that cannot be; move the odometry by others, and yield their reading."""
+        verdict = self._judge.judge(WheelCounts(ticks, raw), self.time_s)
+        if verdict is Verdict.REFUSED:
+            yield self._refused("; ".join(filter(None, self._judge.excess)))
+            return
+        if verdict is Verdict.ANEW:
+            is_left, is_right = map(bool, self._judge.excess)
+            self._odometry = self._odometry.rebased(is_left, is_right)
+            yield self.problem("the wheels count from another place")
+        measured = None if self._yaw is None or block is None else self._yaw.rotation(block)
+        self._odometry = self._odometry.advanced(*ticks, measured)
         left_m_s, right_m_s = (speed * self._wheels.raw_m_s for speed in raw)
         velocity = body_velocity(left_m_s, right_m_s, self._wheels.separation_m)
-        return _motion(self._odometry.pose, velocity, (left_m_s, right_m_s))
+        yield self.item("reading", **_motion(self._odometry.pose, velocity, (left_m_s, right_m_s)))
 
-    def _board(self, block: opencr.Block) -> Item:
-        return self.item(
-            "reading",
-            **self._moved(block.ticks, block.velocities_raw, None if self._yaw is None else self._yaw.rotation(block)),
-            is_torque_on=block.is_torque_on,
-            battery_v=block.battery_v,
-            uptime_ms=block.uptime_ms,
-            buttons=[name for name, is_pressed in block.buttons.items() if is_pressed],
-        )
+    def _refused(self, reason: str) -> Item:
+        return self.problem("a reading that cannot be is refused", reason=reason)
 
-    def _pair(self, measured: Sequence[servo.Measurement]) -> Item:
+    def _board(self, data: bytes) -> Iterator[Item]:
+        reason = opencr.impossibility(data)
+        if reason:
+            yield self._refused(reason)
+            return
+        block = opencr.decode_block(data)
+        more = {
+            "is_torque_on": block.is_torque_on,
+            "battery_v": block.battery_v,
+            "uptime_ms": block.uptime_ms,
+            "buttons": [name for name, is_pressed in block.buttons.items() if is_pressed],
+        }
+        yield from _with(self._moved(block.ticks, block.velocities_raw, block), more)
+
+    def _pair(self, measured: Sequence[servo.Measurement]) -> Iterator[Item]:
         left, right = measured[0], measured[-1]
         signs = [self._signs[motor] for motor in self._motors]
-        return self.item(
-            "reading",
-            **self._moved(
-                (signs[0] * left.ticks, signs[-1] * right.ticks),
-                (signs[0] * left.velocity_raw, signs[-1] * right.velocity_raw),
-            ),
-            battery_v=min(one.voltage_v for one in measured),
-            temperature_c=max(one.temperature_c for one in measured),
+        found = self._moved(
+            (signs[0] * left.ticks, signs[-1] * right.ticks),
+            (signs[0] * left.velocity_raw, signs[-1] * right.velocity_raw),
         )
+        more = {
+            "battery_v": min(one.voltage_v for one in measured),
+            "temperature_c": max(one.temperature_c for one in measured),
+        }
+        yield from _with(found, more)
+
+
+def _with(items: Iterable[Item], more: dict[str, Any]) -> Iterator[Item]:
+    """Yield items, the readings among them with more values."""
+    for item in items:
+        yield replace(item, values=item.values | more) if item.kind == "reading" else item
 
 
 def _wheels_of(info: LineInfo) -> Wheels:
@@ -323,7 +353,7 @@ class _Vehicle(_Player):
         system = options.get("system")
         state = VehicleState(system if isinstance(system, int) else None)
         decoder = Decoder(Codec(*own), vehicle_message)
-        odometry = VehicleOdometry()
+        tracker, rounds = VehicleTracker("", _ANY_BODY), ObstacleRounds()
         for record in records:
             self.time_s = (record.time_ns - self.begin_ns) / _NS
             if record.kind is Kind.EVENTS:
@@ -334,36 +364,50 @@ class _Vehicle(_Player):
             for message in decoder.feed(record.data):
                 before, state = state, state.after(message, self.time_s, own)
                 yield from self._reported(message, before, state)
-                report = estimate(state)
-                if report is not None and report.content is not odometry.last:
-                    odometry = odometry.advanced(report.content)
-                    battery = state.battery or state.pack
-                    yield self.item(
-                        "reading",
-                        **_motion(odometry.pose, odometry.velocity, (math.nan, math.nan)) | {"wheels_m_s": None},
-                        battery_v=None if battery is None else battery.voltage_v,
-                    )
+                yield from self._seen(message, state, rounds)
+                yield from self._tracked(state, tracker)
+        yield from self._texts(state, state.at_end())
         self.summary.count(decoder.counts)
 
+    def _tracked(self, state: VehicleState, tracker: VehicleTracker) -> Iterator[Item]:
+        """Yield the reading of a new estimate, or why it does not count."""
+        refused, begun_anew = tracker.judge.refused, tracker.judge.begun_anew
+        if tracker.take(estimate(state)):
+            if tracker.judge.begun_anew > begun_anew:
+                yield self.problem("the vehicle's estimate has jumped")
+            batteries = [found for found in (state.battery, *state.packs.values()) if found is not None]
+            yield self.item(
+                "reading",
+                **_motion(tracker.odometry.pose, tracker.odometry.velocity, (math.nan, math.nan))
+                | {"wheels_m_s": None},
+                battery_v=next((found.voltage_v for found in batteries if found.voltage_v is not None), None),
+            )
+        elif tracker.judge.refused > refused:
+            yield self.problem("a reading that cannot be is refused", reason="; ".join(tracker.judge.excess))
+
+    def _seen(self, message: Message, state: VehicleState, rounds: ObstacleRounds) -> Iterator[Item]:
+        """Yield the scan that a message completes."""
+        if isinstance(message.content, (ObstacleRing, SectorDistance)) and message.system == state.system:
+            scan = rounds.take(message.component, message.content, self.time_s, state)
+            if scan is not None:
+                yield self.item("scan", **_ranges(scan.ranges_m))
+
     def _reported(self, message: Message, before: VehicleState, state: VehicleState) -> Iterator[Item]:
-        match message.content:
-            case Heartbeat() as heartbeat:
-                last = None if before.heartbeat is None else before.heartbeat.content
-                if state.heartbeat is not before.heartbeat and heartbeat != last:
-                    yield self.item("event", event="heartbeat", mode=heartbeat.mode, is_armed=heartbeat.is_armed)
-            case Text() as text:
-                yield self.item("text", severity=text.severity, text=text.text)
-            case ObstacleRing() as ring:
-                heading_rad = None if state.attitude is None else state.attitude.content.heading_rad
-                sectors = ring_sectors(ring, heading_rad)
-                if sectors is not None:
-                    yield self.item("scan", **_ranges(nearest_in_sectors(sectors)))
-            case SectorDistance() as report:
-                sector = sensor_sector(report)
-                if sector is not None:
-                    yield self.item("scan", **_ranges(nearest_in_sectors((sector,))))
+        if isinstance(message.content, Heartbeat):
+            heartbeat = message.content
+            last = None if before.heartbeat is None else before.heartbeat.content
+            if state.heartbeat is not before.heartbeat and heartbeat != last:
+                yield self.item("event", event="heartbeat", mode=heartbeat.mode, is_armed=heartbeat.is_armed)
+        yield from self._texts(before, state)
         if state.restarts != before.restarts:
             yield self.problem("the vehicle has restarted")
+
+    def _texts(self, before: VehicleState, state: VehicleState) -> Iterator[Item]:
+        """Yield the texts that have been joined since a state."""
+        known = {id(report) for report in before.texts}
+        for report in state.texts:
+            if id(report) not in known:
+                yield self.item("text", severity=report.content.severity, text=report.content.text)
 
 
 def _number(value: object, default: int) -> int:

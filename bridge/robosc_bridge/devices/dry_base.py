@@ -43,6 +43,11 @@ class DryBase:
         """Counters of the real one's line; None: it has none."""
         return getattr(self._base, "counters", None)
 
+    @property
+    def leftover(self) -> str:
+        """What the real one may still do after `close`."""
+        return getattr(self._base, "leftover", "")
+
     def open(self) -> None:
         """Open the real one; it is left with torque off."""
         self._is_torque_wanted = False

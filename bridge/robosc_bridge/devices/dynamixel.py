@@ -10,16 +10,34 @@ Source: ROBOTIS e-Manual, pages XL430-W250, XM430-W210 and "DYNAMIXEL Protocol 2
 import contextlib
 import logging
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Literal
 
 from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, BusCounters, DynamixelBus, exchange_limit_s
-from robosc_bridge.devices.interface import CONSTANT, DriveLimits, DriveReading, MotorFault, Velocity, VelocitySource
+from robosc_bridge.devices.interface import (
+    CONSTANT,
+    UNDO_LIMIT_S,
+    DriveLimits,
+    DriveReading,
+    MotorFault,
+    Velocity,
+    VelocitySource,
+    has_stopped,
+)
 from robosc_bridge.devices.kinematics import body_velocity, wheel_goals
 from robosc_bridge.devices.odometry import Odometry, velocity_variances
+from robosc_bridge.devices.plausibility import Verdict, WheelCounts, wheel_judge
 from robosc_bridge.devices.robots import ACCELERATION_RAW_RAD_S2, SERVOS, Body, Robot, Wheels
 from robosc_bridge.devices.servo_pair import ServoPair
 from robosc_bridge.devices.wheel_following import FOLLOWING_LIMIT_S, FollowingMonitor
-from robosc_bridge.errors import BridgeError, DeviceError, DeviceSilentError, WrongDeviceError
+from robosc_bridge.errors import (
+    BridgeError,
+    DeviceError,
+    DeviceSilentError,
+    LineError,
+    StoppedError,
+    WrongDeviceError,
+)
 from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol import servo
 from robosc_bridge.protocol.servo import Measurement
@@ -33,6 +51,10 @@ CHECK_PERIOD_S = 0.1
 
 DriveMode = Literal["normal", "reverse"]
 _MODES: dict[DriveMode, int] = {"normal": 0, "reverse": servo.REVERSE}
+# Measurements in an exchange: what cannot be is asked for again.
+_READS = 2
+# An answer comes late by up to the time for which an adapter may keep bytes back, twice.
+_COUNTS_LAG_S = 0.05
 # A limit that was rounded to three digits is kept.
 _ROUNDED = 1.001
 
@@ -58,6 +80,9 @@ class DynamixelBase:
             exchanges.
         answer_limit_s: Longest wait for one answer.
         host: Parts of its computer that it uses.
+
+    Attributes:
+        leftover: What the motors may still do after `close`; empty: nothing.
 
     Raises:
         ValueError: An argument is out of its range.
@@ -104,6 +129,7 @@ class DynamixelBase:
         self._exchange_limit_s = exchange_limit_s(answer_limit_s)
         self._limits = robot.limits if isinstance(robot, Body) else robot.limits(robot.motor.velocity_limit_raw)
         self._odometry = Odometry(self._wheels.tick_m, self._wheels.separation_m)
+        self._judge = wheel_judge(path, _COUNTS_LAG_S)
         self._following = FollowingMonitor(FOLLOWING_LIMIT_S + ramp_s)
         self._host = host
         self._line: Port | None = None
@@ -112,6 +138,10 @@ class DynamixelBase:
         self._source: VelocitySource = CONSTANT
         self._is_torque_wanted = False
         self._is_torque_on = False
+        # True from the first order to switch torque on until both motors are known to have none, or until it is known
+        # whether they have.
+        self._may_hold = self._is_uncertain = False
+        self.leftover = ""
         # Faults that keep the motors at a standstill until torque is switched on anew.
         self._stops: frozenset[MotorFault] = frozenset()
         # A motor may have restarted.
@@ -129,7 +159,9 @@ class DynamixelBase:
     def counters(self) -> BusCounters:
         """Health of the line since it was opened."""
         bus = self._bus
-        return BusCounters() if bus is None else bus.counters
+        if bus is None:
+            return BusCounters()
+        return replace(bus.counters, implausible=self._judge.refused, begun_anew=self._judge.begun_anew)
 
     # Each drive base with a bus has its own `attend` and `wake`: when it asks its source, only its line decides.
     def attend(self, source: VelocitySource) -> None:
@@ -152,6 +184,7 @@ class DynamixelBase:
         """
         self.close()
         self._odometry = self._odometry.rebased()
+        self._judge = wheel_judge(self._path, _COUNTS_LAG_S)
         self._is_torque_wanted = self._is_torque_on = self._is_doubtful = False
         self._stops = frozenset()
         try:
@@ -163,7 +196,7 @@ class DynamixelBase:
             )
             self._check_model(self._pair)
             self._limits = self._limits_of(self._pair)
-            self._pair.release_torque()
+            self._release_torque(self._pair)
             self._pair.set_up()
         except BaseException:
             self._release()
@@ -196,24 +229,41 @@ class DynamixelBase:
             LineError: The line is gone.
             DeviceSilentError: A motor does not answer.
             DeviceFaultError: A motor has shut down, or does not switch its torque.
+            StoppedError: A stop came meanwhile.
             DeviceError: The wheels still rotate, or a motor refuses its settings.
         """
         pair, _ = self._opened()
         self._is_torque_wanted = self._is_torque_on = False
         if not is_on:
-            pair.release_torque()
+            self._release_torque(pair)
             self._stops = frozenset()
             return
         try:
-            pair.arm(self._acceleration_raw, self._watchdog)
+            pair.arm(self._acceleration_raw, self._watchdog, self._begin)
         except BridgeError:
             with contextlib.suppress(BridgeError):
-                pair.release_torque()
+                self._release_torque(pair)
             raise
         self._is_torque_wanted = self._is_torque_on = True
+        self._is_uncertain = False
         self._stops = frozenset()
         self._following.forget()
         self._commanded_s = self._host.monotonic()
+
+    def _begin(self) -> None:
+        """Note that torque goes on.
+
+        Raises:
+            StoppedError: A stop came; it must not.
+        """
+        if has_stopped(self._source):
+            raise StoppedError(f"{self._path}: torque is not switched on, as a stop came meanwhile")
+        self._may_hold = self._is_uncertain = True
+
+    def _release_torque(self, pair: ServoPair) -> None:
+        pair.release_torque()
+        self._may_hold = self._is_uncertain = False
+        self.leftover = ""
 
     def exchange(self, velocity: Velocity) -> DriveReading:
         """Command and read both wheels, in at most `exchange_limit_s` of the bus.
@@ -244,18 +294,46 @@ class DynamixelBase:
         pair.halt()
         is_left, is_right = pair.restart_faulty()
         self._odometry = self._odometry.rebased(is_left, is_right)
-        pair.release_torque()
+        self._judge.forget()
+        self._release_torque(pair)
         pair.set_up()
         self._stops = frozenset()
 
     def close(self) -> None:
         """Stop the wheels, switch torque and watchdogs off, and close the line."""
-        if self._pair is not None:
+        pair = self._pair
+        if pair is not None:
+            with contextlib.suppress(LineError):
+                self._let_go(*self._opened())
             with contextlib.suppress(BridgeError):
-                self._pair.release_torque()
-            with contextlib.suppress(BridgeError):
-                self._pair.switch_leds_off()
+                pair.switch_leds_off()
+            names = " and ".join(self._names.values())
+            self.leftover = (
+                f"{names} may hold: they have not confirmed that torque is off; cut their power"
+                if self._may_hold
+                else ""
+            )
         self._release()
+
+    def _let_go(self, pair: ServoPair, bus: DynamixelBus) -> None:
+        """Switch torque off; after a stop again and again for a time, where that is of use.
+
+        Raises:
+            LineError: The line is gone.
+        """
+        end_s = self._host.monotonic() + UNDO_LIMIT_S
+        while True:
+            began_s = self._host.monotonic()
+            try:
+                self._release_torque(pair)
+            except DeviceError as error:
+                _log.debug("%s", error)
+            if not (self._may_hold and has_stopped(self._source)):
+                return
+            is_heard = bus.received_s > began_s
+            if not (is_heard or self._is_uncertain) or self._host.monotonic() > end_s:
+                return
+            self._host.sleep(CHECK_PERIOD_S)
 
     def _release(self) -> None:
         if self._line is not None:
@@ -294,19 +372,41 @@ class DynamixelBase:
             self._is_doubtful = False
             velocity = self._source.newer() or velocity
         goals = self._commanded(pair, velocity)
-        answers = pair.measure()
+        measured, goals = self._measured(pair, bus, goals)
         time_s = bus.received_s
-        for motor, (_, is_alert) in zip(pair.motors, answers, strict=True):
-            self._look_at(pair, motor, is_alert)
-        measured = [measurement for measurement, _ in answers]
-        if any(self._odometry.jumps(*(one.ticks for one in measured))):
-            # A jump comes of the motor's own motion, or of a restart.
-            goals = self._renewed(pair, goals)
-            self._check_torque(pair)
         if self._host.monotonic() >= self._check_s:
             goals = self._renewed(pair, goals)
             self._check_alternately(pair)
         return self._reading(pair, measured, goals, time_s)
+
+    def _measured(
+        self, pair: ServoPair, bus: DynamixelBus, goals: tuple[int, int]
+    ) -> tuple[list[Measurement], tuple[int, int]]:
+        """Return a measurement of each motor that can be, and the goals now; asks again for what cannot be.
+
+        Raises:
+            DeviceSilentError: The motors do not answer with what can be.
+        """
+        for _ in range(_READS):
+            answers = pair.measure()
+            for motor, (_, is_alert) in zip(pair.motors, answers, strict=True):
+                self._look_at(pair, motor, is_alert)
+            left, right = (measurement for measurement, _ in answers)
+            counts = WheelCounts((left.ticks, right.ticks), (left.velocity_raw, right.velocity_raw))
+            verdict = self._judge.judge(counts, bus.received_s)
+            if verdict is Verdict.REFUSED:
+                goals = self._renewed(pair, goals)
+                if self._check_torque(pair) and len(self._judge.excess) == len(counts.ticks):
+                    # One that has restarted counts anew.
+                    self._judge.begin_anew(counts, bus.received_s)
+                    return [left, right], goals
+                continue
+            if verdict is Verdict.ANEW:
+                is_left, is_right = map(bool, self._judge.excess)
+                self._odometry = self._odometry.rebased(is_left, is_right)
+            return [left, right], goals
+        reason = "; ".join(filter(None, self._judge.excess))
+        raise DeviceSilentError(f"{self._path}: the motors do not answer with what can be: {reason}")
 
     def _commanded(self, pair: ServoPair, velocity: Velocity) -> tuple[int, int]:
         """Command a velocity, where the motors are to obey; returns their goals."""
@@ -348,12 +448,15 @@ class DynamixelBase:
             self._check_torque(pair)
         self._is_watchdog_next = not self._is_watchdog_next
 
-    def _check_torque(self, pair: ServoPair) -> None:
+    def _check_torque(self, pair: ServoPair) -> bool:
+        """Find out whether the motors have torque; returns whether one has restarted."""
         self._is_torque_on, (has_left, has_right) = pair.read_torque()
         if has_left or has_right:
             self._odometry = self._odometry.rebased(has_left, has_right)
+            self._judge.forget()
         if not self._is_torque_on:
             self._stop_for(pair, frozenset({MotorFault.TORQUE_LOST}))
+        return has_left or has_right
 
     def _check_watchdogs(self, pair: ServoPair) -> None:
         if pair.has_tripped():
@@ -388,6 +491,7 @@ class DynamixelBase:
             goals_m_s=self._goals_m_s(goals) if self._is_torque_wanted else None,
             wheels_m=self._odometry.wheels_m,
             wheel_radius_m=self._wheels.radius_m,
+            refused=self._judge.refused,
             pose_covariance=self._odometry.covariance,
             velocity_variances=velocity_variances(left_m_s, right_m_s, self._wheels.raw_m_s, self._wheels.separation_m),
         )

@@ -56,6 +56,9 @@ _SETTLING = (
     *((108, length) for length in (14, 15)),
     *((104, length) for length in (12, 16, 18, 19, 20, 22, 24, 28, 32, 36, 40, 42, 43)),
 )
+SETTLING_LENGTHS = frozenset(length for _, length in _SETTLING)
+"""Lengths that no driver may read."""
+
 _revolutions = itertools.cycle(
     _SETTLING
 )  # Shared: a port that is opened anew may still get answers to the last session.
@@ -85,6 +88,8 @@ class BusCounters:
         foreign: Sound packets that were no answer to the request.
         late: Foreign packets from the device that was asked: its answers to earlier requests.
         repeated: Requests that were repeated.
+        implausible: Sound answers that were refused, as their contents cannot be.
+        begun_anew: Times that a device has begun to count from another place, as after a restart.
     """
 
     requests: int = 0
@@ -93,6 +98,8 @@ class BusCounters:
     foreign: int = 0
     late: int = 0
     repeated: int = 0
+    implausible: int = 0
+    begun_anew: int = 0
 
 
 class DynamixelBus:

@@ -93,6 +93,7 @@ class DriveReading:
         wheels_m: Distance that the left and the right wheel have rolled since the odometry began; None: encoders are
             not read.
         wheel_radius_m: Radius of both wheels; None: not known.
+        refused: Number of readings that were refused since the drive base was opened, as no body moves like that.
     """
 
     time_s: float
@@ -113,6 +114,7 @@ class DriveReading:
     velocity_variances: tuple[float, float] | None = None
     wheels_m: tuple[float, float] | None = None
     wheel_radius_m: float | None = None
+    refused: int = 0
 
 
 @dataclass(frozen=True)
@@ -150,6 +152,8 @@ class DriveBase(Protocol):
 
         Raises:
             LineError: The line is gone.
+            StoppedError: A stop came meanwhile (`StoppableSource.is_stopped`), after which nothing was begun; what was
+                begun before ends when torque is switched off, or with `close`.
             DeviceError: The device does not switch torque.
         """
 
@@ -176,7 +180,12 @@ class DriveBase(Protocol):
         """
 
     def close(self) -> None:
-        """Stop the wheels, switch torque off, close the line; never raises, may be called at any time and again."""
+        """Stop the wheels, switch torque off, close the line; never raises, may be called at any time and again.
+
+        What may have been begun is undone after a stop (`StoppableSource.is_stopped`) for up to `UNDO_LIMIT_S`, as long
+        as the device is heard or it is not known whether it has begun. A driver that is not sure of it afterwards says
+        so in an attribute `leftover`: what may still hold or move, in one line; empty: nothing does.
+        """
 
 
 class VelocitySource(Protocol):
@@ -189,6 +198,14 @@ class VelocitySource(Protocol):
         """Note that the line has taken the bytes of the last velocity, or that the device has that velocity already."""
 
 
+@runtime_checkable
+class StoppableSource(VelocitySource, Protocol):
+    """Source that also says when a stop has come."""
+
+    def is_stopped(self) -> bool:
+        """Return True if torque is no longer to be switched on: what has not begun must not begin then."""
+
+
 class _ConstantSource:
     """Source for a drive base that is used alone: each velocity holds until the next exchange."""
 
@@ -199,7 +216,15 @@ class _ConstantSource:
         pass
 
 
+UNDO_LIMIT_S = 5.0
+"""Time for which a driver tries to undo what it may have begun, when it is closed, in seconds."""
+
 CONSTANT: VelocitySource = _ConstantSource()
+
+
+def has_stopped(source: VelocitySource) -> bool:
+    """Return True if a source says that a stop has come; one that cannot say so never does."""
+    return isinstance(source, StoppableSource) and source.is_stopped()
 
 
 @runtime_checkable
@@ -222,7 +247,7 @@ class RawScan:
 
     Attributes:
         angles_rad: Of each point, counter-clockwise from the front, within [0, 2 pi).
-        ranges_m: NaN where nothing valid was measured.
+        ranges_m: 0 where something is nearer than the device measures; NaN where nothing valid was measured.
         intensities: As the device gives them.
     """
 
@@ -241,7 +266,8 @@ class Scan:
     Attributes:
         time_s: Time when its last byte had come, in seconds.
         ranges_m: `BINS` bins of one degree, counter-clockwise, the first straight ahead and half a degree to both
-            sides of it; the smallest valid range of each, NaN if none.
+            sides of it; the smallest valid range of each: 0 where something is nearer than the device measures, NaN
+            if none.
         raw: The scan as it was measured.
         revolutions_per_s: Speed of the motor as the device reports it.
         min_m: Shortest distance that the device measures; 0: unknown.
@@ -265,12 +291,14 @@ class ScannerCounters:
         frames: Well-formed frames.
         bad_frames: Frames with a wrong checksum or impossible contents.
         skipped_bytes: Bytes that belong to no frame.
+        invalid: Measurements that the device itself marks as invalid.
     """
 
     scans: int = 0
     frames: int = 0
     bad_frames: int = 0
     skipped_bytes: int = 0
+    invalid: int = 0
 
 
 class RangeScanner(Protocol):

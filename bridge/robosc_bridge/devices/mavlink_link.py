@@ -11,7 +11,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
+from robosc_bridge.devices.mavlink_state import VehicleState
 from robosc_bridge.errors import LineBusyError, LineError, LineLostError
 from robosc_bridge.host import Host, NetworkPort
 from robosc_bridge.protocol.framing import FrameCounts
@@ -45,7 +45,20 @@ _READ_S = 0.2
 # A read that takes so long was paused, with the process.
 _PAUSE_S = 0.5
 
-type Obstacle = ObstacleRing | SectorDistance
+
+@dataclass(frozen=True, slots=True)
+class ObstacleReport:
+    """Report of a sensor that looks around.
+
+    Attributes:
+        time_s: Time when it came, by the host's clock, in seconds.
+        component: Component that it comes from.
+        content: Content of the report.
+    """
+
+    time_s: float
+    component: int
+    content: ObstacleRing | SectorDistance
 
 
 @dataclass(frozen=True, slots=True)
@@ -113,7 +126,7 @@ class VehicleLink:
         )
         self._decoder = Decoder(self._codec, vehicle_message)
         self._state = VehicleState(settings.system)
-        self._obstacles: deque[Timestamped[Obstacle]] = deque(maxlen=_KEPT_OBSTACLES)
+        self._obstacles: deque[ObstacleReport] = deque(maxlen=_KEPT_OBSTACLES)
         self._lost: LineError | None = None
         self._is_closing = False
         self._changed = host.condition()
@@ -156,7 +169,7 @@ class VehicleLink:
             self._check()
             return found
 
-    def take_obstacles(self, limit_s: float, is_woken: Callable[[], bool]) -> list[Timestamped[Obstacle]]:
+    def take_obstacles(self, limit_s: float, is_woken: Callable[[], bool]) -> list[ObstacleReport]:
         """Return the reports of obstacles since they were taken last; wait for the first.
 
         Raises:
@@ -269,7 +282,7 @@ class VehicleLink:
             self._line.answer_sender()
         # A companion computer of the vehicle may be what sees.
         if isinstance(message.content, (ObstacleRing, SectorDistance)) and message.system == self._state.system:
-            self._obstacles.append(Timestamped(time_s, message.content))
+            self._obstacles.append(ObstacleReport(time_s, message.component, message.content))
 
 
 _links: dict[str, VehicleLink] = {}

@@ -7,8 +7,9 @@ restarts, or when another message begins to report it. A jump does not count as 
 import math
 from dataclasses import dataclass, field, replace
 
-from robosc_bridge.devices.interface import Pose, Velocity
+from robosc_bridge.devices.interface import DriveLimits, Pose, Velocity
 from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
+from robosc_bridge.devices.plausibility import Verdict, body_judge
 from robosc_bridge.protocol.mavlink_messages import MotionEstimate
 
 _NO_LONGER_S = 0.5
@@ -39,6 +40,8 @@ def _of_place_and_attitude(state: VehicleState) -> Timestamped[MotionEstimate] |
         place.x_m_s * cosine + place.y_m_s * sine,
         attitude.yaw_rate_rad_s,
         _NO_ODOMETRY,
+        place.boot_s,
+        attitude.boot_s,
     )
     return Timestamped(min(state.position.time_s, state.attitude.time_s), motion)
 
@@ -80,3 +83,51 @@ class VehicleOdometry:
     def rebased(self) -> "VehicleOdometry":
         """Return an odometry for which the next estimate does not count as motion."""
         return replace(self, last=None)
+
+
+class VehicleTracker:
+    """Follows a vehicle by its estimates, of which those that cannot be do not count.
+
+    Args:
+        name: Name of the vehicle, for warnings.
+        limits: Limits of what it is commanded.
+
+    Attributes:
+        odometry: Odometry so far.
+        judge: Judge of the estimates.
+        accepted: Last estimate that counts; None: there is none yet.
+    """
+
+    def __init__(self, name: str, limits: DriveLimits) -> None:
+        self.odometry = VehicleOdometry()
+        self.judge = body_judge(name, limits)
+        self.accepted: Timestamped[MotionEstimate] | None = None
+        self._seen: tuple[object, ...] = ()
+
+    def begin_anew(self) -> None:
+        """Let the next estimate be no motion, as after the vehicle was opened."""
+        self.odometry = self.odometry.rebased()
+        self.judge.forget()
+        self.accepted, self._seen = None, ()
+
+    def take(self, report: Timestamped[MotionEstimate] | None) -> bool:
+        """Take the newest estimate, also again; return True if it is new and counts."""
+        if report is None:
+            return False
+        motion = report.content
+        seen = report.time_s, motion, motion.place_s, motion.heading_s
+        if seen == self._seen:
+            return False
+        self._seen = seen
+        last = self.odometry.last
+        if last is not None and last.resets != motion.resets:
+            # The vehicle itself says that it has begun anew.
+            self.judge.forget()
+        verdict = self.judge.judge(motion, report.time_s)
+        if verdict is Verdict.REFUSED:
+            return False
+        if verdict is Verdict.ANEW:
+            self.odometry = self.odometry.rebased()
+        self.odometry = self.odometry.advanced(motion)
+        self.accepted = report
+        return True

@@ -11,16 +11,19 @@ import contextlib
 import logging
 import math
 from collections.abc import Callable, Mapping
+from dataclasses import asdict, dataclass
 
 from robosc_bridge.devices.interface import (
     CONSTANT,
     STANDSTILL,
+    UNDO_LIMIT_S,
     BatteryLevel,
     DriveLimits,
     DriveReading,
     MotorFault,
     Velocity,
     VelocitySource,
+    has_stopped,
 )
 from robosc_bridge.devices.kinematics import wheel_speeds, within_limits
 from robosc_bridge.devices.mavlink_link import (
@@ -32,8 +35,8 @@ from robosc_bridge.devices.mavlink_link import (
     acquire,
     release,
 )
-from robosc_bridge.devices.mavlink_odometry import VehicleOdometry, estimate
-from robosc_bridge.devices.mavlink_state import Timestamped, VehicleState
+from robosc_bridge.devices.mavlink_odometry import VehicleTracker, estimate
+from robosc_bridge.devices.mavlink_state import TEXT_LIMIT_S, Timestamped, VehicleState
 from robosc_bridge.devices.robots import Body
 from robosc_bridge.devices.wheel_following import FollowingMonitor
 from robosc_bridge.errors import (
@@ -41,6 +44,7 @@ from robosc_bridge.errors import (
     DeviceError,
     DeviceFaultError,
     DeviceSilentError,
+    StoppedError,
     WrongDeviceError,
 )
 from robosc_bridge.host import Host
@@ -81,6 +85,8 @@ _REST_LIMIT_S = 3.0
 _REST_M_S = 0.05
 _REST_RAD_S = 0.1
 _CLOSE_TRIALS = 1
+# Orders are carried out one after the other: a rover that is disarmed so long after an order to disarm stays it.
+_UNANSWERED_S = 2.0
 # Five times a second is asked for. A new velocity goes out at once, but no more than one each 16 ms in the long run,
 # and no more than one ahead of that, so that a slow radio is not filled: at 57600 baud a signed target takes 14 ms.
 _TARGET_S = 0.1
@@ -97,12 +103,26 @@ _LEVELS: Mapping[int, BatteryLevel] = {
     ChargeState.EMERGENCY: BatteryLevel.EMPTY,
     ChargeState.FAILED: BatteryLevel.EMPTY,
 }
+_WORSE = tuple(BatteryLevel)
 _LONG_TARGETS = (
     "the rover is armed; if the bridge or its line fails, it drives on for up to 3 s, until its target expires "
     "(docs/bridge-safety.md says what shortens that)"
 )
 
 _log = logging.getLogger(__name__)
+
+
+@dataclass
+class VehicleCounts(FrameCounts):
+    """Counts of the line to a vehicle, and of its reports.
+
+    Attributes:
+        implausible: Estimates of its motion that were refused, as no body moves like that.
+        begun_anew: Times that its estimate has begun from another place.
+    """
+
+    implausible: int = 0
+    begun_anew: int = 0
 
 
 class MavlinkRover:
@@ -122,6 +142,7 @@ class MavlinkRover:
 
     Attributes:
         limits: Limits of the drive base.
+        leftover: What the rover may still do after `close`; empty: nothing.
     """
 
     def __init__(
@@ -146,12 +167,15 @@ class MavlinkRover:
         self._motion_limit_s = motion_limit_s
         self._telemetry_s = telemetry_s
         self._link: VehicleLink | None = None
-        self._odometry = VehicleOdometry()
+        self._tracker = VehicleTracker(path, robot.limits)
         self._following = FollowingMonitor(_FOLLOWING_LIMIT_S)
         self._began_s = self._host.monotonic()
         self._restarts = 0
         self._is_torque_wanted = False
         self._is_torque_lost = False
+        # True from the first order to arm until the rover is known to be disarmed, or until it is known whether it is.
+        self._may_be_armed = self._is_uncertain = False
+        self.leftover = ""
         self._target = STANDSTILL
         self._target_s = -math.inf
         # Until when the radio has to do with the targets so far.
@@ -160,10 +184,11 @@ class MavlinkRover:
         self._source: VelocitySource = CONSTANT
 
     @property
-    def counters(self) -> FrameCounts:
+    def counters(self) -> VehicleCounts:
         """Health of the line since it was opened."""
-        link = self._link
-        return FrameCounts() if link is None else link.counts
+        link, judge = self._link, self._tracker.judge
+        counts = FrameCounts() if link is None else link.counts
+        return VehicleCounts(**asdict(counts), implausible=judge.refused, begun_anew=judge.begun_anew)
 
     def attend(self, source: VelocitySource) -> None:
         """Report to this source when a target was sent; no exchange takes long enough to ask it for a newer one."""
@@ -186,12 +211,15 @@ class MavlinkRover:
         try:
             self._is_torque_wanted = self._is_torque_lost = False
             self._target, self._target_s = STANDSTILL, -math.inf
-            self._odometry = self._odometry.rebased()
+            self._tracker.begin_anew()
             self._following.forget()
             self._find(self._link)
             self._restarts = self._link.state.restarts
             heartbeat = self._heartbeat(self._link.state)
             self._check_ours(heartbeat)
+            if self._may_be_armed:
+                self._must_undo()
+            self.leftover = ""
             self._leave_at_rest(heartbeat)
             for telemetry in _TELEMETRY:
                 self._link.request((telemetry,), _TELEMETRY_S.get(telemetry, self._telemetry_s))
@@ -211,26 +239,22 @@ class MavlinkRover:
             LineError: The line is gone.
             DeviceSilentError: The vehicle does not answer.
             DeviceFaultError: It refuses, with its reason, or another operator drives it.
+            StoppedError: A stop came meanwhile; it may be armed until this is called again to disarm it.
         """
         link = self._used_link
         self._is_torque_wanted = False
         heartbeat = self._heartbeat(link.state)
         if not is_on:
-            if not self._is_another_s(heartbeat):
+            if self._is_another_s(heartbeat):
+                self._may_be_armed = self._is_uncertain = False
+            elif heartbeat.is_armed:
                 self._leave_at_rest(heartbeat)
+            elif self._may_be_armed:
+                # An order to arm may still be on its way.
+                self._must_undo()
             return
         self._check_ours(heartbeat)
-        if heartbeat.mode != Mode.GUIDED:
-            self._command(MavCommand.SET_MODE, entering(Mode.GUIDED), "go to mode GUIDED")
-            self._must_show(lambda heartbeat: heartbeat.mode == Mode.GUIDED, "show mode GUIDED")
-        self._send_target(STANDSTILL)
-        if not self._heartbeat(link.state).is_armed:
-            self._command(MavCommand.ARM_DISARM, arming(True), "arm")
-            try:
-                self._must_show(lambda heartbeat: heartbeat.is_armed, "show that it is armed")
-            except DeviceError:
-                self._disarm(_CLOSE_TRIALS)
-                raise
+        self._begin(link, heartbeat)
         self._send_target(STANDSTILL)
         self._is_torque_wanted = True
         self._is_torque_lost = False
@@ -238,6 +262,36 @@ class MavlinkRover:
         if not self._is_warned:
             self._is_warned = True
             _log.warning("%s: %s", self._path, _LONG_TARGETS)
+
+    def _begin(self, link: VehicleLink, heartbeat: Heartbeat) -> None:
+        """Enter GUIDED and arm, as long as no stop comes."""
+        if heartbeat.mode != Mode.GUIDED:
+            self._command(MavCommand.SET_MODE, entering(Mode.GUIDED), "go to mode GUIDED", is_beginning=True)
+            self._must_show(lambda heartbeat: heartbeat.mode == Mode.GUIDED, "show mode GUIDED", is_beginning=True)
+        self._send_target(STANDSTILL)
+        if not self._heartbeat(link.state).is_armed:
+            self._require_no_stop()
+            self._may_be_armed = self._is_uncertain = True
+            try:
+                self._command(MavCommand.ARM_DISARM, arming(True), "arm", is_beginning=True)
+            except DeviceFaultError:
+                self._may_be_armed = self._is_uncertain = False
+                raise
+            try:
+                self._must_show(lambda heartbeat: heartbeat.is_armed, "show that it is armed", is_beginning=True)
+            except DeviceFaultError:
+                self._disarm(_CLOSE_TRIALS)
+                raise
+        self._may_be_armed, self._is_uncertain = True, False
+
+    def _require_no_stop(self) -> None:
+        """Raise if what has not begun must not begin any more.
+
+        Raises:
+            StoppedError: A stop came.
+        """
+        if has_stopped(self._source):
+            raise StoppedError(f"{self._path}: the rover is not armed, as a stop came meanwhile")
 
     def exchange(self, velocity: Velocity) -> DriveReading:
         """Send the velocity and our heartbeat when they are due, and return what has arrived; waits for nothing.
@@ -289,15 +343,75 @@ class MavlinkRover:
 
     def close(self) -> None:
         """Stop, disarm, and close the line; a vehicle that another operator drives is left alone."""
-        if self._link is not None and self._is_torque_wanted:
+        if self._link is not None and (self._is_torque_wanted or self._may_be_armed):
             self._is_torque_wanted = False
+            is_undone = False
             with contextlib.suppress(BridgeError):
-                heartbeat = self._heartbeat(self._link.state)
-                if heartbeat.is_armed and heartbeat.mode == Mode.GUIDED:
-                    self._send_target(STANDSTILL)
-                    self._comes_to_rest()
-                    self._disarm(_CLOSE_TRIALS)
+                is_undone = self._let_go()
+            self.leftover = (
+                ""
+                if is_undone
+                else f"{self._path}: the rover may be armed: it has not confirmed within "
+                f"{UNDO_LIMIT_S:g} s that it is disarmed; switch it off, or disarm it by its remote control"
+            )
         self._release()
+
+    def _let_go(self) -> bool:
+        """Stop and disarm; returns whether that is known, or another operator drives it."""
+        report = self._used_link.state.heartbeat
+        is_heard = report is not None and self._host.monotonic() - report.time_s <= HEARTBEAT_LIMIT_S
+        if report is not None and is_heard and self._is_another_s(report.content):
+            self._may_be_armed = self._is_uncertain = False
+            return True
+        self._send_target(STANDSTILL)
+        if is_heard:
+            self._comes_to_rest()
+        return self._undo()
+
+    def _must_undo(self) -> None:
+        """Disarm as `_undo`.
+
+        Raises:
+            DeviceSilentError: It is not known whether the rover is disarmed.
+        """
+        if not self._undo():
+            raise DeviceSilentError(f"{self._path}: the rover does not confirm that it is disarmed")
+
+    def _undo(self) -> bool:
+        """Disarm a rover that may be armed, or may become so by an order that is still on its way.
+
+        Returns:
+            Whether a heartbeat shows that it is disarmed, which came after the answer, or long enough after the order;
+            or whether another operator drives it.
+        """
+        link, began_s = self._used_link, self._host.monotonic()
+        end_s, is_forced, confirmation = began_s + UNDO_LIMIT_S, False, 0
+
+        def is_over(state: VehicleState) -> bool:
+            answer, report = state.answers.get(MavCommand.ARM_DISARM), state.heartbeat
+            if report is None or report.time_s <= began_s:
+                return False
+            if self._is_another_s(report.content):
+                return True
+            is_answered = answer is not None and began_s <= answer.time_s < report.time_s
+            is_late = report.time_s > began_s + _UNANSWERED_S
+            return (is_answered or is_late) and not report.content.is_armed
+
+        while (left_s := end_s - self._host.monotonic()) > 0.0:
+            state = link.state
+            if state.system is None or state.component is None:
+                return False
+            parameters = arming(False, is_forced=is_forced)
+            link.send(command(state.system, state.component, MavCommand.ARM_DISARM, confirmation, *parameters))
+            if self._waits(is_over, min(left_s, _ANSWER_LIMIT_S)):
+                self._may_be_armed = self._is_uncertain = False
+                return True
+            is_heard = self._host.monotonic() - link.state.heard_s <= _ANSWER_LIMIT_S
+            if not (is_heard or self._is_uncertain):
+                break
+            # Stopping is not refused: what a polite command does not reach, a forced one does.
+            is_forced, confirmation = True, confirmation + 1
+        return False
 
     def _release(self) -> None:
         link, self._link = self._link, None
@@ -343,7 +457,9 @@ class MavlinkRover:
         return report.content
 
     def _fresh(self, state: VehicleState) -> Timestamped[MotionEstimate] | None:
-        report = estimate(state)
+        """Return the last estimate that counts, if it is not too old."""
+        self._tracker.take(estimate(state))
+        report = self._tracker.accepted
         is_fresh = report is not None and self._host.monotonic() - report.time_s <= self._motion_limit_s
         return report if is_fresh else None
 
@@ -370,6 +486,7 @@ class MavlinkRover:
         except DeviceFaultError:
             self._command(MavCommand.ARM_DISARM, arming(False, is_forced=True), "disarm by force", trials)
         self._must_show(lambda heartbeat: not heartbeat.is_armed, "show that it is disarmed")
+        self._may_be_armed = self._is_uncertain = False
 
     def _comes_to_rest(self) -> bool:
         def is_at_rest(state: VehicleState) -> bool:
@@ -381,13 +498,22 @@ class MavlinkRover:
 
         return self._waits(is_at_rest, _REST_LIMIT_S)
 
-    def _command(self, number: MavCommand, parameters: tuple[float, ...], action: str, trials: int = _TRIALS) -> None:
-        """Send a command until it is answered.
+    def _command(
+        self,
+        number: MavCommand,
+        parameters: tuple[float, ...],
+        action: str,
+        trials: int = _TRIALS,
+        *,
+        is_beginning: bool = False,
+    ) -> None:
+        """Send a command until it is answered; one that begins something only as long as no stop comes.
 
         Raises:
             DeviceFaultError: It is refused.
             WrongDeviceError: The vehicle does not know it.
             DeviceSilentError: It is not answered.
+            StoppedError: A stop came; the command may have been carried out.
         """
         link = self._used_link
         began_s = self._host.monotonic()
@@ -395,13 +521,15 @@ class MavlinkRover:
             state = link.state
             if state.system is None or state.component is None:
                 break
+            if is_beginning:
+                self._require_no_stop()
             link.send(command(state.system, state.component, number, confirmation, *parameters))
 
             def is_answered(now: VehicleState) -> bool:
                 report = now.answers.get(number)
                 return report is not None and report.time_s >= began_s and report.content.result != Result.IN_PROGRESS
 
-            if self._waits(is_answered, _ANSWER_LIMIT_S):
+            if self._waits(is_answered, _ANSWER_LIMIT_S, is_beginning=is_beginning):
                 self._check_answer(link.state, number, began_s, action)
                 return
         raise DeviceSilentError(f"{self._path}: the rover does not answer the command to {action}")
@@ -413,30 +541,37 @@ class MavlinkRover:
         if result == Result.UNSUPPORTED:
             raise WrongDeviceError(f"{self._path}: the rover does not know how to {action}")
         name = Result(result).name.lower().replace("_", " ") if result in Result else f"result {result}"
-        # The reason comes as text, before the answer.
+        # The reason comes as text, before the answer; pieces of it may have been lost.
+        self._waits(lambda state: not state.at(self._host.monotonic()).is_text_awaited, TEXT_LIMIT_S)
         reasons = [
             report.content.text
-            for report in state.texts
+            for report in self._used_link.state.at_end().texts
             if report.time_s >= began_s and report.content.severity <= _WARNING and report.content.data
         ]
         reason = "; ".join(dict.fromkeys(reasons)) or "it gives no reason"
         raise DeviceFaultError(f"{self._path}: the rover does not {action} ({name}): {reason}")
 
-    def _must_show(self, is_so: Callable[[Heartbeat], bool], what: str) -> None:
+    def _must_show(self, is_so: Callable[[Heartbeat], bool], what: str, *, is_beginning: bool = False) -> None:
         """Wait for the heartbeat that shows it: an accepted command is not yet a done one.
 
         Raises:
             DeviceFaultError: It does not come.
+            StoppedError: A stop came before it.
         """
 
         def is_shown(state: VehicleState) -> bool:
             return state.heartbeat is not None and is_so(state.heartbeat.content)
 
-        if not self._waits(is_shown, _SHOWN_LIMIT_S):
+        if not self._waits(is_shown, _SHOWN_LIMIT_S, is_beginning=is_beginning):
             raise DeviceFaultError(f"{self._path}: the rover has accepted the command, but does not {what}")
 
-    def _waits(self, is_so: Callable[[VehicleState], bool], limit_s: float) -> bool:
-        """Wait for a state of the vehicle, with our heartbeat going on; returns whether it came in time."""
+    def _waits(self, is_so: Callable[[VehicleState], bool], limit_s: float, *, is_beginning: bool = False) -> bool:
+        """Wait for a state of the vehicle, with our heartbeat going on; returns whether it came in time.
+
+        Raises:
+            LineError: The line is gone.
+            StoppedError: Something is to begin, and a stop came.
+        """
         link = self._used_link
         end_s = self._host.monotonic() + limit_s
         while True:
@@ -444,6 +579,8 @@ class MavlinkRover:
             left_s = end_s - self._host.monotonic()
             if link.wait(is_so, max(min(left_s, _SLICE_S), 0.0)):
                 return True
+            if is_beginning:
+                self._require_no_stop()
             if left_s <= 0:
                 return False
 
@@ -464,9 +601,8 @@ class MavlinkRover:
         link.send(velocity_target(state.system, state.component, boot_ms, target.linear_m_s, target.angular_rad_s))
 
     def _reading(self, state: VehicleState, report: Timestamped[MotionEstimate], is_obeying: bool) -> DriveReading:
-        if report.content is not self._odometry.last:
-            self._odometry = self._odometry.advanced(report.content)
-        velocity = self._odometry.velocity
+        odometry = self._tracker.odometry
+        velocity = odometry.velocity
         wheels_m_s = wheel_speeds(velocity, self._robot.wheel_separation_m)
         faults = {MotorFault.TORQUE_LOST} if self._is_torque_lost else set()
         is_on = self._is_torque_wanted and is_obeying and not self._is_torque_lost
@@ -476,16 +612,22 @@ class MavlinkRover:
                 faults.add(MotorFault.BLOCKED)
         else:
             self._following.forget()
-        main, pack = state.battery, state.pack
+        batteries = [
+            found for found in (state.battery, *map(state.packs.get, sorted(state.packs))) if found is not None
+        ]
+        shares = [found.share for found in batteries if found.share is not None]
+        levels = [_LEVELS[found.state] for found in batteries if found.state in _LEVELS]
         return DriveReading(
             time_s=report.time_s,
-            pose=self._odometry.pose,
+            pose=odometry.pose,
             velocity=velocity,
             wheels_m_s=wheels_m_s,
             is_torque_on=is_on,
             faults=frozenset(faults),
-            battery_v=next((found.voltage_v for found in (main, pack) if found and found.voltage_v is not None), None),
-            battery_share=next((found.share for found in (main, pack) if found and found.share is not None), None),
-            battery_level=None if pack is None else _LEVELS.get(pack.state),
+            # That of the first battery; of charge and judgement, the worst counts.
+            battery_v=next((found.voltage_v for found in batteries if found.voltage_v is not None), None),
+            battery_share=min(shares, default=None),
+            battery_level=max(levels, key=_WORSE.index, default=None),
+            refused=self._tracker.judge.refused,
             imu={"angular_velocity_z": velocity.angular_rad_s},
         )

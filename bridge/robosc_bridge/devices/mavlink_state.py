@@ -1,6 +1,7 @@
 """State of a vehicle, as reported so far."""
 
-from collections.abc import Mapping
+import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 from robosc_bridge.protocol.mavlink_messages import (
@@ -18,10 +19,21 @@ from robosc_bridge.protocol.mavlink_messages import (
     Text,
 )
 
+TEXT_LIMIT_S = 1.0
+"""Longest time between two pieces of a long text; one that is not whole by then is shown as incomplete, in seconds."""
+
+INCOMPLETE = "[a part of this text is missing]"
+"""Words where pieces of a text are missing."""
+
 _KEPT_TEXTS = 8
 _MOST_CHUNKS = 20
+_MOST_UNFINISHED = 8
 # A vehicle's clock goes back when it starts anew; datagrams overtake each other by less.
 _OVERTAKEN_S = 2.0
+# It goes ahead of ours by no more than the time for which a line may hold its reports back.
+_HELD_BACK_S = 60.0
+# It counts milliseconds, and begins anew after 49.7 days.
+_CLOCK_S = 2**32 / 1000
 
 
 @dataclass(frozen=True, slots=True)
@@ -37,6 +49,37 @@ class Timestamped[Content]:
     content: Content
 
 
+@dataclass(frozen=True, slots=True)
+class _LongText:
+    """Pieces of a text of which some are still to come.
+
+    Attributes:
+        time_s: Time when the last of them came, in seconds.
+        pieces: Pieces that have come, by their numbers.
+    """
+
+    time_s: float
+    pieces: Mapping[int, Text]
+
+    def joined(self) -> Text:
+        """Return the text, with words where pieces are missing."""
+        found, expected = list[bytes](), 0
+        first = next(iter(self.pieces.values()))
+        for number in sorted(self.pieces):
+            if number != expected:
+                found.append(f"{' ' if found else ''}{INCOMPLETE} ".encode())
+            found.append(self.pieces[number].data)
+            expected = number + 1
+        if not self.pieces[max(self.pieces)].is_last:
+            found.append(f" {INCOMPLETE}".encode())
+        return replace(first, data=b"".join(found), chunk=0)
+
+    @property
+    def is_whole(self) -> bool:
+        """True if no piece is missing."""
+        return len(self.pieces) == max(self.pieces) + 1 and self.pieces[max(self.pieces)].is_last
+
+
 @dataclass(frozen=True)
 class VehicleState:
     """State of a vehicle after some messages; `after` returns the state after the next.
@@ -50,11 +93,12 @@ class VehicleState:
         position: The last one.
         motion: The last one; some vehicles report only the two before.
         battery: Battery in the summary that every vehicle sends.
-        pack: Battery in the battery's own message.
+        packs: Batteries in their own messages, by number.
         answers: Answers to commands, by command.
-        texts: The last ones that were complete.
-        boot_s: Time of the vehicle's clock, in seconds.
-        restarts: Number of times that this clock went back.
+        texts: The last ones, joined; those that were not whole in time say so.
+        boot_s: Time of the vehicle's clock, in seconds; it begins anew after 49.7 days.
+        boot_heard_s: Time when it was heard, in seconds.
+        restarts: Number of times that this clock has begun anew before that.
     """
 
     system: int | None = None
@@ -65,12 +109,13 @@ class VehicleState:
     position: Timestamped[LocalPosition] | None = None
     motion: Timestamped[MotionEstimate] | None = None
     battery: BatteryState | None = None
-    pack: BatteryState | None = None
+    packs: Mapping[int, BatteryState] = field(default_factory=dict)
     answers: Mapping[int, Timestamped[Answer]] = field(default_factory=dict)
     texts: tuple[Timestamped[Text], ...] = ()
     boot_s: float = 0.0
+    boot_heard_s: float | None = None
     restarts: int = 0
-    _chunks: tuple[Text, ...] = ()
+    _unfinished: Mapping[int, _LongText] = field(default_factory=dict)
 
     def is_vehicle(self, message: Message) -> bool:
         """Return True if a message is of the vehicle's autopilot."""
@@ -88,19 +133,42 @@ class VehicleState:
             return self._after_new_heartbeat(message, message.content, time_s)
         if not self.is_vehicle(message):
             return self
+        return self.at(time_s)._after_own(message, time_s, own)
+
+    def at(self, time_s: float) -> "VehicleState":
+        """Return the state at a time, in seconds: texts whose missing pieces no longer come are incomplete ones."""
+        late = [number for number, text in self._unfinished.items() if time_s - text.time_s > TEXT_LIMIT_S]
+        return self._ended(late) if late else self
+
+    def at_end(self) -> "VehicleState":
+        """Return the state when nothing more comes."""
+        return self._ended(list(self._unfinished))
+
+    @property
+    def heard_s(self) -> float:
+        """Time when the vehicle was heard last, in seconds; minus infinity: it was not."""
+        reports = (self.heartbeat, self.attitude, self.position, self.motion)
+        return max((report.time_s for report in reports if report is not None), default=-math.inf)
+
+    @property
+    def is_text_awaited(self) -> bool:
+        """True if pieces of a text are still to come."""
+        return bool(self._unfinished)
+
+    def _after_own(self, message: Message, time_s: float, own: tuple[int, int]) -> "VehicleState":
         match message.content:
             case Heartbeat() as heartbeat:
                 return replace(self, heartbeat=Timestamped(time_s, heartbeat))
             case Attitude() as attitude:
-                return replace(self._at(attitude.boot_s), attitude=Timestamped(time_s, attitude))
+                return replace(self._at(attitude.boot_s, time_s), attitude=Timestamped(time_s, attitude))
             case LocalPosition() as position:
-                return replace(self._at(position.boot_s), position=Timestamped(time_s, position))
+                return replace(self._at(position.boot_s, time_s), position=Timestamped(time_s, position))
             case MotionEstimate() as motion:
                 return replace(self, motion=Timestamped(time_s, motion))
             case BatteryState(is_main=True) as battery:
                 return replace(self, battery=battery)
             case BatteryState() as battery:
-                return replace(self, pack=battery)
+                return replace(self, packs={**self.packs, battery.number: battery})
             case Answer() as answer if _is_for(answer, own):
                 return replace(self, answers={**self.answers, answer.command: Timestamped(time_s, answer)})
             case Text() as text:
@@ -117,20 +185,38 @@ class VehicleState:
             return replace(self, stranger=heartbeat)
         return self
 
-    def _at(self, boot_s: float) -> "VehicleState":
-        has_restarted = boot_s < self.boot_s - _OVERTAKEN_S
-        return replace(self, boot_s=boot_s, restarts=self.restarts + has_restarted)
+    def _at(self, boot_s: float, time_s: float) -> "VehicleState":
+        has_restarted = False
+        if self.boot_heard_s is not None:
+            ahead_s = (boot_s - self.boot_s + _CLOCK_S / 2) % _CLOCK_S - _CLOCK_S / 2
+            has_restarted = not -_OVERTAKEN_S <= ahead_s <= time_s - self.boot_heard_s + _HELD_BACK_S
+        return replace(self, boot_s=boot_s, boot_heard_s=time_s, restarts=self.restarts + has_restarted)
 
     def _after_text(self, text: Text, time_s: float) -> "VehicleState":
-        chunks: tuple[Text, ...] = ()
-        if text.number:
-            if text.chunk and self._chunks and self._chunks[-1].number == text.number:
-                chunks = self._chunks[: _MOST_CHUNKS - 1]
-            chunks = (*chunks, text)
-            if not text.is_last:
-                return replace(self, _chunks=chunks)
-            text = replace(text, data=b"".join(chunk.data for chunk in chunks))
-        return replace(self, texts=(*self.texts, Timestamped(time_s, text))[-_KEPT_TEXTS:], _chunks=())
+        if not text.number:
+            return self._with_texts([Timestamped(time_s, text)])
+        begun = self._unfinished.get(text.number)
+        if begun is not None and begun.pieces.get(text.chunk) == text:
+            return self
+        # A number that is used again: the text before it does not go on.
+        is_next = begun is not None and text.chunk not in begun.pieces and len(begun.pieces) < _MOST_CHUNKS
+        state = self if is_next or begun is None else self._ended([text.number])
+        pieces = dict(begun.pieces) if begun is not None and is_next else {}
+        pieces[text.chunk] = text
+        unfinished = {**state._unfinished, text.number: _LongText(time_s, pieces)}
+        state = replace(state, _unfinished=unfinished)
+        if unfinished[text.number].is_whole:
+            return state._ended([text.number])
+        return state._ended(list(unfinished)[:-_MOST_UNFINISHED])
+
+    def _ended(self, numbers: Sequence[int]) -> "VehicleState":
+        """Return the state with these long texts as they are."""
+        ended = [Timestamped(self._unfinished[number].time_s, self._unfinished[number].joined()) for number in numbers]
+        left = {number: text for number, text in self._unfinished.items() if number not in numbers}
+        return replace(self._with_texts(ended), _unfinished=left)
+
+    def _with_texts(self, texts: Sequence[Timestamped[Text]]) -> "VehicleState":
+        return replace(self, texts=(*self.texts, *texts)[-_KEPT_TEXTS:])
 
 
 def _is_for(answer: Answer, own: tuple[int, int]) -> bool:

@@ -30,21 +30,37 @@ from dataclasses import replace
 from typing import Literal, NoReturn
 
 from robosc_bridge.devices.board_yaw import UPTIME_MODULUS, BoardYaw
-from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, BusCounters, DynamixelBus, exchange_limit_s
+from robosc_bridge.devices.dynamixel_bus import (
+    ANSWER_LIMIT_S,
+    SETTLING_LENGTHS,
+    BusCounters,
+    DynamixelBus,
+    exchange_limit_s,
+)
 from robosc_bridge.devices.interface import (
     CONSTANT,
     STANDSTILL,
+    UNDO_LIMIT_S,
     DriveLimits,
     DriveReading,
     MotorFault,
     Velocity,
     VelocitySource,
+    has_stopped,
 )
 from robosc_bridge.devices.kinematics import body_velocity, opencr_words, wheel_speeds
 from robosc_bridge.devices.odometry import Odometry, velocity_variances
+from robosc_bridge.devices.plausibility import Verdict, WheelCounts, measurable, wheel_judge
 from robosc_bridge.devices.robots import Robot
 from robosc_bridge.devices.wheel_following import ExcessMonitor, FollowingMonitor
-from robosc_bridge.errors import BridgeError, DeviceError, DeviceFaultError, DeviceSilentError, WrongDeviceError
+from robosc_bridge.errors import (
+    DeviceError,
+    DeviceFaultError,
+    DeviceSilentError,
+    LineError,
+    StoppedError,
+    WrongDeviceError,
+)
 from robosc_bridge.host import Host, Port
 from robosc_bridge.protocol import opencr
 from robosc_bridge.protocol.opencr import Block, decode_block, encode_command
@@ -71,6 +87,10 @@ _POLL_S = 0.01
 # as restarted.
 _LEAD_S = 0.7
 _LAG_S = 1.0
+# Reads of the block in an exchange: what cannot be is asked for again, and a third time in other parts.
+_READS = 3
+# Two refreshes.
+_COUNTS_LAG_S = 0.04
 
 
 _log = logging.getLogger(__name__)
@@ -89,6 +109,7 @@ class OpenCrBase:
 
     Attributes:
         limits: Limits of the drive base.
+        leftover: What the motors may still do after `close`; empty: nothing.
     """
 
     def __init__(
@@ -101,7 +122,8 @@ class OpenCrBase:
         host: Host = SYSTEM_HOST,
     ) -> None:
         # None where the heading is that of the wheels alone.
-        self._yaw = BoardYaw() if heading == "fused" else None
+        self._yaw = BoardYaw(path) if heading == "fused" else None
+        self._judge = wheel_judge(path, _COUNTS_LAG_S)
         self.limits: DriveLimits = robot.limits(robot.motor.velocity_limit_raw)
         self._path = path
         self._robot = robot
@@ -121,10 +143,15 @@ class OpenCrBase:
         self._source: VelocitySource = CONSTANT
         # The last command.
         self._words = (0, 0)
-        # The uptime in the last block, and when that was asked for and received.
+        # Time of the board since it was opened; the uptime in the last block, and when that was asked for and received.
+        self._board_s = 0.0
         self._uptime: tuple[int, float, float] | None = None
         self._is_torque_wanted = False
         self._is_torque_lost = False
+        # True from the first order to switch torque on until both motors are known to have none, or until it is known
+        # whether they have.
+        self._may_hold = self._is_uncertain = False
+        self.leftover = ""
         # Exchanges in a row without an answer, and what was so when the first of them began.
         self._silent = 0
         self._late = 0
@@ -136,7 +163,9 @@ class OpenCrBase:
     def counters(self) -> BusCounters:
         """Health of the line since it was opened."""
         bus = self._bus
-        return BusCounters() if bus is None else bus.counters
+        if bus is None:
+            return BusCounters()
+        return replace(bus.counters, implausible=self._refused, begun_anew=self._begun_anew)
 
     def attend(self, source: VelocitySource) -> None:
         """Command newer velocities of this source from now on, also during an exchange."""
@@ -164,8 +193,8 @@ class OpenCrBase:
             self._line = line
             self._bus = DynamixelBus(line, lambda device: f"{self._path}: OpenCR", self._answer_limit_s, self._host)
             self._uptime = None
-            if self._yaw is not None:
-                self._yaw.forget()
+            self._judge = wheel_judge(self._path, _COUNTS_LAG_S)
+            self._yaw = None if self._yaw is None else BoardYaw(self._path)
             self._is_torque_wanted = self._is_torque_lost = False
             self._odometry = self._odometry.rebased()
             self._following.forget()
@@ -237,6 +266,7 @@ class OpenCrBase:
             LineError: The line is gone.
             DeviceSilentError: The board does not answer.
             DeviceFaultError: A motor does not hold.
+            StoppedError: A stop came meanwhile.
             DeviceError: The wheels do not come to rest.
         """
         self._is_torque_wanted = False
@@ -355,19 +385,53 @@ class OpenCrBase:
 
     def close(self) -> None:
         """Stop the wheels, switch torque off, and close the line."""
-        if self._bus is not None and self._is_slow:
-            self._is_torque_wanted = False
-            with contextlib.suppress(BridgeError):
-                # No answer is awaited: the wheels have stopped when the board comes to the second packet.
-                self._bus.write_unanswered(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
-                self._bus.write_unanswered(opencr.DEVICE, opencr.TORQUE, b"\0")
-        elif self._bus is not None:
-            self._is_torque_wanted = False
-            with contextlib.suppress(BridgeError):
-                self._comes_to_rest()
-            with contextlib.suppress(BridgeError):
-                self._switch_torque(False)
+        bus, self._is_torque_wanted = self._bus, False
+        if bus is not None:
+            with contextlib.suppress(LineError):
+                self._let_go(bus)
+            self.leftover = (
+                f"{self._path}: the wheel motors may hold: OpenCR has not confirmed that torque is off; switch the "
+                "robot off"
+                if self._may_hold
+                else ""
+            )
         self._release()
+
+    def _let_go(self, bus: DynamixelBus) -> None:
+        """Switch torque off; after a stop again and again for a time, where that is of use.
+
+        Raises:
+            LineError: The line is gone.
+        """
+        end_s = self._host.monotonic() + UNDO_LIMIT_S
+        while True:
+            began_s = self._host.monotonic()
+            if self._lets_go(bus) or not self._may_hold or not has_stopped(self._source):
+                return
+            is_heard = bus.received_s > began_s
+            if not (is_heard or self._is_uncertain) or self._host.monotonic() > end_s:
+                return
+            self._host.sleep(_POLL_S)
+
+    def _lets_go(self, bus: DynamixelBus) -> bool:
+        """Stop the wheels and switch torque off; returns whether that is known.
+
+        Raises:
+            LineError: The line is gone.
+        """
+        try:
+            if self._is_slow:
+                # No answer is awaited: the wheels have stopped when the board comes to the second packet.
+                bus.write_unanswered(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
+                bus.write_unanswered(opencr.DEVICE, opencr.TORQUE, b"\0")
+                self._host.sleep(_SLOW_LIMIT_S)
+                return False
+            with contextlib.suppress(DeviceError):
+                self._comes_to_rest()
+            self._switch_torque(False)
+        except DeviceError:
+            return False
+        return True
 
     def _release(self) -> None:
         if self._line is not None:
@@ -438,10 +502,17 @@ class OpenCrBase:
         return self._cycles_until(lambda block: max(map(abs, block.velocities_raw)) <= _REST_RAW, _REST_LIMIT_S)
 
     def _switch_torque(self, is_on: bool) -> None:
+        if is_on:
+            if has_stopped(self._source):
+                raise StoppedError(f"{self._path}: torque is not switched on, as a stop came meanwhile")
+            self._may_hold = self._is_uncertain = True
         self._write_torque(is_on)
         if not self._cycles_until(lambda block: block.is_torque_on == is_on, _TORQUE_LIMIT_S):
             done = "hold" if is_on else "let go"
             raise DeviceFaultError(f"{self._path}: a wheel motor does not {done}; switch the robot off and on")
+        self._is_uncertain = False
+        if not is_on:
+            self._may_hold, self.leftover = False, ""
 
     def _write_torque(self, is_on: bool) -> None:
         bus = self._used_bus
@@ -470,10 +541,70 @@ class OpenCrBase:
             self._command(velocity, sent)
         self._heartbeat = (self._heartbeat + 1) % 256
         bus.write(opencr.DEVICE, opencr.HEARTBEAT, bytes((self._heartbeat,)))
-        asked_s = self._host.monotonic()
-        block = decode_block(bus.read(opencr.DEVICE, opencr.BLOCK_ADDRESS, opencr.BLOCK_LENGTH).data)
-        self._check_uptime(block.uptime_ms, asked_s)
-        return block
+        return self._block(bus)
+
+    def _block(self, bus: DynamixelBus) -> Block:
+        """Read everything; what cannot be is asked for again.
+
+        Raises:
+            DeviceSilentError: Nothing that can be has come.
+        """
+        spoilt: int | None = None
+        for trial in range(_READS):
+            is_last = trial == _READS - 1
+            asked_s = self._host.monotonic()
+            data = self._data(bus, spoilt if is_last else None)
+            problem = opencr.impossibility(data)
+            if problem:
+                spoilt = opencr.spoilt_from(data)
+                self._judge.refuse(problem, self._board_s)
+                continue
+            block = decode_block(data)
+            passed_s, problem = self._passed_s(block.uptime_ms, asked_s)
+            if problem:
+                if trial > 0:
+                    self._give_up(problem)
+                self._judge.refuse(problem, self._board_s)
+            elif self._counts(block, self._board_s + passed_s):
+                self._board_s += passed_s
+                self._uptime = block.uptime_ms, asked_s, bus.received_s
+                return block
+            else:
+                problem = "; ".join(filter(None, self._judge.excess))
+            if trial > 0:
+                break
+        raise DeviceSilentError(f"{self._path}: OpenCR does not answer with what can be: {problem}")
+
+    def _data(self, bus: DynamixelBus, spoilt: int | None) -> bytes:
+        """Read the block, in two parts if its firmware spoils what follows an index, where an item begins."""
+        address, length = opencr.BLOCK_ADDRESS, opencr.BLOCK_LENGTH
+        if spoilt is None or address + spoilt not in opencr.MOTOR_ITEMS:
+            return bus.read(opencr.DEVICE, address, length).data
+        # The last bytes are of no use here.
+        rest = next(count for count in range(length - spoilt, 0, -1) if count not in SETTLING_LENGTHS)
+        begin = bus.read(opencr.DEVICE, address, spoilt).data
+        return (begin + bus.read(opencr.DEVICE, address + spoilt, rest).data).ljust(length, b"\0")
+
+    def _counts(self, block: Block, time_s: float) -> bool:
+        """Return True if the wheels can have got there."""
+        counts = WheelCounts(block.ticks, block.velocities_raw)
+        verdict = self._judge.judge(counts, time_s)
+        if verdict is Verdict.REFUSED and not block.is_torque_on and len(self._judge.excess) == len(block.ticks):
+            # The firmware does not switch torque on again: only now a motor may have restarted.
+            self._judge.begin_anew(counts, time_s)
+            verdict = Verdict.ANEW
+        if verdict is Verdict.ANEW:
+            is_left, is_right = map(bool, self._judge.excess)
+            self._odometry = self._odometry.rebased(is_left, is_right)
+        return verdict is not Verdict.REFUSED
+
+    @property
+    def _refused(self) -> int:
+        return self._judge.refused + (0 if self._yaw is None else self._yaw.judge.refused)
+
+    @property
+    def _begun_anew(self) -> int:
+        return self._judge.begun_anew + (0 if self._yaw is None else self._yaw.judge.begun_anew)
 
     def _command(self, velocity: Velocity, sent: Callable[[], None] | None = None) -> None:
         self._words = self._words_of(velocity)
@@ -492,21 +623,22 @@ class OpenCrBase:
             return 0, 0
         return opencr_words(velocity, self.limits, self._robot.wheel_separation_m)
 
-    def _check_uptime(self, uptime_ms: int, asked_s: float) -> None:
-        received_s = self._used_bus.received_s
-        if self._uptime is not None:
-            before_ms, before_asked_s, before_received_s = self._uptime
-            half = UPTIME_MODULUS // 2
-            passed_s = ((uptime_ms - before_ms + half) % UPTIME_MODULUS - half) / 1000
-            if passed_s < max(0.0, asked_s - before_received_s - _LAG_S):
-                self._give_up("OpenCR has restarted")
-            if passed_s > received_s - before_asked_s + _LEAD_S:
-                self._give_up("the computer stood still or OpenCR has restarted")
-        self._uptime = uptime_ms, asked_s, received_s
+    def _passed_s(self, uptime_ms: int, asked_s: float) -> tuple[float, str]:
+        """Return the time of the board since the last block, and what is wrong with it; empty: nothing."""
+        if self._uptime is None:
+            return 0.0, ""
+        before_ms, before_asked_s, before_received_s = self._uptime
+        half = UPTIME_MODULUS // 2
+        passed_s = ((uptime_ms - before_ms + half) % UPTIME_MODULUS - half) / 1000
+        if passed_s < max(0.0, asked_s - before_received_s - _LAG_S):
+            return passed_s, "OpenCR has restarted"
+        if passed_s > self._used_bus.received_s - before_asked_s + _LEAD_S:
+            return passed_s, "the computer stood still or OpenCR has restarted"
+        return passed_s, ""
 
     def _give_up(self, problem: str) -> NoReturn:
         # The board switches torque on by itself when it starts, and its motors count anew.
-        self._is_torque_wanted = False
+        self._is_torque_wanted, self._may_hold = False, True
         self._used_bus.write_unanswered(opencr.DEVICE, opencr.COMMAND, encode_command(0, 0))
         raise DeviceError(f"{self._path}: {problem}; it must be opened again")
 
@@ -517,13 +649,15 @@ class OpenCrBase:
 
     def _reading(self, block: Block, faults: frozenset[MotorFault]) -> DriveReading:
         time_s = self._used_bus.received_s
-        if not block.is_torque_on:
-            # The firmware does not switch torque on again: only now a motor may have restarted.
-            self._odometry = self._odometry.rebased(*self._odometry.jumps(*block.ticks))
         self._odometry = self._odometry.advanced(*block.ticks, None if self._yaw is None else self._yaw.rotation(block))
         left_m_s, right_m_s = (raw * self._robot.raw_m_s for raw in block.velocities_raw)
         # Below this, the board no longer refreshes the share.
         is_empty = block.battery_v < self._robot.battery.empty_v
+        imu = measurable(block.motion)
+        if len(imu) < len(block.motion):
+            self._judge.refuse(
+                f"it measures more than it can: {sorted(block.motion.keys() - imu.keys())}", self._board_s
+            )
         return DriveReading(
             time_s=time_s,
             pose=self._odometry.pose,
@@ -534,9 +668,10 @@ class OpenCrBase:
             battery_v=block.battery_v,
             battery_share=0.0 if is_empty else block.battery_share,
             buttons=block.buttons,
-            imu=block.motion,
+            imu=imu,
             wheels_m=self._odometry.wheels_m,
             wheel_radius_m=self._robot.wheel_radius_m,
+            refused=self._refused,
             pose_covariance=self._odometry.covariance,
             velocity_variances=velocity_variances(
                 left_m_s, right_m_s, self._robot.raw_m_s, self._robot.wheel_separation_m

@@ -1,6 +1,6 @@
 """The two wheel servos on their bus, as one unit that confirms its commands."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
 from robosc_bridge.devices.dynamixel_bus import DynamixelBus, RefusedError
@@ -102,12 +102,13 @@ class ServoPair:
             self._bus.write(motor, servo.LED, _OURS)
             self.read_hardware(motor)
 
-    def arm(self, acceleration_raw: int, watchdog: int) -> None:
+    def arm(self, acceleration_raw: int, watchdog: int, begin: Callable[[], None]) -> None:
         """Switch torque on, from a standstill, and then the bus watchdogs, and check each of them.
 
         Args:
             acceleration_raw: Profile acceleration.
             watchdog: In units of `servo.WATCHDOG_S`.
+            begin: Function that is called just before torque goes on, and that may raise.
 
         Raises:
             LineError: The line is gone.
@@ -130,6 +131,7 @@ class ServoPair:
             self._bus.write(motor, servo.PROFILE_ACCELERATION, acceleration_raw.to_bytes(4, "little"))
             self._bus.write(motor, servo.GOAL_VELOCITY, encode_velocity(0))
             self._bus.write(motor, servo.LED, _OURS)
+        begin()
         self._write_both(servo.TORQUE, 1, "does not hold")
         self._write_both(servo.BUS_WATCHDOG, watchdog, "does not arm its bus watchdog")
 

@@ -24,8 +24,7 @@ POINTS_PER_FRAME = 6
 PROOF_FRAMES = 16
 """A rule that this many frames in a row have kept is one: by chance, two equal bytes come so once in 2**128 times."""
 
-# Limits of the sensor's data sheet, and of ranges in its official driver.
-_MIN_MM = 120
+# Limit of the sensor's data sheet, and of ranges in its official driver.
 _MAX_MM = 3500
 _HEADER = 0xFA
 _FIRST_INDEX = 0xA0
@@ -115,7 +114,8 @@ def points(frame: Frame) -> Points:
     return Points(
         _COUNTED_DEG[frame.index],
         _ANGLES_DEG[frame.index],
-        tuple([mm / 1000 if _MIN_MM <= mm <= _MAX_MM else math.nan for mm in frame.distances_mm]),
+        # Nearer than the sensor is made for, it is inexact, and something is there all the same.
+        tuple([mm / 1000 if 0 < mm <= _MAX_MM else math.nan for mm in frame.distances_mm]),
         frame.intensities,
         revolutions_per_s(frame.speed),
         frame.index == FRAMES_PER_TURN - 1,

@@ -19,8 +19,7 @@ STOP = bytes.fromhex("aa55f50a")
 MOST_SAMPLES = 50
 """Twice as many as a frame was ever seen to have: a false header holds the frames behind it up no longer than two."""
 
-# Limits of the sensor's data sheet.
-_MIN_MM = 50
+# Limit of the sensor's data sheet. Nearer than its least range, it is inexact, and something is there all the same.
 _MAX_MM = 12_000
 _HEADER = b"\xaa\x55"
 _SAMPLES = 10
@@ -127,7 +126,7 @@ def points(frame: Frame) -> Points:
         tuple(
             [
                 mm / 1000
-                if _WEAK_MM < mm <= _MAX_MM or (_MIN_MM <= mm <= _WEAK_MM and intensity > _WEAK_INTENSITY)
+                if _WEAK_MM < mm <= _MAX_MM or (0 < mm <= _WEAK_MM and intensity > _WEAK_INTENSITY)
                 else math.nan
                 for mm, intensity in zip(frame.distances_mm, frame.intensities, strict=True)
             ]

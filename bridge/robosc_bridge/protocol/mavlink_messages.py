@@ -6,7 +6,7 @@ mavlink.io (common messages) and ArduPilot Rover (`GCS_MAVLink_Rover.cpp`, `mode
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from enum import IntEnum
 from typing import Any
 
@@ -39,6 +39,8 @@ VELOCITY_AND_TURN_RATE: int = (
 FORCE = 21196
 UNKNOWN = 65535
 CHUNK = 50
+# Signal qualities of a distance: 0 is unknown, the others are shares.
+_INVALID_SIGNAL = 1
 
 
 class Mode(IntEnum):
@@ -164,6 +166,8 @@ class MotionEstimate:
         linear_m_s: Of the body, forward.
         angular_rad_s: Of the body, counter-clockwise.
         resets: Counts how often the estimate has jumped.
+        place_s: Time of the place by the vehicle's clock, in seconds.
+        heading_s: Time of the heading, likewise.
     """
 
     x_m: float
@@ -172,6 +176,8 @@ class MotionEstimate:
     linear_m_s: float
     angular_rad_s: float
     resets: int = 0
+    place_s: float = field(default=0.0, compare=False)
+    heading_s: float = field(default=0.0, compare=False)
 
 
 class ChargeState(IntEnum):
@@ -189,19 +195,21 @@ class ChargeState(IntEnum):
 
 @dataclass(frozen=True, slots=True)
 class BatteryState:
-    """State of the first battery; None: not reported.
+    """State of a battery; None: not reported.
 
     Attributes:
-        is_main: True if it is the summary that every vehicle sends.
+        is_main: True if it is the summary that every vehicle sends, which is about the first battery.
         voltage_v: Voltage of the whole pack.
         share: Charge, 0 to 1.
         state: Judgement of the vehicle on it, one of `ChargeState` if it is known.
+        number: Number of the battery.
     """
 
     is_main: bool
     voltage_v: float | None
     share: float | None
     state: int = ChargeState.UNDEFINED
+    number: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -246,12 +254,14 @@ class ObstacleRing:
     """Distances around, clockwise.
 
     Attributes:
-        distances_cm: Distance of each sector: `most_cm` + 1: nothing there; 65535: unknown.
+        distances_cm: Distance of each sector: 0: something practically touches; `most_cm` + 1: nothing there; 65535:
+            unknown.
         increment_deg: Angle between sectors; negative: counter-clockwise.
         offset_deg: Angle of the middle of the first one, clockwise.
         least_cm: Shortest that is valid.
         most_cm: Longest.
         is_body_fixed: True if counted from the front; else from north.
+        kind: Kind of the sensor (MAV_DISTANCE_SENSOR).
     """
 
     distances_cm: tuple[int, ...]
@@ -260,6 +270,7 @@ class ObstacleRing:
     least_cm: int
     most_cm: int
     is_body_fixed: bool
+    kind: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -269,10 +280,12 @@ class SectorDistance:
     Attributes:
         orientation: Direction: 0 ahead, and on clockwise in eighths of a revolution, as ArduPilot has it; others are no
             such direction.
-        distance_cm: Measured distance.
+        distance_cm: Measured distance; below the shortest one: something is nearer than it can measure.
         least_cm: Shortest that is valid.
         most_cm: Longest.
         width_deg: Width of what it sees; 0: unknown.
+        number: Number of the sensor among those of its component.
+        is_valid: False if the sensor itself marks its signal as invalid.
     """
 
     orientation: int
@@ -280,6 +293,8 @@ class SectorDistance:
     least_cm: int
     most_cm: int
     width_deg: float
+    number: int = 0
+    is_valid: bool = True
 
 
 type Content = (
@@ -329,8 +344,13 @@ def _odometry(raw: Any) -> MotionEstimate | None:
     if raw.frame_id not in (LOCAL_NED, LOCAL_FRD) or raw.child_frame_id != BODY_FRD:
         return None
     w, x, y, z, *_ = _finite(*raw.q, raw.x, raw.y, raw.vx, raw.yawspeed)
+    if not 0.9 < w * w + x * x + y * y + z * z < 1.1:
+        raise ValueError("no attitude")
+    if raw.quality < 0:
+        raise ValueError("the odometry has failed")
     yaw_rad = math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
-    return MotionEstimate(raw.x, -raw.y, -yaw_rad, raw.vx, -raw.yawspeed, raw.reset_counter)
+    time_s = raw.time_usec / 1e6
+    return MotionEstimate(raw.x, -raw.y, -yaw_rad, raw.vx, -raw.yawspeed, raw.reset_counter, time_s, time_s)
 
 
 def _share(percent: int) -> float | None:
@@ -342,12 +362,11 @@ def _sys_status(raw: Any) -> BatteryState:
     return BatteryState(True, voltage_v, _share(raw.battery_remaining))
 
 
-def _battery_status(raw: Any) -> BatteryState | None:
-    if raw.id != 0:
-        return None
-    cells_mv = [cell_mv for cell_mv in raw.voltages if cell_mv != UNKNOWN]
+def _battery_status(raw: Any) -> BatteryState:
+    # Of the cells beyond ten, 0 says that there is none.
+    cells_mv = [cell_mv for cell_mv in (*raw.voltages, *raw.voltages_ext) if cell_mv != UNKNOWN]
     voltage_v = sum(cells_mv) / 1000 if any(cells_mv) else None
-    return BatteryState(False, voltage_v, _share(raw.battery_remaining), raw.charge_state)
+    return BatteryState(False, voltage_v, _share(raw.battery_remaining), raw.charge_state, raw.id)
 
 
 def _text(raw: Any) -> Text:
@@ -366,13 +385,23 @@ def _obstacle_ring(raw: Any) -> ObstacleRing:
         raise ValueError("no such angle")
     is_body_fixed = raw.frame == BODY_FRD
     distances_cm = tuple(raw.distances)
-    return ObstacleRing(distances_cm, increment_deg, offset_deg, raw.min_distance, raw.max_distance, is_body_fixed)
+    return ObstacleRing(
+        distances_cm, increment_deg, offset_deg, raw.min_distance, raw.max_distance, is_body_fixed, raw.sensor_type
+    )
 
 
 def _distance(raw: Any) -> SectorDistance:
     (width_rad,) = _finite(raw.horizontal_fov)
     width_deg = min(max(math.degrees(width_rad), 0.0), 360.0)
-    return SectorDistance(raw.orientation, raw.current_distance, raw.min_distance, raw.max_distance, width_deg)
+    return SectorDistance(
+        raw.orientation,
+        raw.current_distance,
+        raw.min_distance,
+        raw.max_distance,
+        width_deg,
+        raw.id,
+        raw.signal_quality != _INVALID_SIGNAL,
+    )
 
 
 READERS: Mapping[int, Callable[[Any], Content]] = {

@@ -25,7 +25,7 @@ class Sector:
     Attributes:
         middle_deg: Counter-clockwise from the front, within [0, 360).
         width_deg: Of all of it.
-        range_m: NaN: nothing is there, or it is unknown.
+        range_m: 0: something is nearer than its sensor measures; NaN: nothing is there, or it is unknown.
         min_m: Shortest distance that its sensor measures.
         max_m: Longest.
     """
@@ -38,8 +38,10 @@ class Sector:
 
 
 def _range_m(distance_cm: int, least_cm: int, most_cm: int) -> float:
-    is_valid = distance_cm != _UNKNOWN_CM and distance_cm > 0 and least_cm <= distance_cm <= most_cm
-    return distance_cm / 100 if is_valid else math.nan
+    if distance_cm == _UNKNOWN_CM or distance_cm > most_cm:
+        return math.nan
+    # What is below the shortest distance was seen, and nearer than it can be measured.
+    return distance_cm / 100 if distance_cm >= least_cm else 0.0
 
 
 def ring_sectors(ring: ObstacleRing, heading_rad: float | None) -> tuple[Sector, ...] | None:
@@ -76,7 +78,9 @@ def sensor_sector(distance: SectorDistance) -> Sector | None:
     """The sector of a single sensor; None: it does not look around."""
     if distance.orientation >= _EIGHTHS:
         return None
-    range_m = _range_m(distance.distance_cm, distance.least_cm, distance.most_cm)
+    range_m = math.nan
+    if distance.is_valid:
+        range_m = _range_m(distance.distance_cm, distance.least_cm, distance.most_cm)
     middle_deg = wrapped_deg(-distance.orientation * _EIGHTH_DEG)
     width_deg = distance.width_deg or _EIGHTH_DEG
     return Sector(middle_deg, width_deg, range_m, distance.least_cm / 100, distance.most_cm / 100)
@@ -99,7 +103,8 @@ def ring_distances_cm(ranges_m: Sequence[float], least_cm: int, most_cm: int) ->
     """The 72 distances of OBSTACLE_DISTANCE: `RING_STEP_DEG` apart, clockwise from the front.
 
     Args:
-        ranges_m: `BINS` bins, counter-clockwise from the front; NaN: nothing valid was measured.
+        ranges_m: `BINS` bins, counter-clockwise from the front; 0: nearer than can be measured; NaN: nothing valid was
+            measured.
         least_cm: Shortest that is reported: what is nearer is reported as this.
         most_cm: Longest.
 
@@ -109,7 +114,7 @@ def ring_distances_cm(ranges_m: Sequence[float], least_cm: int, most_cm: int) ->
     """
     half = RING_STEP_DEG // 2
     # A beam without a measurement counts as farther than every range, also than an infinite one.
-    clear = [range_m if 0.0 < range_m < _FAR_M else _FAR_M if range_m >= _FAR_M else math.inf for range_m in ranges_m]
+    clear = [range_m if 0.0 <= range_m < _FAR_M else _FAR_M if range_m >= _FAR_M else math.inf for range_m in ranges_m]
     clear = clear[-half:] + clear[: BINS - half]
     found = []
     for first in range(0, BINS, RING_STEP_DEG):

@@ -40,6 +40,13 @@ _BLOCK = struct.Struct(
     "8x"  # 174: profile accelerations
 )
 _COMMAND = struct.Struct("<i16xi")
+MOTOR_ITEMS = frozenset({120, 124, 128, 132, 136, 140})
+"""Addresses of what the motors report, four bytes each; the board does not answer with parts of an item."""
+
+_TRUTH_VALUES = tuple(address - BLOCK_ADDRESS for address in (26, 27, 28, 29, MOTORS_CONNECTED, TORQUE))
+_HEADER, _STUFFED = b"\xff\xff\xfd", 0xFD
+# The block ends with what was written to it, which is never eight bytes of this kind.
+_LEAST_SPOILT = 8
 _MOTION = tuple(
     f"{quantity}_{axis}"
     for quantity, axes in (
@@ -89,6 +96,31 @@ class Block:
     has_motors: bool
     is_torque_on: bool
     command: tuple[int, int]
+
+
+def spoilt_from(data: bytes) -> int | None:
+    """Return the index from which firmware has spoilt an answer before it signed it; None: it has not.
+
+    Dynamixel2Arduino before 0.6.2 stuffs a packet in place: it copies the byte behind a header within the answer over
+    all bytes that follow.
+
+    Args:
+        data: Data of an answer, without stuffing.
+    """
+    tail = len(data) - len(data.rstrip(bytes((_STUFFED,))))
+    begin = data.find(_HEADER, max(len(data) - tail - 2, 0))
+    spoilt = None if begin < 0 else begin + 2
+    return spoilt if spoilt is not None and len(data) - spoilt >= _LEAST_SPOILT else None
+
+
+def impossibility(data: bytes) -> str:
+    """Return why a block cannot have such contents; empty: it can."""
+    if spoilt_from(data) is not None:
+        return (
+            "the board's firmware has overwritten the end of its answer: update it (Dynamixel2Arduino 0.6.2 or later)"
+        )
+    wrong = next((data[index] for index in _TRUTH_VALUES if data[index] > 1), None)
+    return "" if wrong is None else f"a truth value is {wrong}"
 
 
 def decode_block(data: bytes) -> Block:

@@ -1,7 +1,7 @@
 """State of a bridge as entries for diagnostic_msgs/DiagnosticArray, without the message types."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import IntEnum
 
 from robosc_bridge.terminal.client import DriveState, Snapshot, is_fault, state_name
@@ -57,6 +57,12 @@ BRIDGE, SAFETY, SUPERVISOR, WARNINGS = "bridge", "safety", "supervisor", "warnin
 """Entries that there always are; the others are about goals, and about the devices by name."""
 
 GOALS = "goals"
+
+PEERS = "ros"
+"""Entry about the other nodes of ROS 2 on the topics of the bridge's node."""
+
+# Warnings that are about one device, which then is not well.
+_DEVICE_WARNINGS = {"READING_REFUSED": "drive", "SCAN_NOISY": "scanner"}
 
 
 def entries(link: Link, snapshot: Snapshot | None, age_s: float) -> tuple[Entry, ...]:
@@ -151,17 +157,23 @@ def _warnings(snapshot: Snapshot) -> Entry:
 
 
 def _devices(snapshot: Snapshot) -> Iterator[Entry]:
+    counts = {line.device: {name.replace("_", " "): str(count) for name, count in line.counts.items()}
+              for line in snapshot.lines}  # fmt: skip
     for device in snapshot.devices:
+        values = counts.get(device.name, {})
+        warnings = [item.text for item in snapshot.warnings if _DEVICE_WARNINGS.get(item.code) == device.name]
+        found = Entry(device.name, Level.OK, "The device works.", values)
         if not device.works:
-            yield Entry(device.name, Level.ERROR, "The device is not there.")
+            found = Entry(device.name, Level.ERROR, "The device is not there.")
         elif device.name == "drive" and snapshot.HasField("drive"):
-            yield _drive(device.name, snapshot.drive)
-        else:
-            yield Entry(device.name, Level.OK, "The device works.")
+            found = _drive(device.name, snapshot.drive, values)
+        if warnings and found.level is Level.OK:
+            found = replace(found, level=Level.WARN, message=" ".join(warnings))
+        yield found
 
 
-def _drive(name: str, drive: DriveState) -> Entry:
-    values = {"torque": "on" if drive.is_torque_on else "off"}
+def _drive(name: str, drive: DriveState, counts: dict[str, str]) -> Entry:
+    values = {"torque": "on" if drive.is_torque_on else "off", **counts}
     for field_name, unit in (("battery_v", "V"), ("temperature_c", "degrees Celsius")):
         if drive.HasField(field_name):
             values[field_name.partition("_")[0]] = f"{getattr(drive, field_name):.1f} {unit}"

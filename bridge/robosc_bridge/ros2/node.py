@@ -1,11 +1,12 @@
 """The node of ROS 2: publishers only, without any way to command the robot."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from types import TracebackType
 from typing import Any, Self
 
-from robosc_bridge.ros2.diagnostics import Entry
+from robosc_bridge.ros2.diagnostics import PEERS, Entry, Level
 from robosc_bridge.ros2.frames import Frames, Place, mountings, places_of
+from robosc_bridge.ros2.peers import OwnTopic, Peer, clock_misfits, misfits
 from robosc_bridge.terminal.client import DriveState, Scan
 
 ROS_ARGUMENTS = "--ros-args"
@@ -52,7 +53,7 @@ class BridgeNode:
             from diagnostic_msgs.msg import DiagnosticArray
             from nav_msgs.msg import Odometry
             from rclpy.node import Node
-            from rclpy.qos import DurabilityPolicy, QoSProfile, qos_profile_sensor_data
+            from rclpy.qos import DurabilityPolicy, QoSProfile, ReliabilityPolicy, qos_profile_sensor_data
             from rclpy.signals import SignalHandlerOptions
             from rclpy.validate_namespace import validate_namespace
             from sensor_msgs.msg import BatteryState, Imu, JointState, LaserScan
@@ -97,6 +98,18 @@ class BridgeNode:
         self._to_tf = node.create_publisher(self._tf_message, "/tf", 100) if sends_odom_tf else None
         latched = QoSProfile(depth=1, durability=DurabilityPolicy.TRANSIENT_LOCAL)
         self._to_static_tf = node.create_publisher(self._tf_message, "/tf_static", latched) if sends_static_tf else None
+        self._reliable = ReliabilityPolicy.RELIABLE
+        self._own = {
+            publisher.topic_name: OwnTopic(_type_name(publisher.msg_type), is_reliable, is_shared)
+            for publisher, is_reliable, is_shared in (
+                (self._to_odometry, True, False),
+                (self._to_joints, True, False),
+                (self._to_imu, False, False),
+                (self._to_battery, True, False),
+                (self._to_scan, False, False),
+                (self._to_diagnostics, True, True),
+            )
+        }
 
     def __enter__(self) -> Self:
         return self
@@ -154,5 +167,38 @@ class BridgeNode:
         self._to_scan.publish(self._messages.laser_scan(scan, stamp_ns, self._frames))
 
     def put_diagnostics(self, reported: tuple[Entry, ...], stamp_ns: int, robot: str) -> None:
-        """Publish the present state."""
-        self._to_diagnostics.publish(self._messages.diagnostics(reported, stamp_ns, robot))
+        """Publish the present state, and what does not fit among the nodes that are seen."""
+        entries = (*reported, self._peers_entry())
+        self._to_diagnostics.publish(self._messages.diagnostics(entries, stamp_ns, robot))
+
+    def _peers_entry(self) -> Entry:
+        node = self._node
+        found = (
+            *clock_misfits(
+                uses_sim_time=bool(node.get_parameter("use_sim_time").value),
+                has_clock=bool(node.get_publishers_info_by_topic("/clock")),
+            ),
+            *misfits(self._own, self._peers()),
+        )
+        message = " ".join(found) or "Nothing is wrong with the other nodes on these topics."
+        return Entry(PEERS, Level.WARN if found else Level.OK, message)
+
+    def _peers(self) -> Iterator[Peer]:
+        """Yield the endpoints of other nodes on the topics of this one."""
+        node = self._node
+        for topic in self._own:
+            for is_publisher, infos in (
+                (True, node.get_publishers_info_by_topic(topic)),
+                (False, node.get_subscriptions_info_by_topic(topic)),
+            ):
+                for info in infos:
+                    if (info.node_namespace, info.node_name) != (node.get_namespace(), node.get_name()):
+                        name = f"{info.node_namespace.rstrip('/')}/{info.node_name}"
+                        is_reliable = info.qos_profile.reliability == self._reliable
+                        yield Peer(name, topic, info.topic_type, is_publisher, is_reliable)
+
+
+def _type_name(message_class: Any) -> str:
+    """Return the name of a message's type, such as `nav_msgs/msg/Odometry`."""
+    package = message_class.__module__.partition(".")[0]
+    return f"{package}/msg/{message_class.__name__}"

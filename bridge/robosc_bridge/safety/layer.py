@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, MotorFault, Velocity
 from robosc_bridge.safety.limits import SafetyLimits
-from robosc_bridge.safety.monitors import BatteryMonitor, Freshness, ScanCoverageMonitor, WheelMonitor
+from robosc_bridge.safety.monitors import BatteryMonitor, Freshness, RefusalMonitor, ScanCoverageMonitor, WheelMonitor
 from robosc_bridge.safety.motion import ramped, wheels, within
 from robosc_bridge.safety.reasons import LATCHING, TORQUE_OFF, Caution, Reason
 
@@ -78,6 +78,7 @@ class SafetyLayer:
         self._sight = ScanCoverageMonitor(limits.min_valid_share)
         self._is_noisy = False
         self._battery = BatteryMonitor(limits)
+        self._refusals = RefusalMonitor()
         self._wheels = WheelMonitor(limits)
         # Time since which torque is wanted, None if it is not; and the motors' report since then that they hold.
         self._torque_since_s: float | None = None
@@ -146,6 +147,7 @@ class SafetyLayer:
                 self._latched.add(Reason.MOTOR_FAULT)
             if reading.faults & _UNBIDDEN:
                 self._latched.add(Reason.UNBIDDEN_MOTION)
+            self._refusals.update(reading.refused, reading.time_s)
             self._battery.update(reading.battery_v, reading.time_s, reading.battery_level)
             if self._battery.is_empty:
                 self._latched.add(Reason.BATTERY_LOW)
@@ -156,7 +158,8 @@ class SafetyLayer:
 
     def _judge_wheels(self, reading: DriveReading) -> None:
         if not reading.is_torque_on:
-            if self._is_torque_seen:
+            # Torque that is to go off anyway is not lost.
+            if self._is_torque_seen and self._letting_go_s is None:
                 self._latched.add(Reason.TORQUE_LOST)
             return
         self._is_torque_seen = True
@@ -301,6 +304,7 @@ class SafetyLayer:
             Reason.COMMAND_SILENT: self._wanted != STANDSTILL and self._commands.is_stale(self._now_s),
             Reason.SCAN_STALE: self._scans.is_stale(self._now_s),
             Reason.SCAN_BLIND: self._limits.is_stopped_when_blind and self._sight.is_blind(self._asked_m_s),
+            Reason.SCAN_TOUCHING: self._sight.is_touching(self._asked_m_s),
             Reason.MOTOR_SILENT: self._readings.is_stale(self._now_s) or self._failures >= self._limits.motor_failures,
             Reason.LOOP_OVERRUN: self._loop.is_stale(self._now_s),
             Reason.OPERATOR_LOST: self._operator.is_stale(self._now_s),
@@ -313,6 +317,7 @@ class SafetyLayer:
             Caution.MOTOR_VOLTAGE: MotorFault.VOLTAGE in self._faults,
             Caution.COMMAND_REFUSED: self._is_refused,
             Caution.SCAN_BLIND: self._sight.is_blind(self._asked_m_s),
+            Caution.READING_REFUSED: self._refusals.is_recent(self._now_s),
             Caution.SCAN_NOISY: self._is_noisy,
             Caution.TORQUE_HELD: self._limits.has_own_controls
             and self._torque_since_s is not None

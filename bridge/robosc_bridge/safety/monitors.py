@@ -14,6 +14,9 @@ from robosc_bridge.safety.limits import SafetyLimits
 SECTOR_DEG = 30
 """Degrees to both sides of the robot's direction that the scanner must see: its own width, half a metre away."""
 
+REFUSAL_SHOWN_S = 10.0
+"""Time for which a person is warned of a reading that was refused, in seconds."""
+
 
 class Freshness:
     """Age of the last report of one kind.
@@ -46,7 +49,7 @@ class Freshness:
 
 
 class ScanCoverageMonitor:
-    """Monitor that finds out whether the scanner measures anything in the direction of motion.
+    """Monitor that finds out whether the scanner measures anything in the direction of motion, or something touches.
 
     Ahead and behind are the sectors of 30 degrees to both sides of the front and of the back.
 
@@ -58,15 +61,19 @@ class ScanCoverageMonitor:
         self._min_share = min_share
         # No scan, no proof of a missing part of the view.
         self._is_blind_ahead = self._is_blind_behind = False
+        self._is_touching_ahead = self._is_touching_behind = False
 
     def update(self, ranges_m: Sequence[float]) -> None:
         """Record a full scan.
 
         Args:
-            ranges_m: One for each degree, counter-clockwise from the front; NaN where nothing valid was measured.
+            ranges_m: One for each degree, counter-clockwise from the front; 0 where something is nearer than can be
+                measured, NaN where nothing valid was measured.
         """
-        self._is_blind_ahead = self._is_blind((*ranges_m[-SECTOR_DEG:], *ranges_m[: SECTOR_DEG + 1]))
-        self._is_blind_behind = self._is_blind(ranges_m[180 - SECTOR_DEG : 180 + SECTOR_DEG + 1])
+        ahead = (*ranges_m[-SECTOR_DEG:], *ranges_m[: SECTOR_DEG + 1])
+        behind = ranges_m[180 - SECTOR_DEG : 180 + SECTOR_DEG + 1]
+        self._is_blind_ahead, self._is_blind_behind = self._is_blind(ahead), self._is_blind(behind)
+        self._is_touching_ahead, self._is_touching_behind = 0.0 in ahead, 0.0 in behind
 
     def _is_blind(self, ranges_m: Sequence[float]) -> bool:
         return sum(map(math.isfinite, ranges_m)) < self._min_share * len(ranges_m)
@@ -74,6 +81,29 @@ class ScanCoverageMonitor:
     def is_blind(self, linear_m_s: float) -> bool:
         """Return True if the scanner is blind in the direction of a speed; a rotation on the spot has no direction."""
         return (linear_m_s > 0 and self._is_blind_ahead) or (linear_m_s < 0 and self._is_blind_behind)
+
+    def is_touching(self, linear_m_s: float) -> bool:
+        """Return True if something in the direction of a speed is nearer than the scanner can measure."""
+        return (linear_m_s > 0 and self._is_touching_ahead) or (linear_m_s < 0 and self._is_touching_behind)
+
+
+class RefusalMonitor:
+    """Monitor of the readings that a drive base has refused, as no body moves like that."""
+
+    def __init__(self) -> None:
+        self._refused = 0
+        self._refused_s = -math.inf
+
+    def update(self, refused: int, time_s: float) -> None:
+        """Record how many have been refused; a smaller number than before begins anew."""
+        if refused > self._refused:
+            self._refused_s = time_s
+        self._refused = refused
+
+    def is_recent(self, now_s: float) -> bool:
+        """Return True if one was refused less than `REFUSAL_SHOWN_S` ago; a time in the future counts as now."""
+        self._refused_s = min(self._refused_s, now_s)
+        return now_s - self._refused_s < REFUSAL_SHOWN_S
 
 
 class BatteryMonitor:

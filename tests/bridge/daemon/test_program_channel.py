@@ -213,6 +213,17 @@ def test_a_goal_is_accepted_reported_on_and_ended() -> None:
     assert variable(scene, "left") == 4
 
 
+def test_a_goal_that_was_given_up_unaccepted_is_cancelled_before_the_next_one() -> None:
+    scene = helped()
+    server, goal = fetching(scene)
+    channel = scene.daemon._robot._program_channel
+    assert channel.send_goal(channel._services["fetch"], 99, {"x": 2.0, "name": "pan"})
+    scene.live(0.05, 2.0)
+    assert server.of(CancelMade) == [CancelMade("fetch", goal.number)]
+    # It may have begun all the same; its acceptance is that of nothing.
+    assert len(why(server.say(GoalAccepted, goal.number))) == 1
+
+
 @pytest.mark.parametrize("outcome", ["aborted", "cancelled", "rejected"])
 def test_a_goal_that_does_not_succeed_is_an_error(outcome: str) -> None:
     scene = helped()

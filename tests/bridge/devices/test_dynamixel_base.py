@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Iterator
 import pytest
 
 from robosc_bridge.devices.dynamixel import DynamixelBase
+from robosc_bridge.devices.dynamixel_bus import BusCounters
 from robosc_bridge.devices.interface import MotorFault, Velocity
 from robosc_bridge.devices.robots import BURGER
 from robosc_bridge.errors import DeviceFaultError, DeviceSilentError, WrongDeviceError
@@ -186,6 +187,64 @@ def test_a_wrong_voltage_is_reported_and_stops_nothing(bench: Rig) -> None:
     assert reading.faults == {MotorFault.VOLTAGE}
     assert reading.is_torque_on
     assert reading.battery_v == pytest.approx(5.8)
+
+
+@pytest.mark.parametrize("side", ["left", "right"])
+@pytest.mark.parametrize("turns", [0.8, -3.0, 8224.0])
+def test_a_motor_that_counts_from_another_place_has_not_moved(
+    bench: Rig, side: str, turns: float, caplog: pytest.LogCaptureFixture
+) -> None:
+    bench.start()
+    before = bench.drive(FORWARD, 0.3)
+    servo = getattr(bench.robot, side)
+    with bench.robot.time.lock:
+        servo.set_position(round(servo._position() + 4096 * turns))
+    after = bench.drive(FORWARD, 0.1)
+    # The other wheel goes on, and so does this one, from there.
+    assert after.pose.x_m - before.pose.x_m == pytest.approx(0.015, abs=0.004)
+    assert abs(after.pose.heading_rad) < 0.03
+    assert (after.refused, after.is_torque_on, after.faults) == (1, True, frozenset())
+    counters = bench.base.counters
+    assert isinstance(counters, BusCounters)
+    assert (counters.implausible, counters.begun_anew) == (1, 1)
+    assert f"the {side} wheel would have turned by" in caplog.text
+
+
+def _spoil(bench: Rig, begin: int, times: int) -> None:
+    """Let four bytes of the left motor's next measurements be what they cannot be, with a right checksum."""
+    servo, read = bench.robot.left, bench.robot.left.read
+    left = times
+
+    def spoilt(address: int, length: int) -> tuple[int, bytes]:
+        nonlocal left
+        error, data = read(address, length)
+        if address == 126 and left:
+            left -= 1
+            data = data[:begin] + b"\xfd\xfd\xfd\xfd" + data[begin + 4 :]
+        return error, data
+
+    servo.read = spoilt  # type: ignore[method-assign]
+
+
+@pytest.mark.parametrize("begin", [2, 6], ids=["velocity", "position"])
+def test_a_measurement_that_cannot_be_is_asked_for_again(bench: Rig, begin: int) -> None:
+    bench.start()
+    before = bench.drive(FORWARD, 0.3)
+    _spoil(bench, begin, 1)
+    reading = bench.base.exchange(FORWARD)
+    assert reading.pose.x_m - before.pose.x_m == pytest.approx(0.0, abs=0.01)
+    assert reading.wheels_m_s[0] == pytest.approx(0.15, abs=0.01)
+    assert (reading.refused, reading.faults) == (1, frozenset())
+
+
+def test_measurements_that_never_can_be_are_a_silent_motor_that_is_stopped(bench: Rig) -> None:
+    bench.start()
+    bench.drive(FORWARD, 0.3)
+    _spoil(bench, 2, 1000)
+    with pytest.raises(DeviceSilentError, match="the motors do not answer with what can be: a wheel would turn at"):
+        bench.base.exchange(FORWARD)
+    assert bench.stops_within(0.1)
+    assert bench.base.counters.implausible == 2
 
 
 def test_an_overloaded_motor_is_restarted_when_asked_to_and_has_not_jumped(bench: Rig) -> None:

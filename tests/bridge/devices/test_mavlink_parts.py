@@ -56,30 +56,100 @@ def test_answers_to_others_are_none_of_ours() -> None:
 
 def test_batteries_are_kept_apart() -> None:
     main, pack = BatteryState(True, None, 0.5), BatteryState(False, 12.0, None)
-    state = _after(ROVER, main, pack)
-    assert (state.battery, state.pack) == (main, pack)
+    second, later = BatteryState(False, 5.0, 0.1, 3, 1), BatteryState(False, 5.1, 0.2, 1, 1)
+    state = _after(ROVER, main, pack, second)
+    assert (state.battery, state.packs) == (main, {0: pack, 1: second})
+    assert _after(later, state=state).packs == {0: pack, 1: later}
 
 
-def test_long_texts_are_joined_and_lost_pieces_end_them() -> None:
-    begin, middle, end = Text(2, b"a" * 50, 7, 0), Text(2, b"b" * 50, 7, 1), Text(2, b"", 7, 2)
-    state = _after(ROVER, begin, middle)
-    assert state.texts == ()
-    assert [report.content.text for report in _after(end, state=state).texts] == ["a" * 50 + "b" * 50]
-    # Another one begins before it has ended.
-    other = _after(Text(2, b"c" * 50, 8, 0), Text(2, b"d", 8, 1), state=state)
-    assert [report.content.text for report in other.texts] == ["c" * 50 + "d"]
-    assert [report.content.text for report in _after(*[Text(2, b"e", 0, 0)] * 20, state=state).texts] == ["e"] * 8
+def _texts(*pieces: tuple[float, Text], until_s: float) -> list[str]:
+    """Return the texts that are known at a time after these pieces came."""
+    state = _after(ROVER)
+    for time_s, piece in pieces:
+        state = state.after(Message(1, 1, piece), time_s, OWN)
+    return [report.content.text for report in state.at(until_s).texts]
+
+
+BEGIN, MIDDLE, END = Text(2, b"a" * 50, 7, 0), Text(2, b"b" * 50, 7, 1), Text(2, b"c", 7, 2)
+MISSING = "[a part of this text is missing]"
+
+
+def test_long_texts_are_joined_in_the_order_of_their_pieces() -> None:
+    whole = "a" * 50 + "b" * 50 + "c"
+    assert _texts((0.0, BEGIN), (0.1, MIDDLE), until_s=1.0) == []
+    assert _texts((0.0, BEGIN), (0.1, MIDDLE), (0.2, END), until_s=0.2) == [whole]
+    # Datagrams overtake each other, or come twice.
+    assert _texts((0.0, MIDDLE), (0.0, BEGIN), (0.0, BEGIN), (0.0, END), until_s=0.0) == [whole]
+    # A text that fills its pieces ends with an empty one.
+    assert _texts((0.0, BEGIN), (0.1, Text(2, b"", 7, 1)), until_s=0.1) == ["a" * 50]
+
+
+def test_other_texts_between_the_pieces_hide_none() -> None:
+    other, long = Text(6, b"EKF3 is using GPS"), (Text(4, b"d" * 50, 8, 0), Text(4, b"e", 8, 1))
+    found = _texts((0, BEGIN), (0, other), (0, long[0]), (0, MIDDLE), (0, long[1]), (0, END), until_s=0)
+    assert found == ["EKF3 is using GPS", "d" * 50 + "e", "a" * 50 + "b" * 50 + "c"]
+
+
+@pytest.mark.parametrize(
+    ("pieces", "text"),
+    [
+        ((MIDDLE, END), f"{MISSING} " + "b" * 50 + "c"),
+        ((BEGIN, END), "a" * 50 + f" {MISSING} c"),
+        ((BEGIN, MIDDLE), "a" * 50 + "b" * 50 + f" {MISSING}"),
+        ((MIDDLE,), f"{MISSING} " + "b" * 50 + f" {MISSING}"),
+    ],
+    ids=["first", "middle", "last", "first and last"],
+)
+def test_a_text_whose_pieces_are_lost_is_shown_after_a_while_and_says_so(pieces: tuple[Text, ...], text: str) -> None:
+    arrived = [(0.1 * number, piece) for number, piece in enumerate(pieces)]
+    last_s = arrived[-1][0]
+    assert _texts(*arrived, until_s=last_s + 0.9) == []
+    assert _texts(*arrived, until_s=last_s + 1.1) == [text]
+    # Any later report of the vehicle shows it, too, and nothing is shown twice.
+    assert _texts(*arrived, (9.0, Text(6, b"later")), until_s=99.0) == [text, "later"]
+
+
+def test_a_number_that_is_used_again_is_another_text() -> None:
+    found = _texts((0.0, BEGIN), (0.1, Text(2, b"x" * 50, 7, 0)), (0.2, Text(2, b"y", 7, 1)), until_s=0.2)
+    assert found == ["a" * 50 + f" {MISSING}", "x" * 50 + "y"]
 
 
 def test_endless_texts_have_an_end() -> None:
     state = _after(ROVER, *[Text(2, b"x" * 50, 7, index) for index in range(200)])
-    assert len(state._chunks) <= 20
+    assert len(state.texts) <= 8
+    assert max(len(report.content.data) for report in state.texts) <= 20 * 50 + 2 * len(MISSING) + 2
+    for number in range(1, 100):
+        state = state.after(Message(1, 1, Text(2, b"x" * 50, number, 0)), 200.0, OWN)
+    assert len(state._unfinished) <= 8
 
 
 def test_a_clock_that_goes_back_is_a_restart_and_an_overtaken_packet_is_none() -> None:
     state = _after(ROVER, Attitude(100.0, 0.0, 0.0), Attitude(99.9, 0.0, 0.0))
     assert state.restarts == 0
     assert _after(Attitude(0.5, 0.0, 0.0), Attitude(0.6, 0.0, 0.0), state=state).restarts == 1
+
+
+WRAP_S = 2**32 / 1000
+
+
+@pytest.mark.parametrize("overtaken", [False, True])
+def test_a_clock_that_begins_anew_after_49_days_is_no_restart(overtaken: bool) -> None:
+    times = [WRAP_S - 0.1, 0.05, WRAP_S - 0.05, 0.1] if overtaken else [WRAP_S - 0.1, WRAP_S - 0.05, 0.0, 0.05]
+    state = _after(ROVER, *[Attitude(boot_s, 0.0, 0.0) for boot_s in times])
+    assert state.restarts == 0
+    # The two messages have the same clock.
+    assert _after(LocalPosition(0.1, 0, 0, 0, 0), state=state).restarts == 0
+
+
+@pytest.mark.parametrize("before_s", [100.0, 20 * 86400.0, 30 * 86400.0, 49 * 86400.0])
+def test_a_restart_after_any_time_is_one(before_s: float) -> None:
+    state = _after(ROVER, Attitude(before_s, 0.0, 0.0))
+    assert _after(Attitude(0.5, 0.0, 0.0), state=state).restarts == 1
+
+
+def test_reports_that_a_line_has_held_back_are_no_restart() -> None:
+    state = _after(ROVER, Attitude(100.0, 0.0, 0.0), Attitude(130.0, 0.0, 0.0), Attitude(130.1, 0.0, 0.0))
+    assert state.restarts == 0
 
 
 def test_an_estimate_is_as_old_as_its_older_part() -> None:

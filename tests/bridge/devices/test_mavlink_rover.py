@@ -1,8 +1,10 @@
 """A MAVLink rover as a drive base, on a virtual host."""
 
+import math
+
 import pytest
 
-from robosc_bridge.devices.interface import STANDSTILL, DriveBase, Velocity
+from robosc_bridge.devices.interface import STANDSTILL, BatteryLevel, DriveBase, Velocity
 from robosc_bridge.devices.mavlink_odometry import estimate
 from robosc_bridge.driver_registry import make_drive_base, make_range_scanner
 from robosc_bridge.errors import DeviceError, DeviceSilentError, LineMissingError, WrongDeviceError
@@ -224,3 +226,72 @@ def test_an_estimate_that_jumps_is_no_motion(bench: Bench) -> None:
         bench.rover.shift_m = (5.0, -3.0)
         bench.rover.resets += 1
     assert bench.drive(seconds=0.3).pose == pose
+
+
+@pytest.mark.parametrize("reports_motion", [True, False])
+def test_an_estimator_that_is_reset_without_a_word_moves_nothing_and_is_counted(
+    bench: Bench, reports_motion: bool
+) -> None:
+    bench.rover.reports_motion = reports_motion
+    bench.start()
+    bench.drive(FORWARD, 0.2)
+    bench.drive_until(lambda reading: abs(reading.velocity.linear_m_s) < 1e-6)
+    before = bench.drive(seconds=0.3)
+    assert before.refused == 0
+    with bench.time.lock:
+        bench.rover.shift_m = (112.0, -3.0)
+        bench.rover.shift_rad = math.pi / 2
+    after = bench.drive(seconds=0.5)
+    assert (after.pose, after.refused > 0) == (before.pose, True)
+    assert bench.base.counters.implausible == after.refused
+    assert bench.base.counters.begun_anew >= 1
+    # It is driven on, and ahead is where it looks.
+    x_m = bench.drive(FORWARD, 1.0).pose.x_m
+    assert x_m == pytest.approx(before.pose.x_m + 0.2, abs=0.05)
+
+
+def test_a_single_estimate_that_cannot_be_counts_for_nothing(bench: Bench) -> None:
+    bench.start()
+    before = bench.drive(seconds=0.3)
+    with bench.time.lock:
+        bench.rover.shift_m = (50.0, 0.0)
+    bench.drive_until(lambda reading: reading.refused == 1)
+    with bench.time.lock:
+        bench.rover.shift_m = (0.0, 0.0)
+    after = bench.drive(seconds=0.3)
+    assert after.pose.x_m == pytest.approx(before.pose.x_m, abs=1e-6)
+    assert after.refused == 1
+    assert bench.base.counters.begun_anew == 0
+
+
+@pytest.mark.parametrize(
+    ("states", "level"),
+    [
+        ((1, 1), BatteryLevel.SOUND),
+        ((1, 2), BatteryLevel.LOW),
+        ((1, 3), BatteryLevel.EMPTY),
+        ((3, 1), BatteryLevel.EMPTY),
+        ((1, 0), BatteryLevel.SOUND),
+        ((0, 4), BatteryLevel.EMPTY),
+        ((2, 6), BatteryLevel.LOW),
+        ((0, 0), None),
+    ],
+)
+def test_the_worst_battery_counts(bench: Bench, states: tuple[int, int], level: BatteryLevel | None) -> None:
+    bench.rover.charge_state = states[0]
+    bench.rover.more_batteries = [(5.0, states[1])]
+    bench.start()
+    reading = bench.drive(seconds=1.5)
+    assert reading.battery_level is level
+    # The voltage is that of the first.
+    assert reading.battery_v == 12.0
+
+
+@pytest.mark.parametrize("left_s", [1.0, 3.0, -100.0])
+def test_a_rover_is_driven_on_when_its_clock_begins_anew(bench: Bench, left_s: float) -> None:
+    # It counts milliseconds in 32 bits: 49.7 days.
+    bench.rover._began_s -= 2**32 / 1000 - left_s
+    bench.start()
+    reading = bench.drive(FORWARD, 4.0)
+    assert reading.is_torque_on
+    assert bench.base.counters.implausible == 0

@@ -25,6 +25,31 @@ def test_a_refusal_to_arm_reports_the_vehicles_reason(bench: Bench) -> None:
     assert bench.drive(FORWARD, 0.1).is_torque_on
 
 
+LONG = "compass 2 is not calibrated; battery 1 below minimum arming voltage; check the fence, and then try again"
+
+
+@pytest.mark.parametrize("lost", [(), (0,), (1,), (2,), (0, 1), (1, 2)])
+def test_a_reason_whose_pieces_are_lost_says_so(bench: Bench, lost: tuple[int, ...]) -> None:
+    bench.rover.refusal = LONG
+    bench.rover.lost_pieces = frozenset(lost)
+    bench.base.open()
+    with pytest.raises(DeviceFaultError) as error:
+        bench.base.set_torque(True)
+    whole, text = f"PreArm: {LONG}", str(error.value).partition("(failed): ")[2]
+    pieces = [whole[begin : begin + 50] for begin in range(0, len(whole), 50)]
+    assert all((piece in text) == (number not in lost) for number, piece in enumerate(pieces))
+    assert ("[a part of this text is missing]" in text) == bool(lost)
+    assert "it gives no reason" not in text
+
+
+def test_a_text_between_the_pieces_of_a_reason_hides_none_of_it(bench: Bench) -> None:
+    bench.rover.refusal = LONG
+    bench.rover.text_between = "EKF3 IMU0 is using GPS"
+    bench.base.open()
+    with pytest.raises(DeviceFaultError, match=rf"\(failed\): PreArm: {LONG}$"):
+        bench.base.set_torque(True)
+
+
 def test_a_refused_mode_is_reported(bench: Bench) -> None:
     bench.rover.refused_modes = (GUIDED,)
     bench.base.open()

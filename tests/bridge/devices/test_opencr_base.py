@@ -4,11 +4,11 @@ import contextlib
 import itertools
 import math
 import struct
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 import pytest
 
-from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S
+from robosc_bridge.devices.dynamixel_bus import ANSWER_LIMIT_S, BusCounters, DynamixelBus
 from robosc_bridge.devices.interface import STANDSTILL, MotorFault, Velocity
 from robosc_bridge.devices.opencr import OpenCrBase
 from robosc_bridge.devices.robots import BURGER, WAFFLE
@@ -254,6 +254,112 @@ def test_answers_to_an_earlier_session_are_not_taken_for_what_the_board_is() -> 
         base = OpenCrBase(peer.path, BURGER, answer_limit_s=PATIENT_S, host=peer.time)
         with pytest.raises(WrongDeviceError, match="another robot"):
             base.open()
+
+
+def _set_ticks(bench: Rig, left: int, right: int) -> None:
+    """Let the wheels count from here, and wait until the board and the driver know."""
+    for servo, ticks in ((bench.robot.left, left), (bench.robot.right, right)):
+        servo.set_position(ticks)
+    bench.host.sleep(0.05)
+
+
+# Left -1 and right -3 as in the reports: the end of the left count and the begin of the right one look like a header.
+@pytest.mark.parametrize("ticks", [(-1, -3), (-65536, 253), (-300, -259)])
+def test_a_board_that_spoils_its_answers_is_read_in_two_parts(bench: Rig, ticks: tuple[int, int]) -> None:
+    _set_ticks(bench, *ticks)
+    bench.base.open()
+    first = bench.drive(seconds=0.05)
+    counters = bench.base.counters
+    assert isinstance(counters, BusCounters)
+    _board(bench).stuffs_in_place = True
+    last = bench.drive(seconds=0.2)
+    assert (last.pose, last.wheels_m, last.wheels_m_s) == (first.pose, first.wheels_m, (0.0, 0.0))
+    found = bench.base.counters
+    assert isinstance(found, BusCounters)
+    assert last.refused == found.implausible > first.refused
+    assert (found.begun_anew, found.unanswered) == (counters.begun_anew, counters.unanswered)
+
+
+def test_a_drive_along_spoilt_answers_ends_where_it_does() -> None:
+    with rig("opencr") as bench:
+        _board(bench).stuffs_in_place = True
+        # The counts become negative soon: every 256th of the right ones follows the left one's end.
+        _set_ticks(bench, 20, 301)
+        bench.start()
+        reading = bench.drive(Velocity(-0.03), 10.0)
+        assert reading.refused > 0
+        assert reading.pose.x_m == pytest.approx(-0.3, abs=0.01)
+        assert reading.pose.heading_rad == pytest.approx(0.0, abs=0.01)
+
+
+def _answered_with(*blocks: bytes) -> Callable[[bytes], Answers]:
+    """Answer as a sound board does; its blocks are these, in turn, and then the last one."""
+    waiting = list(blocks)
+
+    def answer(request: bytes) -> Answers:
+        _, instruction, address, length = asked(request)
+        if instruction == 2 and (address, length) == (10, 172):
+            return [status(200, waiting.pop(0) if len(waiting) > 1 else waiting[0])]
+        if instruction == 1:
+            return [status(200, b"\0\x50\5")]
+        known = {2: b"\1\0\0\0", 18: b"\0", 148: b"\1"}
+        return [status(200, known.get(address, b"").ljust(length, b"\0") if instruction == 2 else b"")]
+
+    return answer
+
+
+def _block(uptime_ms: int, ticks: tuple[int, int] = (0, 0), raw: tuple[int, int] = (0, 0), **changes: int) -> bytes:
+    data = bytearray(172)
+    data[:4] = uptime_ms.to_bytes(4, "little")
+    struct.pack_into("<2i2i", data, 118, *raw, *ticks)
+    data[138] = 1
+    for name, value in changes.items():
+        data[int(name.removeprefix("at_")) - 10] = value
+    return bytes(data)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "problem"),
+    [
+        ({"ticks": (0, -33_686_019)}, "the right wheel would have turned"),
+        ({"ticks": (90_000, 0)}, "the left wheel would have turned"),
+        ({"raw": (-33_686_019, 0)}, "a wheel would turn at"),
+        ({"at_149": 0x40}, "a truth value is 64"),
+        ({"at_26": 2}, "a truth value is 2"),
+    ],
+)
+def test_an_answer_that_cannot_be_is_asked_for_again(
+    wrong: dict[str, object], problem: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    sound = [_block(1000 + 50 * step) for step in range(8)]
+    # From here on torque is on, as far as this board says.
+    on = [_block(1400 + 20 * step, at_149=1) for step in range(40)]
+    spoilt = _block(1800, **({"at_149": 1} | wrong))  # type: ignore[arg-type]
+    peer_answer = _answered_with(*sound, *on)
+    with VirtualPeer(lambda request: peer_answer(request)) as peer:
+        base = OpenCrBase(peer.path, BURGER, answer_limit_s=PATIENT_S, host=peer.time)
+        base.open()
+        first = base.exchange(STANDSTILL)
+        spoilt = _block(int.from_bytes(sound[-1][:4], "little") + 400, **({"at_149": 1} | wrong))  # type: ignore[arg-type]
+        peer_answer = _answered_with(spoilt, _block(int.from_bytes(spoilt[:4], "little") + 20, at_149=1))
+        reading = base.exchange(STANDSTILL)
+        assert (first.refused, reading.refused) == (0, 1)
+        assert reading.pose == first.pose
+        assert reading.wheels_m_s == (0.0, 0.0)
+        assert problem in caplog.text
+        base.close()
+
+
+def test_an_answer_that_never_can_be_is_a_silent_board() -> None:
+    with VirtualPeer(_answered_with(_block(1000))) as peer:
+        base = OpenCrBase(peer.path, BURGER, answer_limit_s=PATIENT_S, host=peer.time)
+        base._bus = DynamixelBus(peer.time.open_port(peer.path, 1_000_000), str, PATIENT_S, peer.time)
+        base.exchange(STANDSTILL)
+        spoilt = _block(1000, ticks=(0, -33_686_019), at_149=1)
+        peer._answer = _answered_with(spoilt)
+        with pytest.raises(DeviceSilentError, match="OpenCR does not answer with what can be: the right wheel"):
+            base.exchange(STANDSTILL)
+        assert base.counters.implausible == 2
 
 
 def test_motors_that_restart_in_a_pause_have_not_jumped(bench: Rig) -> None:

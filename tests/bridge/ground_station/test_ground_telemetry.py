@@ -167,10 +167,10 @@ def test_obstacles_go_clockwise_from_the_front() -> None:
 
 
 def _slow_ring(ranges_m: list[float], least_cm: int, most_cm: int) -> list[int]:
-    """Every bin goes to the entry that is nearest to it, clockwise."""
+    """Every bin goes to the entry that is nearest to it, clockwise; what touches is as near as can be."""
     nearest: list[float | None] = [None] * 72
     for degrees, range_m in enumerate(ranges_m):
-        if math.isnan(range_m) or range_m <= 0.0:
+        if math.isnan(range_m):
             continue
         entry = round(-degrees / 5) % 72
         before = nearest[entry]

@@ -163,9 +163,10 @@ def test_the_tests_own_encoders_make_the_worked_frames() -> None:
 
 
 @pytest.mark.parametrize(
-    ("distance_mm", "is_valid"), [(0, False), (119, False), (120, True), (3500, True), (3501, False), (65535, False)]
+    ("distance_mm", "is_valid"),
+    [(0, False), (1, True), (119, True), (120, True), (3500, True), (3501, False), (65535, False)],
 )
-def test_lds01_range(distance_mm: int, is_valid: bool) -> None:
+def test_lds01_range_and_what_is_too_near_for_it(distance_mm: int, is_valid: bool) -> None:
     points = lds01.points(lds01.Frame(3, 3000, (distance_mm,) * 6, (0,) * 6))
     assert [math.isfinite(range_m) for range_m in points.ranges_m] == [is_valid] * 6
 
@@ -182,7 +183,9 @@ def test_lds02_range_however_weak(distance_mm: int, is_valid: bool) -> None:
     ("distance_mm", "intensity", "is_valid"),
     [
         (0, 200, False),
-        (49, 200, False),
+        (1, 66, True),
+        (49, 200, True),
+        (49, 65, False),
         (50, 66, True),
         (50, 65, False),
         (150, 65, False),

@@ -135,7 +135,7 @@ def test_batteries() -> None:
 
     assert pack(0, 4000, 4100, 3900) == BatteryState(False, 12.0, 0.55)
     assert pack(0) == BatteryState(False, None, 0.55)
-    assert pack(1, 4000) is None
+    assert pack(1, 4000) == BatteryState(False, 4.0, 0.55, number=1)
 
     def judged(state: int) -> Any:
         voltages = [7400, *(65535,) * 9]
@@ -144,6 +144,45 @@ def test_batteries() -> None:
 
     for state in ChargeState:
         assert judged(state) == BatteryState(False, 7.4, 0.55, state)
+
+
+def test_cells_beyond_ten_are_in_the_extension() -> None:
+    def pack(*more_mv: int) -> Any:
+        more = [*more_mv, *(0,) * (4 - len(more_mv))]
+        return _said(
+            lambda codec: codec.battery_status_encode(0, 1, 1, 32767, [4200] * 10, -1, -1, -1, -1, voltages_ext=more)
+        ).voltage_v
+
+    assert pack() == 42.0
+    assert pack(4200, 4200, 4200, 4200) == 58.8
+    assert pack(4200) == 46.2
+    assert pack(4200, 65535) == 46.2
+
+
+@pytest.mark.parametrize(("quality", "is_valid"), [(0, True), (1, False), (2, True), (100, True)])
+def test_a_distance_with_an_invalid_signal_is_marked(quality: int, is_valid: bool) -> None:
+    words = {"signal_quality": quality}
+    found = _said(lambda codec: codec.distance_sensor_encode(0, 5, 800, 123, 0, 1, 2, 255, **words))
+    assert found.is_valid is is_valid
+
+
+@pytest.mark.parametrize(
+    ("quaternion", "quality"),
+    [((0, 0, 0, 0), 0), ((0.5, 0, 0, 0), 0), ((2, 0, 0, 0), 0), ((math.nan, 0, 0, 0), 0), ((1, 0, 0, 0), -1)],
+)
+def test_an_odometry_without_attitude_or_that_has_failed_is_bad(quaternion: Any, quality: int) -> None:
+    decoder = _decoder()
+    rest = (0, 0, 0, 0, 0, 0, [math.nan] * 21, [math.nan] * 21)
+
+    def encoded(q: Any, quality: int) -> bytes:
+        return Codec(1, 1).encode(
+            lambda codec: codec.odometry_encode(0, 20, 12, 1, 2, 0, list(q), *rest, quality=quality)
+        )
+
+    assert not decoder.feed(encoded(quaternion, quality))
+    assert decoder.counts.bad_frames == 1
+    # Slightly rounded, and of a quality that is not known.
+    assert decoder.feed(encoded((0.999, 0, 0, 0.02), 0))
 
 
 def test_obstacles() -> None:
@@ -156,7 +195,8 @@ def test_obstacles() -> None:
     assert _said(ring(-2.5, 0)).increment_deg == -2.5
     assert not _said(ring(1.0, 0)).is_body_fixed
     sensor = _said(lambda codec: codec.distance_sensor_encode(0, 5, 800, 123, 0, 1, 2, 255))
-    assert sensor == SectorDistance(2, 123, 5, 800, 0.0)
+    assert sensor == SectorDistance(2, 123, 5, 800, 0.0, number=1)
+    assert _said(ring(1.0)).kind == 0
 
 
 @pytest.mark.parametrize(

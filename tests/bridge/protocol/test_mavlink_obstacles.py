@@ -9,7 +9,7 @@ from robosc_bridge.protocol.mavlink_messages import ObstacleRing, SectorDistance
 from robosc_bridge.protocol.mavlink_obstacles import Sector, nearest_in_sectors, ring_sectors, sensor_sector
 
 BINS = 360
-ranges = st.one_of(st.just(math.nan), st.integers(1, 800).map(lambda cm: cm / 100))
+ranges = st.one_of(st.just(math.nan), st.integers(0, 800).map(lambda cm: cm / 100))
 # Multiples of a quarter degree: no edge is where only rounding says which side it is on.
 sectors = st.builds(
     Sector, st.integers(0, 1439).map(lambda k: k / 4), st.integers(2, 1440).map(lambda k: k / 4), ranges
@@ -57,10 +57,22 @@ def test_a_ring_is_clockwise_from_the_front() -> None:
     assert bins[270] == 1.18
 
 
-def test_nothing_there_unknown_and_impossible_are_no_range() -> None:
+def test_nothing_there_and_unknown_are_no_range_and_too_near_is_touching() -> None:
     found = ring_sectors(_ring((801, 65535, 4, 0, 5, 800)), None)
     assert found is not None
-    assert [sector.range_m for sector in found if sector.range_m == sector.range_m] == [0.05, 8.0]
+    assert [str(sector.range_m) for sector in found] == ["nan", "nan", "0.0", "0.0", "0.05", "8.0"]
+
+
+def test_a_sensor_that_is_too_near_is_touched_and_an_invalid_signal_says_nothing() -> None:
+    def range_m(distance_cm: int, least_cm: int = 20, is_valid: bool = True) -> str:
+        sector = sensor_sector(SectorDistance(0, distance_cm, least_cm, 400, 0.0, is_valid=is_valid))
+        assert sector is not None
+        return str(sector.range_m)
+
+    assert [range_m(cm) for cm in (0, 1, 19, 20, 400, 401, 65535)] == ["0.0", "0.0", "0.0", "0.2", "4.0", "nan", "nan"]
+    # A sensor without a shortest distance.
+    assert [range_m(cm, 0) for cm in (0, 1)] == ["0.0", "0.01"]
+    assert [range_m(cm, is_valid=False) for cm in (0, 10, 300)] == ["nan"] * 3
 
 
 def test_offset_fine_increment_and_the_other_way_round() -> None:

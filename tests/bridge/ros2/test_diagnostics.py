@@ -76,6 +76,19 @@ def test_the_drive_reports_what_it_knows() -> None:
     }
 
 
+@pytest.mark.parametrize(("code", "name"), [("READING_REFUSED", "drive"), ("SCAN_NOISY", "scanner")])
+def test_a_device_that_is_warned_of_is_not_well_and_shows_its_counts(code: str, name: str) -> None:
+    counts = [pb.LineCounts(device=name, counts={"implausible": 3, "begun_anew": 1})]
+    sound = entries_of(snapshot(lines=counts))[name]
+    assert (sound.level, sound.values["implausible"], sound.values["begun anew"]) == (Level.OK, "3", "1")
+    warned = snapshot(lines=counts, warnings=[pb.Notice(code=code, text="It is so.")], drive=pb.DriveState())
+    entry = entries_of(warned)[name]
+    assert (entry.level, entry.message, entry.values["implausible"]) == (Level.WARN, "It is so.", "3")
+    # A fault is worse.
+    faulty = snapshot(warnings=[pb.Notice(code=code, text="It is so.")], drive=pb.DriveState(faults=["overload"]))
+    assert entries_of(faulty)["drive"].level is Level.ERROR
+
+
 def test_a_loop_that_hangs_is_an_error_whatever_it_said_last() -> None:
     found = entries_of(snapshot(), age_s=2.5)
     assert (found["bridge"].level, found["bridge"].message) == (Level.ERROR, "The bridge's loop hangs, for 2.5 s.")

@@ -55,7 +55,8 @@ def test_every_reason_is_a_sentence_and_either_latches_or_not() -> None:
     expected = {*LATCHED, Reason.WHEEL_ASTRAY, Reason.UNBIDDEN_MOTION, Reason.BATTERY_LOW}
     assert set(LATCHING) == expected
     others = {reason for reason, _ in END_BY_THEMSELVES.values()}
-    assert expected | others | {Reason.STANDBY, Reason.CLOCK, Reason.TORQUE_AWAITED, Reason.SCAN_BLIND} == set(Reason)
+    seen = {Reason.SCAN_BLIND, Reason.SCAN_TOUCHING}
+    assert expected | others | seen | {Reason.STANDBY, Reason.CLOCK, Reason.TORQUE_AWAITED} == set(Reason)
     assert all(text.endswith(".") and text[0].isupper() for text in [*Reason, *Caution])
 
 
@@ -469,6 +470,58 @@ def test_where_the_scanner_sees_nothing_the_robot_may_not_go() -> None:
     bench.ranges_m = AHEAD
     assert bench.cycle().reasons == ()
     assert bench.cycles(0.5).velocity == Velocity(0.1)
+
+
+def _touched(*degrees: int) -> tuple[float, ...]:
+    return tuple(0.0 if degree in degrees else 3.0 for degree in range(360))
+
+
+@pytest.mark.parametrize(
+    ("degree", "speed_m_s"), [(0, 0.1), (30, 0.1), (330, 0.1), (150, -0.1), (180, -0.1), (210, -0.1)]
+)
+def test_where_something_touches_the_robot_does_not_go(degree: int, speed_m_s: float) -> None:
+    bench = Bench()
+    bench.ranges_m = _touched()
+    bench.drive(speed_m_s)
+    bench.ranges_m = _touched(degree)
+    for _ in range(3):
+        assert bench.cycle().velocity == STANDSTILL
+        assert bench.last.reasons == (Reason.SCAN_TOUCHING,)
+    # It may turn away and go back, without a person.
+    bench.wanted = Velocity(0.0, 0.5)
+    assert bench.cycles(0.5).velocity == Velocity(0.0, 0.5)
+    bench.wanted = Velocity(-speed_m_s)
+    assert bench.cycles(0.5).velocity == Velocity(-speed_m_s)
+    bench.wanted = Velocity(speed_m_s)
+    assert bench.cycle().reasons == (Reason.SCAN_TOUCHING,)
+    bench.ranges_m = _touched()
+    assert bench.cycle().reasons == ()
+
+
+@pytest.mark.parametrize(("degree", "speed_m_s"), [(31, 0.1), (329, 0.1), (149, -0.1), (211, -0.1)])
+def test_what_touches_beside_the_way_does_not_stop_it(degree: int, speed_m_s: float) -> None:
+    bench = Bench(is_stopped_when_blind=False)
+    bench.ranges_m = _touched(degree)
+    bench.drive(speed_m_s)
+    assert bench.last.reasons == ()
+
+
+def test_a_person_learns_of_a_refused_reading_for_a_while() -> None:
+    bench = Bench()
+    bench.drive()
+    assert not bench.last.warnings
+    bench.refused = 1
+    assert bench.cycle().warnings == (Caution.READING_REFUSED,)
+    assert bench.last.velocity == Velocity(0.1)
+    bench.cycles(9.8)
+    assert bench.last.warnings == (Caution.READING_REFUSED,)
+    bench.cycles(0.4)
+    assert bench.last.warnings == ()
+    # A drive base that was opened anew counts anew.
+    bench.refused = 0
+    assert not bench.cycle().warnings
+    bench.refused = 1
+    assert bench.cycle().warnings == (Caution.READING_REFUSED,)
 
 
 def test_a_reset_forgets_where_it_was_to_go() -> None:

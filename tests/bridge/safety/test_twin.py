@@ -18,9 +18,10 @@ SPEEDS = st.sampled_from([0.0, -0.0, 0.005, 0.1, 0.2, -0.2, 0.5, 3.0, -3.0, math
 # Behind the clock or ahead of it, and no time at all; most reports come just in time.
 SHIFTS = st.sampled_from([0.0] * 6 + [0.01, 0.1, 50.0, -0.1, -0.4, -1.0, math.nan, math.inf])
 SEEN, NOT_SEEN = (1.0,) * 180, (math.nan,) * 180
-# Front and left, back and right, all and nothing; or unknown.
+# Front and left, back and right, all and nothing; something that touches in front, behind and beside; or unknown.
+TOUCHED = [tuple(0.0 if degree == at else 1.0 for degree in range(360)) for at in (30, 31, 150, 330)]
 SCANS = st.sampled_from(
-    [(), SEEN + SEEN, SEEN + NOT_SEEN, NOT_SEEN + SEEN, (*SEEN[90:], *NOT_SEEN, *SEEN[90:]), NOT_SEEN * 2]
+    [(), SEEN + SEEN, SEEN + NOT_SEEN, NOT_SEEN + SEEN, (*SEEN[90:], *NOT_SEEN, *SEEN[90:]), NOT_SEEN * 2, *TOUCHED]
 )
 STEPS = st.sampled_from([STEP_S] * 8 + [0.0, 0.001, 0.15, 0.25, 0.7, 2.1, 6.0])
 FAULTS = st.sampled_from([frozenset[MotorFault]()] * 8 + [frozenset({fault}) for fault in MotorFault])

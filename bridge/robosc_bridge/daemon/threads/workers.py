@@ -24,8 +24,8 @@ from robosc_bridge.devices.interface import (
     Scan,
     Velocity,
 )
-from robosc_bridge.errors import BridgeError, DeviceSilentError
-from robosc_bridge.safety import Caution, Reason
+from robosc_bridge.errors import BridgeError, DeviceSilentError, StoppedError
+from robosc_bridge.safety import LATCHING, Caution, Reason
 
 _LISTEN_S = 0.2
 """Time that a scanner is listened to at once, in seconds."""
@@ -57,6 +57,10 @@ _EXCHANGE_LIMIT_S = 2.0
 
 _STEP_LIMIT_S = 30.0
 """Time that no other step takes: opening a MAVLink rover that is to be brought to rest takes half of it."""
+
+
+_HALTS = frozenset((Reason.STANDBY, *LATCHING))
+"""Reasons after which nothing is begun: unlike the others, they do not end by themselves."""
 
 
 class DriveCommand(Protocol):
@@ -173,6 +177,25 @@ class DriveWorker:
         self._must_let_go = False
         # Faults that were reported since it was opened or reset: one that comes and goes is reported once.
         self._reported: frozenset[MotorFault] = frozenset()
+        # True once nothing is to begin any more; and the halts under which a reset was ordered.
+        self._is_ending = False
+        self._known_halts: frozenset[Reason] = frozenset()
+
+    @property
+    def leftover(self) -> str:
+        """What the drive base may still do after it was closed, in one line; empty: nothing."""
+        return getattr(self._base, "leftover", "")
+
+    def end(self) -> None:
+        """Let nothing begin any more; called from other threads, before the end of this one."""
+        self._is_ending = True
+
+    def is_stopped(self) -> bool:
+        """Return True if torque is no longer to be switched on."""
+        return self._is_ending or self._is_halted(self._ask(self._clock()))
+
+    def _is_halted(self, command: DriveCommand) -> bool:
+        return not self._known_halts.issuperset(_HALTS.intersection(command.reasons))
 
     def is_cycling(self, now_s: float) -> bool:
         """Return True if no step takes longer than it may; called from other threads."""
@@ -227,14 +250,15 @@ class DriveWorker:
         is_reset = self._is_reset_wanted
         if is_reset:
             self._is_reset_wanted = False
-            self._reset()
+            is_reset = self._reset()
         if self._must_let_go:
             self._must_let_go = False
             if self._has_torque:
                 self._switch_torque(False)
                 now_s = self._clock()
         command = self._take(now_s)
-        if command.is_torque_wanted != self._has_torque:
+        is_begun_after_stop = command.is_torque_wanted and self._is_halted(command)
+        if command.is_torque_wanted != self._has_torque and not is_begun_after_stop:
             self._switch_torque(command.is_torque_wanted)
             # That took a while: what was to be done then may be wrong now.
             command = self._take(self._clock())
@@ -266,8 +290,15 @@ class DriveWorker:
     def _switch_torque(self, is_on: bool) -> None:
         # A velocity from before does not count.
         self._scan_s = None
-        self._base.set_torque(is_on)
-        self._has_torque = is_on
+        try:
+            self._base.set_torque(is_on)
+            self._has_torque = is_on
+        except StoppedError as error:
+            _log.info("%s", error)
+            self._has_torque = False
+            if not self._is_ending:
+                # What may have begun ends now; at the end, closing does that.
+                self._base.set_torque(False)
 
     def newer(self) -> Velocity | None:
         """Return the velocity that the safety layer lets through now, if `wake` was called and it is another one."""
@@ -303,14 +334,24 @@ class DriveWorker:
             self._report(notice)
         return command
 
-    def _reset(self) -> None:
+    def _reset(self) -> bool:
+        """Reset the drive base; returns whether no stop has come meanwhile."""
         self._has_torque = False
         self._reported = frozenset()
+        # A reset is ordered while a stop holds; another one ends it.
+        self._known_halts = _HALTS.intersection(self._ask(self._clock()).reasons)
         try:
             self._base.reset()
+        except StoppedError as error:
+            self._report(ResetDone(str(error)))
+            self._base.set_torque(False)
+            return False
         except BridgeError as error:
             self._report(ResetDone(str(error)))
             raise
+        finally:
+            self._known_halts = frozenset()
+        return True
 
     def _failed(self, problem: str) -> float:
         self._is_open = False

@@ -72,6 +72,27 @@ def test_what_goes_wrong_is_a_warning_once(clock: ManualClock) -> None:
     assert monitor.report().values["unexpected"] == "2"
 
 
+def test_troubles_with_others_are_warnings_as_long_as_they_last(clock: ManualClock) -> None:
+    executor, monitor = monitored(clock, max_age_s={"/scan": 1.0})
+    monitor.troubles = ("2 servers of /a", "no clock")
+    assert monitor.report()[:2] == (Level.WARN, "not started; 2 servers of /a; no clock")
+    executor.start()
+    waiting = "waiting for the first message of every sensor with a maximum age"
+    assert monitor.report()[:2] == (Level.WARN, f"{waiting}; 2 servers of /a; no clock")
+    executor.receive("/scan", {"ranges": [2.0] * 360})
+    for _ in range(2):
+        assert monitor.report()[:2] == (Level.WARN, "2 servers of /a; no clock")
+        monitor.next_interval()
+    executor.receive("/nobody/knows", None)
+    assert monitor.report().message == "2 servers of /a; no clock; since the last report: 1 unexpected"
+    monitor.next_interval()
+    monitor.troubles = ()
+    assert monitor.report()[:2] == (Level.OK, "running")
+    monitor.troubles = ("no clock",)
+    executor.stop("the sky falls", is_fault=True)
+    assert monitor.report()[:2] == (Level.ERROR, "stopped: the sky falls")
+
+
 def test_a_sensor_that_was_not_seen_or_is_stale(clock: ManualClock) -> None:
     executor, monitor = monitored(clock, max_age_s={"/scan": 1.0})
     executor.start()

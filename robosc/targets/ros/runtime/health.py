@@ -42,6 +42,7 @@ class HealthMonitor:
 
     :param executor: The executor.
     :ivar missing_servers: Servers that the start waits for.
+    :ivar troubles: What keeps the node's surroundings from being of use to it, in words.
     """
 
     def __init__(self, executor: Runner) -> None:
@@ -49,6 +50,7 @@ class HealthMonitor:
         self._before = executor.counters
         self._decision_us: float | None = None
         self.missing_servers: tuple[str, ...] = ()
+        self.troubles: tuple[str, ...] = ()
 
     def decided(self, took_s: float) -> None:
         """Note how long a decision took."""
@@ -82,11 +84,14 @@ class HealthMonitor:
         reasons = self._executor.reasons
         if reasons:
             return Level.ERROR, 'stopped: ' + '; '.join(reasons)
+        warnings = list(self.troubles)
         if status is Status.NEW:
             names = ', '.join(self.missing_servers)
-            return Level.WARN, f'waiting for servers: {names}' if names else 'not started'
+            warnings.insert(0, f'waiting for servers: {names}' if names else 'not started')
+            return Level.WARN, '; '.join(warnings)
         if status is Status.WAITING:
-            return Level.WARN, 'waiting for the first message of every sensor with a maximum age'
+            warnings.insert(0, 'waiting for the first message of every sensor with a maximum age')
+            return Level.WARN, '; '.join(warnings)
         new = [
             f'{after - before} {name}'
             for name, before, after in (
@@ -95,7 +100,8 @@ class HealthMonitor:
             )
             if after > before
         ]
-        warnings = [] if progress is None else owed_texts(progress)
+        if progress is not None:
+            warnings.extend(owed_texts(progress))
         if new:
             warnings.append('since the last report: ' + ', '.join(new))
         if warnings:

@@ -9,7 +9,7 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 from robosc.targets.ros2.runtime.inquiry import node_of
@@ -20,7 +20,7 @@ def topic_misfits(
     type_name: str,
     peers: Iterable[Any],
     sends: bool,
-    why_not: Callable[[Any], str],
+    quality: Any,
 ) -> list[str]:
     """
     Return what keeps the other ends of a topic from being connected with this node.
@@ -29,7 +29,7 @@ def topic_misfits(
     :param type_name: Type that this node uses, `geometry_msgs/msg/Twist`.
     :param peers: What the middleware shows of the other ends.
     :param sends: True if this node sends there and the others receive.
-    :param why_not: Function that returns why a quality of service does not fit; empty if it does.
+    :param quality: This node's quality of service there.
     """
     own, others = ('sends', 'takes') if sends else ('takes', 'sends')
     found = set()
@@ -38,10 +38,26 @@ def topic_misfits(
         if peer.topic_type and peer.topic_type != type_name:
             found.add(f'{name}: {who} {others} {peer.topic_type}, this node {own} {type_name}')
             continue
-        reason = why_not(peer.qos_profile)
+        sender, receiver = (quality, peer.qos_profile) if sends else (peer.qos_profile, quality)
+        reason = _why_not(sender, receiver)
         if reason:
             found.add(f'{name}: {who} {others} and this node {own} in vain: {reason}')
     return sorted(found)
+
+
+def _why_not(sender: Any, receiver: Any) -> str:
+    """
+    Return why one quality of service does not do for the other; empty if it does.
+
+    Only policies that nodes set: of others a peer's are reported in another way than one's own.
+    """
+    for policy, offered, wanted in (
+        ('reliability', 'BEST_EFFORT', 'RELIABLE'),
+        ('durability', 'VOLATILE', 'TRANSIENT_LOCAL'),
+    ):
+        if (getattr(sender, policy).name, getattr(receiver, policy).name) == (offered, wanted):
+            return f'{policy} {offered.lower()} is sent, {wanted.lower()} is taken'
+    return ''
 
 
 def service_misfits(

@@ -5,7 +5,7 @@ from itertools import pairwise
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc.targets.ros2.runtime.node_time import STILL_S, SimulatedClock, SteadyClock
+from robosc.targets.ros2.runtime.node_time import SimulatedClock, SteadyClock
 
 
 class World:
@@ -68,18 +68,3 @@ def test_a_steady_clock_never_jumps() -> None:
     clock = SteadyClock()
     assert clock.monotonic() <= clock.monotonic()
     assert (clock.has_begun, clock.take_jump()) == (True, 0.0)
-
-
-def test_time_that_does_not_come_or_stands_still_is_worth_a_warning() -> None:
-    ros_ns = [0]
-    clock = SimulatedClock(lambda: ros_ns[0])
-    assert clock.trouble(100.0) == clock.trouble(1000.0) == "use_sim_time is true, and no time has come on /clock"
-    ros_ns[0] = 5
-    assert clock.trouble(1000.0) == ""
-    assert clock.trouble(1000.0 + 0.9 * STILL_S) == ""
-    assert clock.trouble(1000.0 + STILL_S) == "use_sim_time is true, and the time of /clock stands still"
-    # Time that goes back moves.
-    ros_ns[0] = 4
-    assert clock.trouble(1000.0 + STILL_S) == ""
-    assert clock.trouble(1000.0 + 1.9 * STILL_S) == ""
-    assert SteadyClock().trouble(1000.0) == ""

@@ -8,7 +8,7 @@ from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.clock import ManualClock
 from robosc.execution.runtime.executor import Executor
 from robosc.execution.runtime.settings import Settings
-from robosc.targets.ros.runtime.health import HealthMonitor, Level
+from robosc.targets.ros.runtime.health import STILL_S, ClockWatch, HealthMonitor, Level
 from support.generated import example_supervisor
 from support.goal_porter import porter_supervisor
 
@@ -130,3 +130,17 @@ def test_an_assumption_that_is_owed_for_too_long_is_a_warning_until_it_is_met(cl
     monitor.next_interval()
     executor.receive("/door/opened", None)
     assert monitor.report()[:2] == (Level.OK, "running")
+
+
+def test_time_that_does_not_come_or_stands_still_is_worth_a_warning() -> None:
+    ros_ns = [0]
+    watch = ClockWatch(lambda: ros_ns[0])
+    assert watch.trouble(100.0) == watch.trouble(1000.0) == "use_sim_time is true, and no time has come on /clock"
+    ros_ns[0] = 5
+    assert watch.trouble(1000.0) == ""
+    assert watch.trouble(1000.0 + 0.9 * STILL_S) == ""
+    assert watch.trouble(1000.0 + STILL_S) == "use_sim_time is true, and the time of /clock stands still"
+    # Time that goes back moves.
+    ros_ns[0] = 4
+    assert watch.trouble(1000.0 + STILL_S) == ""
+    assert watch.trouble(1000.0 + 1.9 * STILL_S) == ""

@@ -6,12 +6,16 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 from typing import NamedTuple
 
 from robosc.execution.runtime.progress import mission_texts, owed_texts, Progress, standing_text
 from robosc.execution.runtime.recorder import Counters
 from robosc.execution.runtime.runner import Runner, Status
+
+STILL_S = 3.0
+"""Simulated time that stands still for so long is worth a warning, in seconds."""
 
 
 class Level(IntEnum):
@@ -34,6 +38,34 @@ class Health(NamedTuple):
     level: Level
     message: str
     values: dict[str, str]
+
+
+class ClockWatch:
+    """
+    Watch of simulated time, without which stamps are zero and nothing may be decided.
+
+    :param now_ns: Function that returns the time of ROS in nanoseconds; 0 before the first message
+        on `/clock`.
+    """
+
+    def __init__(self, now_ns: Callable[[], int]) -> None:
+        self._now_ns = now_ns
+        self._seen_ns = 0
+        self._moved_s = 0.0
+
+    def trouble(self, steady_s: float) -> str:
+        """
+        Return why no time passes, in words; empty if it does. To be called again and again.
+
+        :param steady_s: Reading of a steady clock.
+        """
+        now_ns = self._now_ns()
+        if now_ns != self._seen_ns:
+            self._moved_s, self._seen_ns = steady_s, now_ns
+        if now_ns == 0:
+            return 'use_sim_time is true, and no time has come on /clock'
+        is_still = steady_s >= self._moved_s + STILL_S
+        return 'use_sim_time is true, and the time of /clock stands still' if is_still else ''
 
 
 class HealthMonitor:

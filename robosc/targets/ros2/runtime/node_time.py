@@ -11,9 +11,6 @@ import time
 
 from robosc.execution.runtime.clock import SystemClock
 
-STILL_S = 3.0
-"""Simulated time that stands still for so long is worth a warning, in seconds."""
-
 
 class SimulatedClock:
     """
@@ -34,8 +31,6 @@ class SimulatedClock:
         self._last_ns = 0
         self._passed_ns = 0
         self._went_back_ns = 0
-        self._moved_s: float | None = None
-        self._seen_ns = -1
 
     def monotonic(self) -> float:
         """Seconds of simulated time that have passed."""
@@ -52,20 +47,6 @@ class SimulatedClock:
         """Return True if there was a message on `/clock` when the time was last taken."""
         return self._last_ns > 0
 
-    def trouble(self, steady_s: float) -> str:
-        """
-        Return why no time passes, in words; empty if it does. To be called again and again.
-
-        :param steady_s: Reading of a steady clock.
-        """
-        self.monotonic()
-        if not self.has_begun:
-            return 'use_sim_time is true, and no time has come on /clock'
-        if self._moved_s is None or self._last_ns != self._seen_ns:
-            self._moved_s, self._seen_ns = steady_s, self._last_ns
-        is_still = steady_s >= self._moved_s + STILL_S
-        return 'use_sim_time is true, and the time of /clock stands still' if is_still else ''
-
     def take_jump(self) -> float:
         """Seconds by which time has gone back since this was last asked; 0 if it has not."""
         self.monotonic()
@@ -81,10 +62,6 @@ class SteadyClock(SystemClock):
     """
 
     has_begun = True
-
-    def trouble(self, steady_s: float) -> str:
-        """Return nothing: a steady clock always moves."""
-        return ''
 
     def take_jump(self) -> float:
         """Go on: a steady clock never goes back."""

@@ -310,6 +310,8 @@ def test_a_server_that_is_lost_and_back_is_asked_to_cancel(goals: Goals) -> None
     assert goals.passes(LOST_S - 0.1) == []
     assert goals.passes(0.2) == [("on_goal_ended", 1, "lost", None)]
     assert goals.goals.has_abandoned and goals.handles[0].cancels == 0
+    # Its process is gone.
+    assert goals.goals.unsettled == []
     goals.is_there = True
     goals.passes(0.5)
     assert goals.handles[0].cancels == 1
@@ -335,6 +337,10 @@ def test_a_goal_that_nothing_is_heard_of_is_lost_and_cancelled(goals: Goals, sta
     ]
     assert goals.passes(0.2, hears=False) == [("on_goal_ended", 1, "lost", None)]
     assert goals.handles[0].cancels == 1
+    # Until its server has been heard, it may be running.
+    assert goals.goals.unsettled == ["a goal of /a may be running: its server has not answered it"]
+    goals.changes(DONE, LOST)
+    assert goals.goals.unsettled == []
 
 
 def test_a_server_that_reports_and_does_not_name_a_goal_does_not_have_it(goals: Goals) -> None:

@@ -164,7 +164,7 @@ class ActionGoals:
                     self._no_result = (
                         f'the server of {self.name} gave no result of a goal that ended'
                     )
-                self._abandon(goal_id)
+                self._abandon(goal_id, is_served=True)
             elif goal.cancelled_s is not None and self._heard_s >= goal.cancelled_s + REFUSAL_S:
                 goal.cancelled_s = None
                 self._refuse(goal_id)
@@ -209,11 +209,15 @@ class ActionGoals:
 
         A goal that its server has not named, and one whose cancel it has not heard.
         """
-        return [
-            f'a goal of {self.name} may be running: its server has not answered '
-            + ('its cancel' if goal.is_accepted else 'it')
+        answers = [
+            'its cancel' if goal.is_accepted else 'it'
             for goal in self._goals.values()
             if goal.state == WAITING_FOR_GOAL_ACK or goal.cancelled_s is not None
+        ]
+        answers += ['it' for abandoned in self._abandoned.values() if abandoned.is_served]
+        return [
+            f'a goal of {self.name} may be running: its server has not answered {answer}'
+            for answer in answers
         ]
 
     def cancel_unanswered(self) -> None:
@@ -237,9 +241,9 @@ class ActionGoals:
             abandoned.is_asked = True
             abandoned.handle.cancel()
 
-    def _abandon(self, goal_id: int) -> None:
+    def _abandon(self, goal_id: int, is_served: bool = False) -> None:
         """Report a goal as lost, and keep it: it may be running, or on its way to the server."""
-        self._abandoned[goal_id] = AbandonedGoal(self._goals[goal_id].handle)
+        self._abandoned[goal_id] = AbandonedGoal(self._goals[goal_id].handle, is_served)
         self._end(goal_id, 'lost')
 
     def _look_for_server(self) -> None:

@@ -17,6 +17,7 @@ from functools import wraps
 from typing import Any, Callable, cast, Optional, Tuple, TypeVar
 
 from robosc.execution.runtime.calls import Calls, Goals
+from robosc.execution.runtime.cancels import Cancels
 from robosc.execution.runtime.clock import Clock, SystemClock
 from robosc.execution.runtime.event_log import EventLog, NullLog
 from robosc.execution.runtime.progress import Progress, ProgressAccount
@@ -47,7 +48,10 @@ class Status(str, Enum):
     NEW = 'new'
     """Not started."""
     WAITING = 'waiting'
-    """No requests before the first message of every sensor with a maximum age."""
+    """
+    No requests before the first message of every sensor with a maximum age, and before the goals
+    from before a restart have ended: the initial state knows nothing of them.
+    """
     RUNNING = 'running'
     STOPPING = 'stopping'
     """At rest, but some cancelled goals have not ended yet."""
@@ -125,7 +129,9 @@ class Runner:
             self.settings.max_age_s,
         )
         self._has_watched_sensors = bool(self._sensors)
-        self._safe_stop = SafeStop(robot, self._releases, self._goals)
+        self._cancels = Cancels(robot, self._recorder, self._goals, self.settings.cancel_timeout_s)
+        self._cancels.wake = self._wake_at
+        self._safe_stop = SafeStop(robot, self._releases, self._goals, self._cancels)
         self._progress = self._new_progress()
         self._steps = Steps(
             system,
@@ -133,10 +139,13 @@ class Runner:
             self._recorder,
             self._releases,
             self._goals,
+            self._cancels,
             self.settings.on_unknown,
             self._progress,
         )
-        self._replies = Replies(self._steps, robot, self._recorder, self._calls, self._goals)
+        self._replies = Replies(
+            self._steps, self._cancels, self._recorder, self._calls, self._goals
+        )
         self._batches = batches(infos)
         self._is_started = False
         self._may_request = False
@@ -175,9 +184,24 @@ class Runner:
         return self._sensors.unseen()
 
     @property
+    def old_goals(self) -> Tuple[str, ...]:
+        """Return the actions with a goal from before a restart that has not ended."""
+        return self._goals.left()
+
+    @property
     def counters(self) -> Counters:
         """Return counts of what went wrong so far."""
         return self._recorder.counters()
+
+    @property
+    def cancelling(self) -> Tuple[str, ...]:
+        """Return the actions whose goal was to be cancelled and has not ended, in source order."""
+        return self._cancels.cancelling()
+
+    @property
+    def overdue_cancels(self) -> Tuple[str, ...]:
+        """Return those of them whose goal has not ended within the time for that."""
+        return self._cancels.overdue()
 
     @property
     def progress(self) -> Optional[Progress]:
@@ -304,7 +328,7 @@ class Runner:
         The adapter calls it on a signal, or, with `is_fault`, on a fault that it found. Running
         goals are cancelled: the status is `stopping` until they have ended, for at most 0.5 s.
         """
-        self._now_s = self._clock.monotonic()
+        self._now_s = self._recorder.began_s = self._clock.monotonic()
         if is_fault:
             self._fail(reason)
         else:
@@ -315,9 +339,10 @@ class Runner:
         """
         Begin again in the initial state, also after a fault.
 
-        Goals and calls under way belong to the old run.
+        Goals and calls under way belong to the old run. Nothing is requested before these goals
+        have ended.
         """
-        self._now_s = self._clock.monotonic()
+        self._now_s = self._recorder.began_s = self._clock.monotonic()
         if not self._safe_stop.reasons or self._safe_stop.unsent:
             self._come_to_rest()
         if self._safe_stop.unsent:
@@ -409,7 +434,9 @@ class Runner:
             self._end_batch()
 
     def _take_end(self, goal_id: int, outcome: str, data: Any) -> None:
-        if self._replies.goal_ended(goal_id, outcome, data):
+        is_event = self._replies.goal_ended(goal_id, outcome, data)
+        self._update_may_request()
+        if is_event:
             self._end_batch()
 
     def _finish(self) -> None:
@@ -417,7 +444,10 @@ class Runner:
 
     def _update_may_request(self) -> None:
         self._may_request = (
-            self._is_started and not self._safe_stop.reasons and self._sensors.are_all_seen()
+            self._is_started
+            and not self._safe_stop.reasons
+            and self._sensors.are_all_seen()
+            and not self._goals.left()
         )
 
     # Safe stop.

@@ -19,6 +19,10 @@ namespace robosc {
 constexpr std::uint64_t REFUSAL_US = 250000;
 /* A goal that its server shows as ended, and whose result does not come for so long, is over. */
 constexpr std::uint64_t RESULT_US = 5000000;
+/* action_msgs/msg/GoalStatus. */
+constexpr int SUCCEEDED = 4;
+constexpr int CANCELED = 5;
+constexpr int ABORTED = 6;
 
 template <class Action>
 class ActionGoals {
@@ -52,7 +56,7 @@ public:
     void send(std::uint32_t id, const Goal& goal)
     {
         if (!is_ready()) {
-            end(id);
+            end(id, ROBOT_OUTCOME_LOST);
             return;
         }
         typename Client::SendGoalOptions options;
@@ -95,15 +99,16 @@ public:
             if (goal.is_refused && now >= goal.refused_us + REFUSAL_US) {
                 goal.is_refused = false;
                 if (goal.is_unknown) {
-                    gone_.push_back(id);
+                    gone_.emplace_back(id, ROBOT_OUTCOME_LOST);
                 } else {
                     refuse(id, false);
                 }
             }
         }
-        for (const std::uint32_t id : std::exchange(gone_, {})) {
-            goals_.erase(id);
-            end(id);
+        for (const auto& [id, outcome] : std::exchange(gone_, {})) {
+            if (goals_.erase(id) > 0) {
+                end(id, outcome);
+            }
         }
     }
 
@@ -224,13 +229,17 @@ private:
     /* End a goal whose server shows that it has ended, and gives no result. */
     void await_result(std::uint32_t id, Sent& goal, std::uint64_t now)
     {
-        /* succeeded, canceled, aborted */
-        if (goal.handle && !goal.has_ended && goal.handle->get_status() >= 4) {
+        if (goal.handle && !goal.has_ended && goal.handle->get_status() >= SUCCEEDED) {
             goal.has_ended = true;
             goal.ended_us = now;
         } else if (goal.has_ended && now >= goal.ended_us + RESULT_US) {
             no_result_ = "the server of " + name_ + " gave no result of a goal that ended";
-            gone_.push_back(id);
+            /* What is not known of a success makes it a failure. */
+            const int status = goal.handle->get_status();
+            gone_.emplace_back(id,
+                status == CANCELED      ? ROBOT_OUTCOME_CANCELLED
+                    : status == ABORTED ? ROBOT_OUTCOME_ABORTED
+                                        : ROBOT_OUTCOME_LOST);
         }
     }
 
@@ -241,7 +250,7 @@ private:
             abandoned_[id] = Abandoned{goals_.at(id).handle, false};
         }
         goals_.erase(id);
-        end(id);
+        end(id, ROBOT_OUTCOME_LOST);
     }
 
     void look_for_server()
@@ -274,7 +283,7 @@ private:
         if (!handle) {
             if (found != goals_.end()) {
                 goals_.erase(found);
-                end(id);
+                end(id, ROBOT_OUTCOME_REJECTED);
             }
         } else if (found == goals_.end()) {
             /* Its server counted as lost: nobody would ever stop this one. */
@@ -318,7 +327,10 @@ private:
                 take(robot, now, id, *data, notes);
             });
         } else {
-            end(id);
+            end(id,
+                result.code == rclcpp_action::ResultCode::CANCELED      ? ROBOT_OUTCOME_CANCELLED
+                    : result.code == rclcpp_action::ResultCode::ABORTED ? ROBOT_OUTCOME_ABORTED
+                                                                        : ROBOT_OUTCOME_LOST);
         }
     }
 
@@ -349,9 +361,11 @@ private:
         });
     }
 
-    void end(std::uint32_t id)
+    void end(std::uint32_t id, robot_outcome_t outcome)
     {
-        reports_.add([id](robot_t* robot, std::uint64_t now, Notes&) { robot_goal_ended(robot, now, id); });
+        reports_.add([id, outcome](robot_t* robot, std::uint64_t now, Notes&) {
+            robot_goal_ended(robot, now, id, outcome);
+        });
     }
 
     Reports& reports_;
@@ -361,7 +375,7 @@ private:
     typename Client::SharedPtr client_;
     std::map<std::uint32_t, Sent> goals_;
     std::map<std::uint32_t, Abandoned> abandoned_;
-    std::vector<std::uint32_t> gone_;
+    std::vector<std::pair<std::uint32_t, robot_outcome_t>> gone_;
     Presence presence_;
     std::string no_result_;
     Endpoints servers_;

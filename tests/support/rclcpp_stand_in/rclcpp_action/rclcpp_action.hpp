@@ -2,6 +2,7 @@
 
 #pragma once
 
+#include <array>
 #include <functional>
 #include <future>
 #include <map>
@@ -34,6 +35,10 @@ public:
         ResultCode code;
         typename ActionT::Result::SharedPtr result;
     };
+
+    std::array<uint8_t, 16> get_goal_id() const { return {}; }
+    int8_t get_status() { return status; }
+    int8_t status = 2;
 };
 
 template <typename ActionT>
@@ -63,6 +68,11 @@ public:
         orders[{"accept", name}] = [this](std::istream&) {
             handle_ = std::make_shared<GoalHandle>();
             options_.goal_response_callback(handle_);
+        };
+        orders[{"status", name}] = [this](std::istream& in) {
+            int status = 0;
+            in >> status;
+            handle_->status = static_cast<int8_t>(status);
         };
         orders[{"reject", name}] = [this](std::istream&) { options_.goal_response_callback(nullptr); };
         orders[{"feedback", name}] = [this](std::istream& in) {

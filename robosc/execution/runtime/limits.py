@@ -12,11 +12,10 @@ import math
 import numbers
 from typing import Any, Dict, Mapping, NamedTuple, Optional, Sequence, Tuple
 
-Path = Tuple[str, ...]
-Bound = Tuple[Path, float, float]
+Bound = Tuple[Tuple[str, ...], float, float]
 """Properties that lead to a number, its lower and its upper bound."""
 
-_ABSENT = object()
+_NOT_GIVEN = object()
 
 
 class Limited(NamedTuple):
@@ -42,14 +41,14 @@ def limited(message: Any, bounds: Sequence[Bound]) -> Optional[Limited]:
     :returns: None if no number is within the bounds of all, or what should be a number is none.
     """
     moved = []
-    for path, (low, high) in _joint(bounds).items():
-        given = _part(message, path)
-        value = 0 if given is _ABSENT or given is None else given
-        if low > high or not _is_number(value):
+    for path, (low, high) in _joint_bounds(bounds).items():
+        given = _number_at(message, path)
+        value = 0 if given is _NOT_GIVEN or given is None else given
+        if low > high or not _is_finite_number(value):
             return None
         if not low <= value <= high:
             target = low if value < low else high
-            message = _with(message, path, target)
+            message = _with_number(message, path, target)
             moved.append('{}: {} -> {}'.format('.'.join(path) or 'value', value, target))
     return Limited(message, tuple(moved))
 
@@ -60,38 +59,38 @@ def is_within(message: Any, bounds: Sequence[Bound]) -> bool:
     return found is not None and not found.moved
 
 
-def _joint(bounds: Sequence[Bound]) -> Dict[Path, Tuple[float, float]]:
+def _joint_bounds(bounds: Sequence[Bound]) -> Dict[Tuple[str, ...], Tuple[float, float]]:
     """Return the bounds that hold together for each number."""
-    found: Dict[Path, Tuple[float, float]] = {}
+    found: Dict[Tuple[str, ...], Tuple[float, float]] = {}
     for path, low, high in bounds:
         lowest, highest = found.get(path, (low, high))
         found[path] = (max(low, lowest), min(high, highest))
     return found
 
 
-def _is_number(value: Any) -> bool:
+def _is_finite_number(value: Any) -> bool:
     return isinstance(value, numbers.Real) and not isinstance(value, bool) and math.isfinite(value)
 
 
-def _part(message: Any, path: Path) -> Any:
+def _number_at(message: Any, path: Tuple[str, ...]) -> Any:
     for name in path:
-        if message is None or message is _ABSENT:
-            return _ABSENT
+        if message is None or message is _NOT_GIVEN:
+            return _NOT_GIVEN
         if isinstance(message, Mapping):
-            message = message.get(name, _ABSENT)
+            message = message.get(name, _NOT_GIVEN)
         else:
-            message = getattr(message, name, _ABSENT)
+            message = getattr(message, name, _NOT_GIVEN)
     return message
 
 
-def _with(message: Any, path: Path, value: float) -> Any:
+def _with_number(message: Any, path: Tuple[str, ...], value: float) -> Any:
     """Return a copy of a message with another number at a path; what is beside it is shared."""
     if not path:
         return value
     name, rest = path[0], path[1:]
     if message is None or isinstance(message, Mapping):
         part = None if message is None else message.get(name)
-        return {**(message or {}), name: _with(part, rest, value)}
+        return {**(message or {}), name: _with_number(part, rest, value)}
     changed = copy.copy(message)
-    setattr(changed, name, _with(getattr(message, name), rest, value))
+    setattr(changed, name, _with_number(getattr(message, name), rest, value))
     return changed

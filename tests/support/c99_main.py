@@ -81,7 +81,11 @@ static @p@_t r;
 LOG = """static void do_log(void *context, @p@_log_t kind, int what)
 {
     static const char *const kinds[]
-        = {"event", "unexpected", "unknown", "release", "fault", "stop", "resume", "restart", @more@};
+        = {"event", "unexpected", "unknown",
+#if @P@_LIMIT_COUNT > 0
+           "limited",
+#endif
+           "release", "fault", "stop", "resume", "restart", @more@};
     (void)context;
     if (kind == @P@_LOG_FAULT || kind == @P@_LOG_STOP || kind == @P@_LOG_RESTART || kind == @P@_LOG_RESUME) {
         printf("log %s\\n", kinds[kind]);

@@ -6,8 +6,11 @@ from random import Random
 import msgspec
 
 from robosc.expressions import Binary, Constant, DoubleType, Expression, IntegerType, ObjectType, StateTest, Type
-from robosc.model.structure import Bound, Communication, Limit, Model
+from robosc.model.structure import Bound, Communication, Limit, Model, ObjectValue, Provide
 from robosc.supervisor import Supervisor
+from support.execution import supervisor_of
+from support.random_controllers import SAMPLE
+from support.random_layers import random_layer
 
 _UNKNOWN = Binary("<", Binary("/", Constant(1), Constant(0)), Constant(1))
 
@@ -66,3 +69,23 @@ def _condition(dice: Random, model: Model) -> Expression | None:
         return None
     name, behaviour = dice.choice(behaviours)
     return StateTest(name, dice.choice(behaviour.states).name)
+
+
+def limited_controller(dice: Random) -> Supervisor:
+    """A supervisor that adds nothing to a random robot whose messages have data, some of it given, and limits."""
+    model = random_layer(dice).model
+    provides = tuple(
+        Provide(item.name, _given(dice), _condition(dice, model))
+        for item in model.communications
+        if item.request == SAMPLE
+        for _ in range(dice.choice((0, 1, 2)))
+    )
+    return limited_robot(supervisor_of(msgspec.structs.replace(model, provides=provides)), dice)
+
+
+def _given(dice: Random) -> ObjectValue:
+    names = dice.sample(("n", "m"), dice.randint(0, 2))
+    unknown = Binary("/", Constant(1), Constant(0))
+    return ObjectValue(
+        tuple((name, unknown if dice.random() < 0.1 else Constant(dice.choice((-3, 0, 1, 2, 4)))) for name in names)
+    )

@@ -1,6 +1,6 @@
 """Parts of received data that are converted when an event happens: the same in every executor."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 
 from robosc.errors import InternalError
 from robosc.expressions import (
@@ -22,7 +22,7 @@ from robosc.expressions import (
     VariableRead,
     leaves,
 )
-from robosc.model.structure import EventKind, Model, is_tau
+from robosc.model.structure import EventKind, Model, Update, is_tau
 
 Path = tuple[PathStep, ...]
 
@@ -117,12 +117,13 @@ def sure_updates(model: Model) -> tuple[tuple[str, str], ...]:
     found: dict[tuple[str, str], bool] = {}
     for component in model.components:
         behaviour = component.behaviour
-        kept = {item.name for item in behaviour.variables if item.is_synthesis} if behaviour else set()
+        kept = {item.name: item.type for item in behaviour.variables if item.is_synthesis} if behaviour else {}
         for transition in behaviour.transitions if behaviour else ():
             for update in transition.updates:
                 if update.variable in kept and received_paths(update.expression):
                     key = transition.event, f"{component.name}.{update.variable}"
-                    found[key] = found.get(key, True) and _is_sure(update.expression)
+                    is_sure = _is_sure(update.expression) and _fits(model, transition.event, update, kept)
+                    found[key] = found.get(key, True) and is_sure
     return tuple(key for key, is_sure in found.items() if is_sure)
 
 
@@ -139,6 +140,22 @@ def _is_sure(expression: Expression) -> bool:
             return all(map(_is_sure, (condition, then, otherwise)))
         case _:
             return isinstance(expression, Constant | EnumValue | VariableRead | StateTest)
+
+
+def _fits(model: Model, event: str, update: Update, types: Mapping[str, Type]) -> bool:
+    """Return True if no value leaves the variable's range; in doubt False."""
+    wanted = types[update.variable]
+    if not isinstance(wanted, IntegerType):
+        return True
+    name, _, kind = event.partition(".")
+    root = model.communication(name).received_type(EventKind(kind))
+    if root is None or not isinstance(update.expression, Received):
+        return False
+    match wanted, path_type(model, root, update.expression.path):
+        case IntegerType(low=int(low), high=int(high)), IntegerType(low=int(least), high=int(greatest)):
+            return low <= least and greatest <= high
+        case _:
+            return False
 
 
 def path_text(path: Path) -> str:

@@ -391,7 +391,9 @@ def _entries(layout: Layout) -> list[str]:
     for identifier in layout.received_topics:
         names = ", ".join(item.name for item in batch(layout, identifier))
         lines += [
-            *comment(f"A message came on {identifier}: {names}.{_null_words(layout, identifier)}{_message_words(layout)}"),
+            *comment(
+                f"A message came on {identifier}: {names}.{_null_words(layout, identifier)}{_message_words(layout)}"
+            ),
             f"{receive_head(layout, identifier)};",
             "",
         ]

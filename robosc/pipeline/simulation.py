@@ -12,7 +12,7 @@ from typing import Any, overload
 from robosc.automata.plants import communication_plant, communication_plant_name
 from robosc.certification.supervisor_file import StateInWords
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.runtime.protocol import Reading
+from robosc.execution.runtime.protocol import MissingData, Reading
 from robosc.explanation.blocked import Requests
 from robosc.expressions import Value
 from robosc.expressions.text import automaton_text, expression_text
@@ -294,7 +294,11 @@ class Run(ManualRun):
                 raise DataError(f"'{event}' carries no data, and was given {data!r:.100}")
             return None
         raw = None if data is NO_DATA else GivenData(self._model, event).value(type_, data)
-        return self._system.read(event, raw)
+        try:
+            return self._system.read(event, raw)
+        except MissingData as error:
+            self._require_possible(event)
+            raise DataError(f"'{event}' cannot happen so: {error}") from None
 
     def _explained(self, event: str) -> Iterator[str]:
         """Yield the reasons why an event other than a request cannot happen."""

@@ -13,7 +13,7 @@ from robosc.automata.plants import PLANT_LOCATIONS, communication_plant_name
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.clock import ManualClock
 from robosc.execution.runtime.executor import Executor
-from robosc.execution.runtime.protocol import DataDoesNotFit
+from robosc.execution.runtime.protocol import DataDoesNotFit, MissingData
 from robosc.execution.runtime.runner import Status
 from robosc.execution.runtime.settings import POLICIES, Settings
 from robosc.expressions import (
@@ -350,8 +350,17 @@ class Reference:
             if number != chosen and isinstance(type_, DoubleType) and type(datum) is int:
                 shared = float(datum)
             words += data_words(self.layout, type_, shared, is_root=True)
-        self.executor.receive(identifier, datum)
+        try:
+            self.executor.receive(identifier, datum)
+        except MissingData:
+            self._let_time_pass(now)
+            return
         self._note_command(words)
+
+    def _let_time_pass(self, now: int) -> None:
+        """Let no more than that happen instead of what lacks data: much of that cannot be said in C."""
+        self.executor.watch()
+        self._note_command(["w", now])
 
     def _back(self, now: int, event: str) -> None:
         name, _, kind = event.rpartition(".")
@@ -362,12 +371,16 @@ class Reference:
         words: list[object] = ["b", now, events_back(self.layout).index(event), number, *self._token_words(datum)]
         if type_ is not None:
             words += data_words(self.layout, type_, datum, is_root=True)
-        if is_service:
-            self.executor.on_reply(number, datum)
-        elif kind == "feedback":
-            self.executor.on_feedback(number, datum)
-        else:
-            self.executor.on_goal_ended(number, "succeeded", datum)
+        try:
+            if is_service:
+                self.executor.on_reply(number, datum)
+            elif kind == "feedback":
+                self.executor.on_feedback(number, datum)
+            else:
+                self.executor.on_goal_ended(number, "succeeded", datum)
+        except MissingData:
+            self._let_time_pass(now)
+            return
         self._note_command(words)
 
     def _waiting(self, ids: dict[int, str], name: str) -> int:
@@ -395,32 +408,39 @@ class Reference:
 
     # Data.
 
-    def _datum(self, type_: Type) -> Any:
-        """Return a possible datum of a type, as far as C can represent it."""
+    def _datum(self, type_: Type, *, is_complete: bool = False) -> Any:
+        """Return a possible datum of a type, as far as C can represent it.
+
+        Args:
+            type_: The type.
+            is_complete: True if nothing is left out that cannot be said in C, where no event would be refused for it.
+        """
         dice = self.dice
         match type_:
             case EnumType():
-                return self._datum(self.layout.source(type_))
+                return self._datum(self.layout.source(type_), is_complete=is_complete)
             case BooleanType():
-                return dice.choice([True, False, None])
+                return dice.choice([True, False, *([] if is_complete else [None])])
             case IntegerType():
-                return dice.choice([0, 1, -1, 2, 3, 4, 5, 6, 7, 100, 2**31 - 1, 2**31, -(2**31), -(2**40), None])
+                numbers = [0, 1, -1, 2, 3, 4, 5, 6, 7, 100, 2**31 - 1, 2**31, -(2**31), -(2**40)]
+                return dice.choice([*numbers, *([] if is_complete and type_.is_bounded else [None])])
             case DoubleType():
                 values = [0.0, 0.1, 0.4, 0.5, 0.7, 1.0, 2.0, 3.0, -1.5, 1e308, math.nan, math.inf, -math.inf]
                 return dice.choice(values)
             case StringType():
                 return dice.choice(["", "a", "it's", '"""\n\\', "\udc80é", None])
             case ObjectType(name=name):
-                if dice.random() < 0.05:
+                if dice.random() < 0.05 and not is_complete:
                     return None
-                parts = self.model.object(name).properties
-                return {item.name: self._datum(item.type) for item in parts if not isinstance(item.type, NoneType)}
+                parts = [item for item in self.model.object(name).properties if not isinstance(item.type, NoneType)]
+                return {item.name: self._datum(item.type, is_complete=is_complete) for item in parts}
             case ArrayType(element=element):
                 if dice.random() < 0.1:
                     return None
                 if isinstance(element, DoubleType) and dice.random() < 0.3:
                     return [dice.choice([0.1, 3.0])] * 360
-                return [self._datum(element) for _ in range(dice.randint(0, 4))]
+                is_inner = not isinstance(element, BooleanType | IntegerType)
+                return [self._datum(element, is_complete=is_inner) for _ in range(dice.randint(0, 4))]
         raise AssertionError(type_)
 
 

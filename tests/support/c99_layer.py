@@ -278,7 +278,7 @@ class LayerReference(Reference):
         if not types:
             return None, words
         chosen = self.dice.randrange(len(types))
-        datum = change(self._datum(types[chosen]))
+        datum = change(self._datum(types[chosen], is_complete=True))
         for number, type_ in enumerate(types):
             shared: Any = datum if number == chosen else None
             if number != chosen and isinstance(type_, DoubleType) and type(datum) is int:

@@ -319,7 +319,7 @@ class _Program:
                     body.append(f"data.{member} = {self.reader(part.type)}();")
         else:
             assert isinstance(type_, ArrayType)
-            element, inner = self.layout.raw(type_.element), self.reader(type_.element)
+            element, inner = self.layout.raw_element(type_.element), self.reader(type_.element)
             pool = f"pool_{raw}"
             self.pools.append(pool)
             self.readers[pool] = f"static {element} {pool}[65536]; static size_t {pool}_used;\n"

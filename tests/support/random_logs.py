@@ -7,6 +7,7 @@ import copy
 import json
 import re
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from pathlib import Path
 from random import Random
 from typing import Any
@@ -15,7 +16,7 @@ from robosc.event_logs import LoggedRun, read_log
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.interpreter.received import path_text
 from robosc.execution.runtime.event_log import json_line
-from robosc.execution.runtime.protocol import Reading
+from robosc.execution.runtime.protocol import MissingData, Reading
 from robosc.expressions import BooleanType, EnumType
 from robosc.model.received import converted_paths
 from robosc.model.structure import Communication, CommunicationKind
@@ -86,7 +87,7 @@ class World:
         return self.entries
 
     def act(self) -> None:
-        """Let one thing happen."""
+        """Let one thing happen, or nothing where data lacks what cannot be unknown."""
         dice, executor = self.dice, self.bench.executor
         choices: list[Callable[[], None]] = [self._wait] * 8
         if self.topics:
@@ -99,7 +100,8 @@ class World:
             choices = [lambda: executor.stop("by hand", dice.random() < 0.5), executor.restart]
         elif executor.reasons and dice.random() < 0.2:
             choices = [executor.restart]
-        dice.choice(choices)()
+        with suppress(MissingData):
+            dice.choice(choices)()
 
     def _calls(self) -> Any:
         return self.bench.executor._replies._calls._calls

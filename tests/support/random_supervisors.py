@@ -521,11 +521,11 @@ def random_data(dice: Random) -> Any:
     if kind < 0.5:
         return dice.choice(([], {}, Trap(), object(), b"bytes", 3, {"level": 3}))
     fields = {
-        "level": dice.choice(_SCALARS),
+        "level": dice.choice(_SCALARS) if dice.random() < 0.2 else dice.randint(-9, 9),
         "kind": dice.choice(_SCALARS),
         "count": dice.choice(_SCALARS),
         "number": dice.choice(_SCALARS),
-        "flag": dice.choice(_SCALARS),
+        "flag": dice.choice(_SCALARS) if dice.random() < 0.2 else dice.random() < 0.5,
         "text": dice.choice(_SCALARS),
         "numbers": dice.choice(
             [

@@ -6,6 +6,7 @@ from math import prod
 from robosc.conditions.goals import aims_in_words, assumptions_in_words
 from robosc.execution.runtime.protocol import Aim, CommunicationInfo, Description, MissionInfo
 from robosc.expressions import conjuncts
+from robosc.model.received import sure_updates
 from robosc.model.structure import Communication, CommunicationKind, EventKind, Model, Transition, is_tau
 from robosc.supervisor import Supervisor
 
@@ -30,6 +31,7 @@ def describe(supervisor: Supervisor) -> Description:
         aims=() if supervisor.strategy is None else tuple(_aims(supervisor)),
         assumptions=() if supervisor.strategy is None else tuple(Aim(*item) for item in assumptions_in_words(model)),
         missions=() if supervisor.strategy is None else tuple(_missions(model)),
+        sure_updates=sure_updates(model),
     )
 
 

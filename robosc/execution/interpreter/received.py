@@ -1,9 +1,13 @@
-"""Received data as a model sees it: properties, elements, ranges, enums. Nothing here raises."""
+"""Received data as a model sees it: properties, elements, ranges, enums.
 
-from collections.abc import Mapping
+Whatever the data is, nothing here raises but `MissingData`.
+"""
+
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 from robosc.execution.interpreter.functions import Function, Path, function_of
+from robosc.execution.runtime.given import given, given_boolean, given_integer
 from robosc.execution.runtime.protocol import Reading
 from robosc.expressions import (
     ArrayType,
@@ -51,6 +55,25 @@ class Reader:
             unknown=tuple(datum.unknown),
             enum_unknown=datum.enum_unknown,
         )
+
+    def require(self, required: Iterable[tuple[Path, Type]], raw: Any) -> None:
+        """Do nothing if the parts of data that cannot be unknown by their types are given.
+
+        Raises:
+            MissingData: One of them is not.
+        """
+        for path, type_ in required:
+            value = _given_at(raw, path)
+            match type_:
+                case _ if isinstance(value, EnumChoice):
+                    # A value of an enum is made of nothing.
+                    pass
+                case BooleanType():
+                    given_boolean(value, path_text(path))
+                case IntegerType():
+                    given_integer(value, path_text(path))
+                case _:
+                    given(value, path_text(path))
 
     def step(self, type_: Type | None, step: str | int) -> Type | None:
         """The type of a part, or None if there is no such part."""
@@ -168,6 +191,15 @@ class _Datum:
         if was_unknown:
             self.unknown.append(f"{path_text(path)} is {value} by default: an earlier rule is unknown")
         return value
+
+
+def _given_at(raw: Any, path: Path) -> Any:
+    """The raw datum at a path; an enum's value where one was given above it."""
+    for step in path:
+        if isinstance(raw, EnumChoice):
+            break
+        raw = values.received_part(raw, step)
+    return raw
 
 
 def whole_array(raw: Any) -> list[Any] | None:

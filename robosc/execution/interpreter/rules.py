@@ -16,7 +16,7 @@ from robosc.execution.interpreter.functions import (
     no_data,
 )
 from robosc.expressions import DoubleType, IntegerType, Type, Value, domain, values
-from robosc.model.received import converted_paths, received_paths
+from robosc.model.received import converted_paths, received_paths, required_parts
 from robosc.model.structure import (
     ISSUED_KINDS,
     Behaviour,
@@ -92,6 +92,7 @@ class EventRule:
         added: Condition that the supervisor adds, or None.
         received: Declared type of its data, or None.
         paths: The parts of its data that are converted.
+        required: The parts of its data that cannot be unknown by their types.
     """
 
     is_controllable: bool
@@ -101,6 +102,7 @@ class EventRule:
     added: Callable[[State], bool] | None
     received: Type | None
     paths: tuple[Path, ...]
+    required: tuple[tuple[Path, Type], ...]
 
 
 @dataclass(frozen=True, slots=True)
@@ -179,6 +181,7 @@ def _event(
         added=None if diagram is None else diagram_function(diagram, domains),
         received=None if communication is None or kind is None else communication.received_type(kind),
         paths=converted_paths(model, event),
+        required=required_parts(model, event),
     )
 
 

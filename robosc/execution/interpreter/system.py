@@ -171,8 +171,9 @@ class InterpretedSystem:
         return tuple((event, skipped) for event, skipped in taken if skipped)
 
     def read(self, event: str, data: Any) -> Reading:
-        """Convert the data of an uncontrollable event."""
+        """Convert the data of an uncontrollable event (MissingData if a part is missing that cannot be unknown)."""
         rule = self._events[event]
+        self._reader.require(rule.required, data)
         return self._reader.read(rule.received, rule.paths, data)
 
     def step(self, event: str, reading: Reading | None = None) -> tuple[str, ...] | None:

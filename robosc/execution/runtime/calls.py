@@ -60,6 +60,11 @@ class Calls:
         call = self._calls.pop(number, None)
         return None if call is None else call.service
 
+    def find(self, number: int) -> Optional[str]:
+        """Return the service of a call; None if no such call is under way."""
+        call = self._calls.get(number)
+        return None if call is None else call.service
+
     def is_open(self, number: int) -> bool:
         """Return True if a call is under way."""
         return number in self._calls

@@ -98,6 +98,8 @@ class Description(NamedTuple):
     :ivar aims: Aims of the strategy, in its order: the goals, then the visits of each mission.
     :ivar assumptions: Its assumptions about the surroundings, in source order.
     :ivar missions: Its missions, in source order.
+    :ivar sure_updates: Updates that are never skipped by what was proved: the event, and the
+        variable with its component. To skip one is a fault.
     """
 
     name: str
@@ -111,6 +113,7 @@ class Description(NamedTuple):
     aims: Tuple[Aim, ...] = ()
     assumptions: Tuple[Aim, ...] = ()
     missions: Tuple[MissionInfo, ...] = ()
+    sure_updates: Tuple[Tuple[str, str], ...] = ()
 
 
 def requesting(infos: Sequence[CommunicationInfo]) -> Tuple[CommunicationInfo, ...]:
@@ -132,6 +135,15 @@ def batches(infos: Sequence[CommunicationInfo]) -> Dict[str, Tuple[Tuple[str, st
                 (info.name, info.name + '.response'),
             )
     return found
+
+
+class MissingData(ValueError):
+    """
+    Data of an event that lacks what every message has.
+
+    A boolean, an integer with a range, and an enum cannot be unknown by their types, and nothing
+    was proved about an event without them: so it does not happen.
+    """
 
 
 class Reading(NamedTuple):
@@ -218,10 +230,16 @@ class ControlledSystem(Protocol):
         :returns: The events with skipped updates, and these updates (mostly empty); or None if
             some data is unknown. Then nothing has changed, and the caller must read and take each
             event by itself.
+        :raises MissingData: As `read`. Then nothing has changed.
         """
 
     def read(self, event: str, data: Any) -> Reading:
-        """Convert the data of an uncontrollable event; change nothing, never raise."""
+        """
+        Convert the data of an uncontrollable event; change nothing.
+
+        :raises MissingData: A part is missing that cannot be unknown by its type; nothing else is
+            raised, whatever the data is.
+        """
 
     def step(self, event: str, reading: Optional[Reading] = None) -> Optional[Tuple[str, ...]]:
         """

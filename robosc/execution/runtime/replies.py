@@ -72,6 +72,21 @@ class Replies:
         self._steps.happen_with_data(service + '.response', data)
         return True
 
+    def require_reply(self, request_id: int, data: Any) -> None:
+        """Do nothing if data can be the reply to a call under way (MissingData if it lacks any)."""
+        service = self._calls.find(request_id)
+        if service is not None:
+            self._steps.read(service + '.response', data)
+
+    def require_feedback(self, goal_id: int, data: Any) -> None:
+        """Do the same for feedback on a goal."""
+        self._require(goal_id, '.feedback', data)
+
+    def require_result(self, goal_id: int, outcome: str, data: Any) -> None:
+        """Do the same for the result of a goal."""
+        if outcome == 'succeeded':
+            self._require(goal_id, '.response', data)
+
     def call_failed(self, request_id: int, reason: str) -> bool:
         """Note that a service call will not be answered."""
         service = self._close_call(request_id)
@@ -133,6 +148,11 @@ class Replies:
             raise ExecutionError(
                 'the cancel of a running goal of {} was refused'.format(goal.action)
             )
+
+    def _require(self, goal_id: int, kind: str, data: Any) -> None:
+        goal = self._goals.find(goal_id)
+        if goal is not None and goal.is_running:
+            self._steps.read(goal.action + kind, data)
 
     def _close_call(self, request_id: int) -> Optional[str]:
         service = self._calls.close(request_id)

@@ -4,7 +4,8 @@ Common part of the executors of both deployments, around any `ControlledSystem`.
 An adapter calls an executor from one thread: `tick` once in a period, the other methods when a
 message or reply comes. The middleware must not call the executor back from within a call. No
 method raises an exception: one of the system or of the middleware becomes a fault, and the robot
-comes to rest.
+comes to rest. The one exception is `MissingData`, for data that the caller must not leave out:
+nothing has happened then.
 
 A request is always taken in this order: prepare its message, take the event, take all silent
 steps, make the releases that are due, send the message. So no request is decided on an old state.
@@ -25,6 +26,7 @@ from robosc.execution.runtime.protocol import (
     batches,
     ControlledSystem,
     Description,
+    MissingData,
     OUTGOING,
     RobotSide,
     StrategicSystem,
@@ -66,12 +68,18 @@ _Method = TypeVar('_Method', bound=Callable[..., None])
 
 
 def guarded(method: _Method) -> _Method:
-    """Return the method; each exception becomes a fault, and `_finish` follows in any case."""
+    """
+    Return the method; each exception becomes a fault, and `_finish` follows in any case.
+
+    Missing data is the fault of the caller instead.
+    """
 
     @wraps(method)
     def wrapper(self: Runner, *arguments: Any, **named: Any) -> None:
         try:
             method(self, *arguments, **named)
+        except MissingData as error:
+            self._refuse(error)
         except Exception as error:
             self._fail(describe_error(error))
         self._finish()
@@ -248,6 +256,7 @@ class Runner:
         :param identifier: Identifier on which the message came.
         :param data: Mapping or object with the properties, or the plain value of a basic type;
             None for no data.
+        :raises MissingData: A part is missing that cannot be unknown by its type: nothing happens.
         """
         # This is written out for speed: the cycle time of the controller.
         if not self._is_started:
@@ -265,17 +274,22 @@ class Runner:
                     for name, _ in batch:
                         self._see(name)
             else:
-                for name, event in batch:
-                    if self._steps.happen_with_data(event, data, may_keep=True):
+                # None of them happens if another one lacks data.
+                readings = [self._steps.read(event, data) for _, event in batch]
+                for (name, event), reading in zip(batch, readings):
+                    if self._steps.happen_reading(event, reading, may_keep=True):
                         self._see(name)
             self._end_batch()
+        except MissingData as error:
+            self._refuse(error)
         except Exception as error:
             self._fail(describe_error(error))
 
     @guarded
     def on_reply(self, request_id: int, data: Any) -> None:
-        """Take in the reply to a service call."""
+        """Take in the reply to a service call (MissingData as `receive`)."""
         self._look_at_clock()
+        self._replies.require_reply(request_id, data)
         self._take_reply(request_id, data)
 
     @guarded
@@ -293,8 +307,9 @@ class Runner:
 
     @guarded
     def on_feedback(self, goal_id: int, data: Any) -> None:
-        """Take in the feedback on a goal."""
+        """Take in the feedback on a goal (MissingData as `receive`)."""
         self._look_at_clock()
+        self._replies.require_feedback(goal_id, data)
         self._take_feedback(goal_id, data)
 
     @guarded
@@ -305,8 +320,10 @@ class Runner:
         :param goal_id: Id of the goal.
         :param outcome: `succeeded`, `rejected`, `aborted`, `cancelled` or `lost`.
         :param data: Its result, if it succeeded.
+        :raises MissingData: As `receive`.
         """
         self._look_at_clock()
+        self._replies.require_result(goal_id, outcome, data)
         self._take_end(goal_id, outcome, data)
 
     @guarded
@@ -438,6 +455,10 @@ class Runner:
         self._update_may_request()
         if is_event:
             self._end_batch()
+
+    def _refuse(self, error: MissingData) -> None:
+        """Refuse data that lacks what every message has; an adapter may override it."""
+        raise error
 
     def _finish(self) -> None:
         """End the handling of a message or reply, also after a failure. Never raises."""

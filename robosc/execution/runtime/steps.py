@@ -14,7 +14,7 @@ from robosc.execution.runtime.calls import Goal, Goals
 from robosc.execution.runtime.cancels import BY_SUPERVISOR, Cancels
 from robosc.execution.runtime.livelock import LivelockDetector
 from robosc.execution.runtime.progress import ProgressAccount
-from robosc.execution.runtime.protocol import ControlledSystem, Reading, RobotSide
+from robosc.execution.runtime.protocol import ControlledSystem, MissingData, Reading, RobotSide
 from robosc.execution.runtime.recorder import Recorder
 from robosc.execution.runtime.release import Releases
 
@@ -101,8 +101,23 @@ class Steps:
         :param data: Received data.
         :param may_keep: True if the setting `keep` applies, as it does to messages.
         :returns: True if the event was handled; False if the data is unknown and `keep` applies.
+        :raises MissingData: As `read`; then nothing has happened.
         """
-        reading = self._system.read(event, data)
+        return self.happen_reading(event, self.read(event, data), may_keep)
+
+    def read(self, event: str, data: Any) -> Reading:
+        """
+        Convert the data of an uncontrollable event; change nothing.
+
+        :raises MissingData: A part is missing that cannot be unknown by its type.
+        """
+        try:
+            return self._system.read(event, data)
+        except MissingData as error:
+            raise MissingData('{}: {}'.format(event, error)) from None
+
+    def happen_reading(self, event: str, reading: Reading, may_keep: bool = False) -> bool:
+        """Take an event with converted data, as `happen_with_data` does."""
         if reading.unknown:
             # A part that is read alone and with its array is reported once.
             unknown = tuple(dict.fromkeys(reading.unknown))
@@ -234,9 +249,12 @@ class Steps:
         return silent
 
     def _skip(self, event: str, skipped: Tuple[str, ...]) -> None:
-        """Record that updates were skipped."""
+        """Record that updates were skipped: a fault where it was proved that none is."""
         self._recorder.unknown(event, skipped)
         self._handle_unknown(event, skipped)
+        for variable in skipped:
+            if (event, variable) in self._system.description.sure_updates:
+                self._pending = '{} was not updated at {}'.format(variable, event)
 
     def _handle_unknown(self, event: str, what: Tuple[str, ...]) -> None:
         if self._on_unknown == 'fault':

@@ -302,7 +302,7 @@ class Writer:
         if not isinstance(type_, ArrayType):
             raise TypeError(type_)
         element = self.layout.source(type_.element)
-        raw = self.layout.raw(element)
+        raw = self.layout.raw_element(type_.element)
         reads = [
             f"auto* const items = arena.take<{raw}>(message.size());",
             "for (std::size_t k = 0; k < message.size(); k++) {",

@@ -4,6 +4,7 @@ import math
 
 import pytest
 
+from robosc.execution.runtime.protocol import MissingData
 from robosc.execution.runtime.runner import DeploymentError, Status
 from robosc.model.structure import Deployment
 from support.execution import Bench, Sent, system_of
@@ -112,13 +113,13 @@ def test_a_call_that_cannot_be_made_is_answered_and_is_a_fault() -> None:
     assert b.executor.is_faulty
 
 
-@pytest.mark.parametrize("on_unknown", ["default", "fault"])
-def test_a_reply_is_handed_over_whatever_it_does_to_the_supervisor(on_unknown: str) -> None:
-    b = layer(SERVICE, on_unknown=on_unknown)
+def test_a_reply_that_lacks_data_is_not_handed_over() -> None:
+    b = layer(SERVICE)
     b.call("ask", "a")
-    # Its part `success` is missing: the update is skipped.
-    assert b.reply(1, {}) == [("answer", "ask", "a", {})]
-    assert b.executor.is_faulty is (on_unknown == "fault")
+    with pytest.raises(MissingData, match=r"ask.response: value.success is missing"):
+        b.reply(1, {})
+    assert b.reply(1, YES) == [("answer", "ask", "a", YES)]
+    assert b.status() is Status.RUNNING
 
 
 def test_calls_under_way_at_a_restart_are_answered_with_a_default_response() -> None:

@@ -50,8 +50,8 @@ def run(tmp_path: Path) -> robosc.Run:
     run = robosc.simulate(made)
     run.step("scan.response", {"front": 0.7, "class": 1, "rest": [None, "free"], "far": math.inf})
     run.step("move.request")
-    run.step("scan.response", {"class": 9, "far": math.nan})
-    run.step("scan.response")
+    run.step("scan.response", {"front": math.nan, "class": 9, "far": math.nan})
+    run.step("scan.response", {"front": math.nan, "class": 0})
     return run
 
 

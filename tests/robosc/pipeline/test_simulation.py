@@ -142,7 +142,7 @@ def test_a_random_run_is_that_of_the_interpreter(seed: int) -> None:
 def test_a_run_step_by_step(run: robosc.Run) -> None:
     assert run.events == ("scan.response", "level.response", "move.request", "bump.response")
     assert not run.enabled
-    step = run.step("scan.response", {"front": 0.7, "class": 1, "rest": [0.1, 0.9]})
+    step = run.step("scan.response", {"front": 0.7, "class": 1, "word": "any", "rest": [0.1, 0.9]})
     assert step.data["value.front"] == "free"
     assert run.state.variables == {
         "Sensor.front": "free",
@@ -150,9 +150,12 @@ def test_a_run_step_by_step(run: robosc.Run) -> None:
         "Sensor.word": "free",
         "Sensor.number": 1,
     }
-    # Data that was not given is unknown, as it would be to the robot.
-    assert step.unknown == ("value.word is free by default: an earlier rule is unknown",)
-    assert run.step("scan.response", {"front": 0.7, "class": 1}).skipped == ("Sensor.back",)
+    # An element that was not given is unknown, as it would be to the robot; what every message has must be given.
+    assert run.step("scan.response", {"front": 0.7, "class": 1, "word": "any"}).skipped == ("Sensor.back",)
+    with pytest.raises(robosc.DataError, match=r"'scan.response' cannot happen so: value.class is missing"):
+        run.step("scan.response", {"front": 0.7, "word": "any"})
+    with pytest.raises(robosc.DataError, match=r"'level.response' cannot happen so: value is missing, and cannot be"):
+        run.step("level.response")
     assert run.enabled == ("move.request",)
     assert run.step("move.request").provided == 2
     run.step("level.response", 3)
@@ -173,14 +176,15 @@ def test_a_run_step_by_step(run: robosc.Run) -> None:
 
 
 def test_values_of_enums_are_given_by_name_or_by_what_they_are_made_of(run: robosc.Run) -> None:
+    rest = {"front": "free", "class": 0, "word": "any"}
     for given, expected in (("free", "free"), ("blocked", "blocked"), (0.51, "free"), (0, "blocked")):
-        run.step("scan.response", front=given)
+        run.step("scan.response", **rest | {"front": given})
         assert run.state.variables["Sensor.front"] == expected
     # A text that is a value is that value, whatever the rules would make of it; another text goes by the rules.
     for word, expected in (("free", "free"), ("taken", "taken"), ("anything", "free")):
-        run.step("scan.response", word=word)
+        run.step("scan.response", **rest | {"word": word})
         assert run.state.variables["Sensor.word"] == expected
-    run.step("scan.response", rest=("free", 0.1))
+    run.step("scan.response", **rest | {"rest": ("free", 0.1)})
     assert run.state.variables["Sensor.back"] == "free"
 
 

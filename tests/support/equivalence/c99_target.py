@@ -50,6 +50,7 @@ class C99Target:
         self._topics = tuple(self._layout.topics)
         self._ids = Ids()
         self._now_s = 0.0
+        self._last = Observation()
         program = self._compiled(folder, *(options or SANITIZERS))
         self._errors = (folder / "errors").open("w+", encoding="utf-8")
         self._process = subprocess.Popen(
@@ -69,7 +70,9 @@ class C99Target:
         return settings_words(self._layout, settings)
 
     def do(self, action: Action, awaited: Observation | None = None) -> Observation:
-        """Let one thing happen."""
+        """Let one thing happen; data that lacks what cannot be unknown cannot be said in C."""
+        if awaited is not None and any(kind == "refused" for kind, *_ in awaited.issued):
+            return replace(self._last, issued=awaited.issued, log=())
         self._now_s += PERIOD_S if action.do == "tick" else action.seconds
         now, name, ids = microseconds(self._now_s), action.subject, self._ids
         match action.do:
@@ -121,7 +124,8 @@ class C99Target:
         for line in _pipe(self._process.stdout):
             kind, *rest = line.split()
             if kind == "state":
-                return self._observation(rest, issued, log)
+                self._last = self._observation(rest, issued, log)
+                return self._last
             if kind == "log":
                 log.append(self._entry(*rest))
             else:
@@ -269,6 +273,8 @@ class C99Layer(C99Target):
 
     def do(self, action: Action, awaited: Observation | None = None) -> Observation:
         """Let one thing happen."""
+        if awaited is not None and any(what == "refused" for what, *_ in awaited.issued):
+            return super().do(action, awaited)
         name = action.subject
         kind = action.do.removeprefix("ask_")
         if action.do == "ask":

@@ -182,7 +182,7 @@ class Driver:
         self.executor.start()
 
     def do(self, do: str, name: str, data: Any, how: str, seconds: float) -> None:
-        """Let one thing happen.
+        """Let one thing happen, or nothing if its data lacks what cannot be unknown: then it is `refused`.
 
         Args:
             do: Its kind, as `Action` of support.equivalence.scenario has it.
@@ -191,8 +191,18 @@ class Driver:
             how: Outcome of a goal.
             seconds: Time that passes, in seconds.
         """
-        executor, ids, callers = self.executor, self.ids, self.callers
         self._clock.advance(seconds)
+        is_end = do == "reply" or do == "end"
+        number = self.ids.last(name) if is_end else 0
+        try:
+            self._do(do, name, data, how)
+        except self._runtime.MissingData:
+            self._world._note("refused", name)
+            if is_end:
+                self.ids.add(name, number)
+
+    def _do(self, do: str, name: str, data: Any, how: str) -> None:
+        executor, ids, callers = self.executor, self.ids, self.callers
         # Later ones than 3.8 would match.
         if do == "tick":
             executor.tick()

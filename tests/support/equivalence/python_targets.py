@@ -6,7 +6,7 @@ from typing import Any
 
 from robosc.automata.executable import ExecutableSystem
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.execution.runtime import clock, event_log, executor, layer, settings
+from robosc.execution.runtime import clock, event_log, executor, layer, protocol, settings
 from robosc.model.structure import Communication, CommunicationKind, Deployment, Model
 from robosc.supervisor import Supervisor
 from support.equivalence.observation import FULL, NO_LOG, Observation, entry
@@ -101,6 +101,7 @@ def reference(supervisor: Supervisor, *, has_log: bool = True) -> PythonTarget:
         ManualClock=clock.ManualClock,
         MemoryLog=event_log.MemoryLog,
         NullLog=event_log.NullLog,
+        MissingData=protocol.MissingData,
     )
     system = InterpretedSystem(supervisor)
     return PythonTarget("reference", supervisor.model, system, runtime, is_layer=_is_layer(supervisor), has_log=has_log)

@@ -73,19 +73,25 @@ class Dice:
             return None
         subject = self._dice.choice(sorted(kinds))
         kind, types = kinds[subject]
-        return Action(kind, subject, self.datum(*types))
+        return Action(kind, subject, self.datum(*types, is_complete=True))
 
     def received(self, name: str, part: str) -> Any:
         """Data of a reply, feedback or result."""
         return self.datum(getattr(self._model.communication(name), part))
 
-    def datum(self, *types: Type) -> Any:
-        """Draw a value that may come as something of all these types."""
+    def datum(self, *types: Type, is_complete: bool = False) -> Any:
+        """Draw a value that may come as something of all these types.
+
+        Args:
+            types: The types.
+            is_complete: True if nothing is missing that cannot be said in C, where no event would be refused for it.
+        """
         dice = self._dice
         sources = [self._source(type_) for type_ in types]
         # A missing number is NaN in C.
         if self._is_hostile and not isinstance(sources[0], DoubleType) and dice.random() < 0.05:
-            return None
+            if not is_complete or all(_may_be_unknown(source) for source in sources):
+                return None
         match sources[0]:
             case BooleanType():
                 return dice.choice((True, False))
@@ -98,14 +104,16 @@ class Dice:
             case ArrayType(element=element):
                 if isinstance(self._source(element), DoubleType) and dice.random() < 0.6:
                     return self._scan(element)
-                return [self.datum(element) for _ in range(dice.randint(0, 4))]
+                if self._is_hostile and isinstance(element, BooleanType):
+                    return [dice.choice((True, False, None)) for _ in range(dice.randint(0, 4))]
+                return [self.datum(element, is_complete=True) for _ in range(dice.randint(0, 4))]
             case ObjectType():
                 found: dict[str, list[Type]] = {}
                 for source in sources:
                     if isinstance(source, ObjectType):
                         for part in self._model.object(source.name).properties:
                             found.setdefault(part.name, []).append(part.type)
-                return {name: self.datum(*parts) for name, parts in found.items()}
+                return {name: self.datum(*parts, is_complete=is_complete) for name, parts in found.items()}
             case NoneType():
                 return None
         raise AssertionError(types)
@@ -120,6 +128,11 @@ class Dice:
 
     def _source(self, type_: Type) -> Type:
         return self._model.enum(type_.name).source if isinstance(type_, EnumType) else type_
+
+
+def _may_be_unknown(type_: Type) -> bool:
+    """Return True if a value of a type may be unknown wherever it stands."""
+    return isinstance(type_, StringType | ArrayType) or (isinstance(type_, IntegerType) and not type_.is_bounded)
 
 
 def random_settings(supervisor: Supervisor, dice: Random) -> dict[str, Any]:

@@ -21,6 +21,7 @@ from robosc.expressions import (
     Type,
     type_text,
 )
+from robosc.model.received import required_parts
 from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.supervisor import Supervisor
 from robosc.targets.code.c.layer import request_declarations
@@ -164,12 +165,11 @@ def _unknowns(layout: Layout) -> list[str]:
     return [
         *comment(
             "Values that stand for unknown in received data: NaN for a double, NULL for a text or for an array's "
-            "items, and these for an integer and a boolean."
+            "items, and this for an integer without a range. What every message has, a boolean and an integer of a "
+            "range, cannot be unknown; an element of an array can."
         ),
         f"#define {upper}_UNKNOWN_INTEGER INT64_MIN",
-        f"#define {upper}_UNKNOWN ((int8_t)-1)",
-        f"#define {upper}_FALSE ((int8_t)0)",
-        f"#define {upper}_TRUE ((int8_t)1)",
+        *([f"#define {upper}_UNKNOWN_ELEMENT ((int8_t)-1)"] if _has_booleans_in_arrays(layout) else []),
     ]
 
 
@@ -286,7 +286,7 @@ def _received_types(layout: Layout) -> list[str]:
         under_way.append(name)
         if isinstance(type_, ArrayType):
             visit(type_.element)
-            raw = layout.raw(type_.element)
+            raw = layout.raw_element(type_.element)
             body = [f"{pointer_to(raw, 'items')};", "size_t length;"]
             words = "An array; `items` is NULL where none came."
         else:
@@ -312,7 +312,8 @@ def _received_types(layout: Layout) -> list[str]:
     for enum in layout.model.enums:
         visit(enum.source)
     for name in dict.fromkeys(layout.raw(root) for root in roots if isinstance(root, ObjectType | ArrayType)):
-        lines += ["/* Nothing is known. */", f"extern const {name} {unknown_name(name)};", ""]
+        words = "All that can be unknown is; what cannot is false, 0, or the number of its range next to 0."
+        lines += [*comment(words), f"extern const {name} {unknown_name(name)};", ""]
     return lines
 
 
@@ -394,7 +395,9 @@ def _entries(layout: Layout) -> list[str]:
     for identifier in layout.received_topics:
         names = ", ".join(item.name for item in batch(layout, identifier))
         lines += [
-            *comment(f"A message came on {identifier}: {names}. NULL: nothing of it is known.{_message_words(layout)}"),
+            *comment(
+                f"A message came on {identifier}: {names}.{_null_words(layout, identifier)}{_message_words(layout)}"
+            ),
             f"{receive_head(layout, identifier)};",
             "",
         ]
@@ -457,6 +460,31 @@ def reply_head(layout: Layout, event: str) -> str:
         parameters.append(layout.parameter(data, "data"))
     parameters += _passed_on(layout)
     return f"void {layout.function(purpose, name)}({', '.join(parameters)})"
+
+
+def _null_words(layout: Layout, identifier: str) -> str:
+    """What it means that there is no data, where data is handed over by its address."""
+    model, events = layout.model, [item.event(EventKind.RESPONSE) for item in batch(layout, identifier)]
+    types = [type_ for event in events if (type_ := event_data(model, event)) is not None]
+    if not any(layout.is_by_pointer(type_) for type_ in types):
+        return ""
+    if any(required_parts(model, event) for event in events):
+        return " NULL: unexpected, nothing happens, since every message has some of it."
+    return " NULL: nothing of it is known."
+
+
+def _has_booleans_in_arrays(layout: Layout) -> bool:
+    """Return True if an element of an array that comes is a boolean."""
+    parts = [*data_that_comes(layout), *(part.type for item in layout.model.objects for part in item.properties)]
+    return any(_is_of_booleans(part) for part in parts)
+
+
+def _is_of_booleans(type_: Type) -> bool:
+    while isinstance(type_, ArrayType):
+        type_ = type_.element
+        if isinstance(type_, BooleanType):
+            return True
+    return False
 
 
 def _message_words(layout: Layout) -> str:

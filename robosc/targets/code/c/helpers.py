@@ -148,8 +148,15 @@ HELPERS: dict[str, str] = dict(
             "static int boolean_of(int8_t a)\n{\n    return (a == 0 || a == 1) ? a : KLEENE_UNKNOWN;\n}",
         ),
         (
-            "clamped",
+            "moved",
             "/* A received integer of a declared range: however far outside, it is moved to the nearest bound. */\n"
+            "static int64_t moved(int64_t a, int64_t low, int64_t high, notes_t *notes)\n{\n"
+            "    const int64_t found = a < low ? low : (a > high ? high : a);\n"
+            "    if (found != a && notes != NULL) {\n        notes->is_unknown = true;\n    }\n    return found;\n}",
+        ),
+        (
+            "clamped",
+            "/* The same for one that may be unknown, in an array. */\n"
             "static int64_t clamped(int64_t a, int64_t low, int64_t high, notes_t *notes)\n{\n"
             "    const int64_t moved = a < low ? low : (a > high ? high : a);\n"
             "    if (a == INT64_MIN) {\n        return a;\n    }\n"

@@ -146,5 +146,5 @@ def _requests(layout: Layout) -> list[str]:
     return lines
 
 
-_UNKNOWN = {"int8_t": "{upper}_UNKNOWN", "int64_t": "{upper}_UNKNOWN_INTEGER", "double": "0.0", "const char *": "NULL"}
-"""Data of which nothing is known; a number stands for a double, since its NaN needs a header."""
+_UNKNOWN = {"bool": "false", "int64_t": "{upper}_UNKNOWN_INTEGER", "double": "0.0", "const char *": "NULL"}
+"""Data of which nothing is known that can be unknown; a number stands for a double, since its NaN needs a header."""

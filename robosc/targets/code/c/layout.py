@@ -27,14 +27,15 @@ from robosc.targets.code.c.text import declared
 
 # Names of the engine itself after the prefix.
 _ENGINE_NAMES = """
-    t ACTION_COUNT AIM_COUNT ASSUMPTION_COUNT COMMUNICATION_COUNT CONJUNCT_COUNT EVENT_COUNT FALSE H LIMIT_COUNT
+    t ACTION_COUNT AIM_COUNT ASSUMPTION_COUNT COMMUNICATION_COUNT CONJUNCT_COUNT EVENT_COUNT H LIMIT_COUNT
     MISSION_COUNT NO_COMMUNICATIONS NO_EVENT NO_EVENTS NO_NUMBERS NO_SOURCES NO_TOPICS NUMBER_COUNT RECEIVED_COUNT
-    REQUEST_COUNT REQUIREMENT_COUNT SENSOR_COUNT SERVICE_COUNT SILENT_COUNT TOPIC_COUNT TRUE UNCONTROLLABLE_DATA
-    UNKNOWN UNKNOWN_INTEGER VISIT_COUNT WHEN_COUNT acting_t approached call_failed call_t callbacks_t cancel_refused
-    cancel_t cancelling cancelling_t chosen communication_name communication_t counters_t default_settings detour
-    enabled end_t event_name event_t fault fault_t goal_accepted goal_ended goal_t init item_t log_t mission mission_t
-    number_name number_t on_unknown_t outcome_t policy_t refusal_t request_t restart sensor_t sent_t settings_t
-    source_name source_t standing standing_t start state_t status status_t stop tick topic_name topic_t watch
+    REQUEST_COUNT REQUIREMENT_COUNT SENSOR_COUNT SERVICE_COUNT SILENT_COUNT TOPIC_COUNT UNCONTROLLABLE_DATA
+    UNKNOWN_ELEMENT UNKNOWN_INTEGER VISIT_COUNT WHEN_COUNT acting_t approached call_failed call_t callbacks_t
+    cancel_refused cancel_t cancelling cancelling_t chosen communication_name communication_t counters_t
+    default_settings detour enabled end_t event_name event_t fault fault_t goal_accepted goal_ended goal_t init item_t
+    log_t mission mission_t number_name number_t on_unknown_t outcome_t policy_t refusal_t request_t restart sensor_t
+    sent_t settings_t source_name source_t standing standing_t start state_t status status_t stop tick topic_name
+    topic_t watch
 """.split()
 
 
@@ -131,7 +132,7 @@ class Layout:
         """The C type of received data as it comes; an enum comes as what it is made from."""
         match type_:
             case BooleanType():
-                return "int8_t"
+                return "bool"
             case IntegerType():
                 return "int64_t"
             case DoubleType():
@@ -148,6 +149,10 @@ class Layout:
                 raise InternalError("none has no C type")
         raise InternalError(f"no C type for {type_!r}")
 
+    def raw_element(self, type_: Type) -> str:
+        """The C type of an array's element, which may be unknown even if it is a boolean."""
+        return "int8_t" if isinstance(type_, BooleanType) else self.raw(type_)
+
     def _word(self, type_: Type) -> str:
         match type_:
             case EnumType(name=name):
@@ -157,7 +162,7 @@ class Layout:
             case ArrayType(element=element):
                 return f"array_of_{self._word(element)}"
             case _:
-                return {"int8_t": "boolean", "int64_t": "integer", "double": "double"}.get(self.raw(type_), "string")
+                return {"bool": "boolean", "int64_t": "integer", "double": "double"}.get(self.raw(type_), "string")
 
     def _type(self, kind: str, word: str) -> str:
         key = f"{kind} {word}"

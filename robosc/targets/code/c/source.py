@@ -6,7 +6,7 @@ from functools import partial
 from robosc.automata.executable import CALLED_KINDS
 from robosc.automata.plants import communication_plant_name
 from robosc.expressions import ArrayType, BooleanType, DoubleType, EnumType, IntegerType, NoneType, ObjectType, Type
-from robosc.model.received import converted_paths
+from robosc.model.received import converted_paths, required_parts
 from robosc.model.structure import CommunicationKind, EventKind, is_tau
 from robosc.targets.code.c.conditions import CConditions
 from robosc.targets.code.c.expressions import number_code
@@ -139,7 +139,9 @@ def _unknown_constants(layout: Layout) -> list[str]:
 def _unknown_value(layout: Layout, type_: Type) -> str:
     match layout.source(type_):
         case BooleanType():
-            return "-1"
+            return "false"
+        case IntegerType(low=int(low), high=int(high)):
+            return str(min(max(0, low), high))
         case IntegerType():
             return "INT64_MIN"
         case DoubleType():
@@ -351,6 +353,11 @@ def _entries(layout: Layout) -> list[list[str]]:
         ignored = statement_lines(unused(*parameters.values()))
         body = ["if (!r->is_started) {", "    return;", "}", _LOOK]
         for item in batch(layout, identifier):
+            data = event_data(layout.model, item.event(EventKind.RESPONSE))
+            body += _refused(
+                layout, item.event(EventKind.RESPONSE), data, "" if data is None else parameters[layout.raw(data)]
+            )
+        for item in batch(layout, identifier):
             event = item.event(EventKind.RESPONSE)
             data = event_data(layout.model, event)
             arguments = ["r", *([parameters[layout.raw(data)]] if data is not None else []), "true"]
@@ -362,6 +369,15 @@ def _entries(layout: Layout) -> list[list[str]]:
             body += ["finish(r);", f"require(r, r->callbacks.pass_on(r->callbacks.context, {source}, message));"]
         result.append([receive_head(layout, identifier), "{", *indent([*ignored, *body]), "}"])
     return result + _replies(layout)
+
+
+def _refused(layout: Layout, event: str, data: Type | None, name: str, condition: str = "") -> list[str]:
+    """Refuse no data for an event that cannot happen without, where a condition holds."""
+    if data is None or not layout.is_by_pointer(data) or not required_parts(layout.model, event):
+        return []
+    ends = ["finish(r);"] if layout.is_layer else []
+    body = [f"unexpected(r, (int){layout.events[event]});", *ends, "return;"]
+    return [f"if ({name} == NULL{condition}) {{", *indent(body), "}"]
 
 
 def _replies(layout: Layout) -> list[list[str]]:
@@ -381,7 +397,13 @@ def _replies(layout: Layout) -> list[list[str]]:
     for place, item in enumerate(layout.of_kind(CommunicationKind.SERVICE)):
         event = item.event(EventKind.RESPONSE)
         awaited = f"is_awaited = r->calls[{place}].is_awaited && r->calls[{place}].id == id;"
-        body = [f"if (close_call(r, {place}, id)) {{", *indent(taken(event)), "}"]
+        is_open = f" && r->calls[{place}].is_open && r->calls[{place}].id == id"
+        body = [
+            *_refused(layout, event, event_data(layout.model, event), "data", is_open),
+            f"if (close_call(r, {place}, id)) {{",
+            *indent(taken(event)),
+            "}",
+        ]
         answer = [f"answer_caller(r, {place}, is_awaited, message);"]
         add(event, ["bool is_awaited = false;", awaited], body, answer)
     for place, item in enumerate(layout.of_kind(CommunicationKind.ACTION)):
@@ -389,6 +411,7 @@ def _replies(layout: Layout) -> list[list[str]]:
             event, is_end = item.event(kind), kind is EventKind.RESPONSE
             ended = f"end_for_caller(r, {place}, {layout.upper}_END_SUCCEEDED, message);"
             body = [
+                *_refused(layout, event, event_data(layout.model, event), "data", f" && r->goals[{place}].is_running"),
                 *([f"close_goal(r, {place});"] if is_end else []),
                 f"if (r->goals[{place}].is_running) {{",
                 *indent(taken(event)),

@@ -120,12 +120,22 @@ class Unit:
             self.uses[name] = uses
         return self.functions[template][0]
 
-    def conversion(self, lvalue: Lvalue, type_: Type, notes: str) -> Code:
-        """The value of a type that is made of received data; what must be noted goes to `notes`."""
+    def conversion(self, lvalue: Lvalue, type_: Type, notes: str, *, is_element: bool = True) -> Code:
+        """The value of a type that is made of received data.
+
+        Args:
+            lvalue: Place of the data.
+            type_: The type.
+            notes: Text of the address that what must be noted goes to.
+            is_element: True for a part of an array's element, which may be unknown whatever its type is.
+        """
         read, noted = variable(str(lvalue)), variable(notes)
         match type_:
             case IntegerType(low=int(low), high=int(high)):
-                code = call("clamped", read, number_code(low), number_code(high), noted)
+                bounds = number_code(low), number_code(high)
+                if not is_element:
+                    return call("moved", read, *bounds, noted).typed(type_)
+                code = call("clamped", read, *bounds, noted)
             case IntegerType():
                 code = call("whole", read)
             case EnumType(name=name):
@@ -135,8 +145,10 @@ class Unit:
                 return place(lvalue.address, type_)
             case ObjectType():
                 raise InternalError(f"{lvalue} is not a single value")
-            case BooleanType():
+            case BooleanType() if is_element:
                 code = call("boolean_of", read)
+            case BooleanType():
+                return read.typed(type_)
             case _:
                 code = read
         return code.typed(type_, unknown_as(sort_of(type_)))
@@ -157,7 +169,7 @@ class Unit:
     def part(self, lvalue: Lvalue, type_: Type, path: Path, notes: str) -> Code:
         """The value of a part of received data; unknown where it is absent."""
         guards, found, inner = self.access(lvalue, type_, path)
-        code = self.conversion(found, inner, notes)
+        code = self.conversion(found, inner, notes, is_element=bool(guards))
         if not guards:
             return code
         is_there = guards[0] if len(guards) == 1 else operation("and", *guards)
@@ -317,7 +329,7 @@ class Reading(CWriter):
             f"    int result = count == 0 ? KLEENE_UNKNOWN : {1 - ends};",
             *indent(statement_lines(unused(*[*parameters][1:]))),
             "    for (size_t k = 0; k < count; k++) {",
-            f"        {pointer_to(raw(type_.element), 'item')} = &array->items[{index}];",
+            f"        {pointer_to(self.unit.layout.raw_element(type_.element), 'item')} = &array->items[{index}];",
             f"        const int holds = {condition};",
             "        (void)item;",
             f"        if (holds == {ends}) {{",

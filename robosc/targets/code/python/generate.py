@@ -44,8 +44,11 @@ def header(supervisor: Supervisor) -> str:
 
 
 RUNTIME = {
-    Deployment.CONTROLLER: ("robosc.targets.code.python.runtime.reading", "robosc.execution.runtime.asynchronous"),
-    Deployment.LAYER: ("robosc.targets.code.python.runtime.reading", "robosc.execution.runtime.layer"),
+    deployment: ("robosc.targets.code.python.runtime.reading", "robosc.execution.runtime.given", executor)
+    for deployment, executor in (
+        (Deployment.CONTROLLER, "robosc.execution.runtime.asynchronous"),
+        (Deployment.LAYER, "robosc.execution.runtime.layer"),
+    )
 }
 """The modules that a supervisor runs on; they bring those that they need."""
 
@@ -180,9 +183,9 @@ def _class(writer: Writer) -> list[str]:
 def _description(description: Description) -> list[str]:
     lines = ["description = Description("]
     for field, content in description._asdict().items():
-        if field in ("has_strategy", "aims", "assumptions", "missions") and not content:
+        if field in ("has_strategy", "aims", "assumptions", "missions", "sure_updates") and not content:
             continue
-        if field in ("communications", "aims", "assumptions", "missions"):
+        if field in ("communications", "aims", "assumptions", "missions", "sure_updates"):
             lines += [f"    {field}=(", *(f"        {item!a}," for item in content), "    ),"]
         else:
             lines.append(f"    {field}={content!a},")

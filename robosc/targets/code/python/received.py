@@ -4,7 +4,7 @@ from functools import reduce
 
 from robosc.errors import InternalError
 from robosc.expressions import ArrayType, BooleanType, DoubleType, EnumType, IntegerType, ObjectType, StringType, Type
-from robosc.model.received import Path, path_text
+from robosc.model.received import Path, path_text, required_at
 from robosc.model.structure import EnumDefinition
 from robosc.targets.code.expressions import (
     FALSE_CODE,
@@ -23,7 +23,7 @@ from robosc.targets.code.python.layout import Layout
 from robosc.targets.code.python.naming import PythonNamer
 from robosc.targets.code.python.statements import statement_lines
 from robosc.targets.code.received import ReceivedReader
-from robosc.targets.code.statements import Assign, If, Let, Return, when
+from robosc.targets.code.statements import Assign, Do, If, Let, Return, when
 from robosc.targets.text import indent
 
 _PLAIN: dict[type, str] = {
@@ -34,19 +34,36 @@ _PLAIN: dict[type, str] = {
 }
 """Functions of `values` that convert an element about which there is nothing to note."""
 
+_GIVEN: dict[type, str] = {BooleanType: "given_boolean", IntegerType: "given_integer"}
+"""Functions that refuse data without a part that an enum is made of."""
+
 _DATA, _NOTES = variable("data"), variable("notes")
 _ABSENT = (constant(None), constant(()), FALSE_CODE)
 
 
-def received_unknown(type_: Type, path: Path) -> Unknown:
-    """Return the way in which received data of a type, at a path, is unknown."""
+def received_unknown(type_: Type, path: Path, *, is_event: bool) -> Unknown:
+    """Return the way in which received data of a type, at a path, is unknown.
+
+    Args:
+        type_: The type.
+        path: The path.
+        is_event: True if the data comes with an event, which does not happen without what cannot be unknown.
+    """
     match type_:
+        case EnumType() if not _is_element(path):
+            return Unknown.NEVER  # The rules make a value of any data; an element may be absent.
+        case BooleanType() if is_event and not _is_element(path):
+            return Unknown.NEVER
+        case IntegerType() if is_event and type_.is_bounded and not _is_element(path):
+            return Unknown.NEVER
         case DoubleType() | IntegerType():
             return Unknown.NAN
-        case EnumType() if not any(isinstance(step, int) for step in path):
-            return Unknown.NEVER  # The rules make a value of any data; an element may be absent.
         case _:
             return Unknown.VALUE
+
+
+def _is_element(path: Path) -> bool:
+    return any(isinstance(step, int) for step in path)
 
 
 def reader_namer() -> PythonNamer:
@@ -62,14 +79,18 @@ class Reader(ReceivedReader):
         root: Type of the datum.
         used: Functions of the runtime modules that the statements call.
         namer: Names the locals.
+        is_event: True if the datum comes with an event: then it must have what cannot be unknown by its type.
 
     Attributes:
         words: Tuples that say what was unknown, so far.
         flags: Conditions that an enum fell to its default past an unknown rule, so far.
     """
 
-    def __init__(self, layout: Layout, root: Type, used: set[str], namer: PythonNamer | None = None) -> None:
+    def __init__(
+        self, layout: Layout, root: Type, used: set[str], namer: PythonNamer | None = None, *, is_event: bool = False
+    ) -> None:
         super().__init__(layout.model, root, namer or reader_namer())
+        self._is_event = is_event
         self.layout = layout
         self.used = used
         self.words: list[Code] = []
@@ -122,13 +143,15 @@ class Reader(ReceivedReader):
                 value = self._call("number", self._access(path))
             case IntegerType(low=int(low), high=int(high)):
                 received, bounds = variable(self.local(path, "_received")), (integer(low), integer(high))
-                self._statements.append(Let(received, self._call("whole", self._access(path))))
+                self._statements.append(Let(received, self._required(path, "given_integer", "whole")))
                 self.words.append(self._call("moved", constant(path_text(path)), received, *bounds))
                 value = self._call("clamped", received, *bounds)
             case IntegerType():
                 value = self._call("integer", self._access(path))
-            case BooleanType() | StringType():
-                value = self._call(_PLAIN[type(type_)], self._access(path))
+            case BooleanType():
+                value = self._required(path, "given_boolean", "read_boolean")
+            case StringType():
+                value = self._call("read_string", self._access(path))
             case EnumType(name=enum):
                 return self._read_enum(path, type_, enum)
             case ArrayType(element=element):
@@ -136,6 +159,12 @@ class Reader(ReceivedReader):
             case _:
                 raise InternalError(f"{path_text(path)} is not a single value")
         return self._assign(path, type_, value)
+
+    def _required(self, path: Path, given: str, plain: str) -> Code:
+        """The datum at a path by the function that refuses none, where there must be one, else by the plain one."""
+        if self._is_event and not _is_element(path):
+            return self._call(given, self._access(path), constant(path_text(path)))
+        return self._call(plain, self._access(path))
 
     def _read_array(self, path: Path, type_: Type, element: Type) -> Code:
         plain = _PLAIN.get(type(element))
@@ -177,14 +206,18 @@ class Reader(ReceivedReader):
 
     def _read_enum(self, path: Path, type_: Type, enum: str) -> Code:
         value, words, flag = (variable(self.local(path, suffix)) for suffix in ("", "_words", "_unknown"))
+        if self._is_event:
+            for part, part_type in required_at(self._model, self._root, path):
+                function = _GIVEN.get(type(part_type), "given")
+                self._statements.append(Do(self._call(function, self._access(part), constant(path_text(part)))))
         converted = call(self.layout.converters[enum], self._access(path), constant(path_text(path)))
         self._statements.append(Assign(operation("list", value, words, flag), converted))
         self.words.append(words)
         self.flags.append(flag)
-        return value.typed(type_, received_unknown(type_, path))
+        return value.typed(type_, received_unknown(type_, path, is_event=self._is_event))
 
     def _assign(self, path: Path, type_: Type, value: Code) -> Code:
-        code = place(self.local(path), type_, received_unknown(type_, path))
+        code = place(self.local(path), type_, received_unknown(type_, path, is_event=self._is_event))
         self._statements.append(Let(code, value))
         return code
 

@@ -39,7 +39,7 @@ def read_method(writer: Writer, event: str) -> list[str]:
     if not paths:
         words = f"{event}: nothing of its data is converted."
         return method(name, words, [Return(variable("NO_DATA"))], [_DATA])
-    reader = Reader(writer.layout, _event_type(writer, event), writer.used)
+    reader = Reader(writer.layout, _event_type(writer, event), writer.used, is_event=True)
     codes = [reader.read(path) for path in paths]
     # Arrays can be long, so they are not logged.
     shown = [path for path in paths if not isinstance(reader.type_at(path), ArrayType)]
@@ -64,7 +64,7 @@ def receive_method(writer: Writer, identifier: str, batch: tuple[str, ...]) -> l
     for event in batch:
         values: list[Code] = []
         if paths := converted_paths(writer.model, event):
-            reader = Reader(writer.layout, _event_type(writer, event), writer.used, namer)
+            reader = Reader(writer.layout, _event_type(writer, event), writer.used, namer, is_event=True)
             values = [reader.read(path) for path in paths]
             read += reader.take()
             words += reader.words
@@ -119,7 +119,7 @@ class _StepWriter(StepWriter):
         for path in self.paths:
             name = self._namer.name("_".join(["value", *map(str, path)]))
             type_ = self._values.received_type(path)
-            self.received[path] = place(name, type_, received_unknown(type_, path))
+            self.received[path] = place(name, type_, received_unknown(type_, path, is_event=True))
         self._copy_what_is_overwritten()
         body = self._components()
         copied = [Let(copy, variable(f"self.{attribute}")) for attribute, copy in self.copies.items()]

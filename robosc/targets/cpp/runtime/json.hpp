@@ -148,7 +148,7 @@ inline void put_json(std::string& out, std::int64_t value)
     out += value == INT64_MIN ? "null" : std::to_string(value);
 }
 
-/* A received boolean. */
+/* A received boolean in an array. */
 inline void put_json(std::string& out, std::int8_t value) { out += value < 0 ? "null" : value > 0 ? "true" : "false"; }
 
 }  // namespace robosc

@@ -111,11 +111,12 @@ void require_string(const F&)
 
 /* Received. */
 
-template <class F>
-void read_boolean(const F& field, std::int8_t& value)
+/* An element of an array is no bool, since it may be unknown. */
+template <class F, class V>
+void read_boolean(const F& field, V& value)
 {
     require_boolean(field);
-    value = field ? 1 : 0;
+    value = static_cast<V>(field ? 1 : 0);
 }
 
 template <class F>

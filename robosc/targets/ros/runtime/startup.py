@@ -15,7 +15,9 @@ from collections import deque
 from collections.abc import Mapping
 from typing import Any
 
+from robosc.execution.runtime.protocol import MissingData
 from robosc.execution.runtime.runner import Runner
+from robosc.execution.runtime.safe_stop import describe_error
 
 
 class HeldMessages:
@@ -71,6 +73,10 @@ class StartupBufferingRunner(Runner):
             self._came_s = came_s
             self.receive(identifier, message)
         self._came_s = None
+
+    def _refuse(self, error: MissingData) -> None:
+        # No caller can be told: a message of a type that lacks a field of the model's came.
+        self._fail(describe_error(error))
 
     def _see(self, name: str) -> None:
         if self._came_s is None:

@@ -88,7 +88,14 @@ class _Line:
             yield from self._instead(instead[1], instead[2])
             return
         match found.code:
-            case "unknown-name" | "update-out-of-scope" | "unknown-field" | "unknown-ros-type" | "field-type-mismatch":
+            case (
+                "unknown-name"
+                | "update-out-of-scope"
+                | "unknown-field"
+                | "needless-property"
+                | "unknown-ros-type"
+                | "field-type-mismatch"
+            ):
                 for name in _WRITE.findall(found.fix):
                     yield self._written(name)
             case "ambiguous-name":

@@ -29,6 +29,7 @@ from robosc.model.findings import Bindings, Findings
 from robosc.model.goals import build_goals
 from robosc.model.interfaces import InterfaceChecker
 from robosc.model.missions import build_missions, build_preferences
+from robosc.model.needless import PropertyUses, without
 from robosc.model.own_requests import OwnRequests
 from robosc.model.places import Places
 from robosc.model.restrictions import Restrictions
@@ -204,7 +205,8 @@ class _RobotChecker:
             if tree is not None:
                 check_synthesis_variables(tree, behaviour, communications, self._types, self.findings)
                 partial_updates(tree, behaviour, self.findings)
-        interfaces = InterfaceChecker(self._bundle, self._types, self.findings)
+        uses = PropertyUses(communications.values(), behaviours.values(), provides, enums, self._types.objects)
+        interfaces = InterfaceChecker(self._bundle, self._types, self.findings, uses)
         fitting = interfaces.check(trees, communications, self._unit)
         self.fields = interfaces.fields
         self._check_data(trees, communications, provides, fitting)
@@ -214,12 +216,14 @@ class _RobotChecker:
         self.places.objects.update(self._types.object_places)
         if self.findings.has_errors:
             return None
+        needed = without(communications.values(), enums, self._types.objects.values(), interfaces.left_out)
+        self.places.objects.update((name, self.places.objects[old]) for name, old in needed.origins.items())
         return Model(
             name=self._tree.name.text,
             components=tuple(Component(part.name, marked.get(part.name)) for part in self.parts),
-            communications=tuple(communications.values()),
-            enums=enums,
-            objects=tuple(self._types.objects.values()),
+            communications=needed.communications,
+            enums=needed.enums,
+            objects=needed.objects,
             requirements=requirements,
             provides=provides,
             invariants=invariants,

@@ -28,6 +28,7 @@ from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Bindings, Findings
 from robosc.model.goals import build_goals
 from robosc.model.interfaces import InterfaceChecker
+from robosc.model.message_outcomes import message_outcomes
 from robosc.model.missions import build_missions, build_preferences
 from robosc.model.needless import PropertyUses, without
 from robosc.model.own_requests import OwnRequests
@@ -184,7 +185,10 @@ class _RobotChecker:
             for part in self.parts
         }
         constants = Constants(self._types, self._libraries, self.findings)
-        self.scopes = scopes = RobotScopes(self._unit, self._types, self.parts, self._libraries, names, constants)
+        outcomes = message_outcomes(trees, filter(None, behaviour_trees.values()), names)
+        self.scopes = scopes = RobotScopes(
+            self._unit, self._types, self.parts, self._libraries, names, constants, outcomes
+        )
         scopes.of(self._unit)  # Also a file whose constants nothing uses has them checked.
         enums = self._enums(scopes)
         behaviours = self._behaviours(behaviour_trees, scopes, communications)

@@ -138,7 +138,7 @@ def without(
         return Needed(communications, enums, objects)
     variants = _Variants(objects)
     made: dict[str, Communication] = {}
-    # What needs everything is first, and keeps the names.
+    # Those that need everything are first, and keep the names.
     for item in sorted(communications, key=lambda item: bool(left_out.get(item.name))):
         gone = left_out.get(item.name, LeftOut())
         types = {part: variants.of(getattr(item, part), item.name, gone) for part in _PARTS}

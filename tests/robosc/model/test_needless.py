@@ -5,7 +5,7 @@ from robosc.model.structure import Communication, Model
 from robosc.targets.ros.topics import shapes_of
 from support.models import checked
 
-# As in the scenarios of the language's authors: the pose of one message is filled, that of the other does not exist.
+# The pose of one message is filled, that of the other does not exist, as in the scenarios of the language's authors.
 NAVIGATION = """robot R {
     interface located use PoseWithCovarianceStamped from geometry_msgs
     interface target use PoseStamped from geometry_msgs

@@ -16,9 +16,10 @@ from robosc.interfaces.definitions import INTERFACE_KINDS, parse_definition
 from robosc.interfaces.distributions import read_shipped
 
 PACKAGES = tuple(
-    "action_msgs actionlib actionlib_msgs builtin_interfaces diagnostic_msgs geometry_msgs lifecycle_msgs map_msgs "
-    "move_base_msgs nav_msgs rcl_interfaces rosgraph_msgs sensor_msgs service_msgs shape_msgs std_msgs std_srvs "
-    "stereo_msgs tf2_msgs trajectory_msgs type_description_interfaces unique_identifier_msgs visualization_msgs".split()
+    "action_msgs actionlib actionlib_msgs builtin_interfaces control_msgs diagnostic_msgs geographic_msgs "
+    "geometry_msgs lifecycle_msgs map_msgs move_base_msgs nav2_msgs nav_msgs opennav_docking_msgs rcl_interfaces "
+    "rosgraph_msgs sensor_msgs service_msgs shape_msgs std_msgs std_srvs stereo_msgs tf2_msgs trajectory_msgs "
+    "type_description_interfaces unique_identifier_msgs uuid_msgs visualization_msgs".split()
 )
 """The packages that are collected, each whole or not at all."""
 
@@ -26,8 +27,8 @@ _DERIVED = re.compile(r"(Action|ActionGoal|ActionResult|ActionFeedback|Goal|Resu
 _HEAD = """\
 # Interface definitions of {title}: fields and constants, without comments and default values.
 # Made by deploy/collect_interfaces.py from the packages of that distribution, whose licences hold: the packages of
-# ROS 2 are under the Apache License 2.0, those of ROS 1 under the BSD License (copyright Willow Garage and the Open
-# Source Robotics Foundation).
+# ROS 2 are under the Apache License 2.0, those of ROS 1, control_msgs and geographic_msgs under the BSD License
+# (copyright Willow Garage and the Open Source Robotics Foundation, for those two the authors that they name).
 """
 
 

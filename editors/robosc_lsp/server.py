@@ -523,7 +523,7 @@ class Server(LanguageServer):
     def _changes(self, analysis: Analysis, found: Diagnostic, fix: Fix) -> dict[str, Sequence[lsp.TextEdit]]:
         """Return the edits of a fix: another name of a property is written wherever the property is named."""
         place = analysis.text.range_of(fix.location)
-        if found.code == "unknown-field":
+        if found.code in ("unknown-field", "needless-property"):
             try:
                 renamed = self.renamed(analysis.uri, place.start, fix.text)
             except JsonRpcInvalidParams:

@@ -19,6 +19,7 @@ from robosc.cli.arguments import (
 from robosc.cli.output import ExitCode, UsageError, print_json
 from robosc.errors import UnsupportedModelError
 from robosc.json_documents import diagnostics_json
+from robosc.model.structure import Deployment
 from robosc.source import Bundle
 
 if TYPE_CHECKING:
@@ -112,7 +113,8 @@ def add_generate_arguments(parser: argparse.ArgumentParser) -> None:
         "--output",
         type=given_path,
         metavar="DIR",
-        help="folder to write to (default: the target's in outputLocations of controller-config.json beside the model)",
+        help="folder to write to (default: the target's in outputLocations or output of controller-config.json beside "
+        "the model)",
     )
     parser.add_argument(
         "--package",
@@ -212,7 +214,7 @@ def generate_options(arguments: argparse.Namespace) -> "GenerateOptions":
     for warning in config.warnings:
         sys.stderr.write(f"warning: {warning}\n")
     if arguments.output is None:
-        arguments.output = config.locations.get(arguments.target)
+        arguments.output = config.location(arguments.target, Deployment(arguments.deployment))
     if arguments.output is None:
         raise UsageError(f"no folder to write to: -o DIR, or outputLocations.{arguments.target} of {CONFIG_FILE}")
     options = config.options(arguments.package)

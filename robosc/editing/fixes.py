@@ -81,6 +81,9 @@ class _Line:
         self._before = line[: self._begin]
 
     def fixes(self, found: Diagnostic) -> Iterator[Fix]:
+        if " in the 'with' list of '" in found.fix:
+            # It changes another place, where a person looks first.
+            return
         if found.message.startswith("there is no '") and (node := _NODE.fullmatch(found.fix)):
             yield from self._node(node["meant"] or "", node["written"], node["elsewhere"] and (node["here"] or ""))
             return
@@ -88,7 +91,14 @@ class _Line:
             yield from self._instead(instead[1], instead[2])
             return
         match found.code:
-            case "unknown-name" | "update-out-of-scope" | "unknown-field" | "unknown-ros-type" | "field-type-mismatch":
+            case (
+                "unknown-name"
+                | "update-out-of-scope"
+                | "unknown-field"
+                | "needless-property"
+                | "unknown-ros-type"
+                | "field-type-mismatch"
+            ):
                 for name in _WRITE.findall(found.fix):
                     yield self._written(name)
             case "ambiguous-name":
@@ -146,12 +156,18 @@ class _Line:
 
     def _node(self, meant: str, written: str, here: str | None) -> Iterator[Fix]:
         """Text for a control node, which may end on a later line; or text at the end of the robot, and some here."""
-        behind = f"{self._line[self._begin :]}\n{self._rest()}"
-        length = _length(written, behind)
-        if length is None:
+        rest = self._rest()
+        # The place may be behind the begin of what is written.
+        at = next(
+            (at for at in range(self._begin, -1, -1) if _length(written, f"{self._line[at:]}\n{rest}") is not None),
+            None,
+        )
+        if at is None:
             return
+        behind = f"{self._line[at:]}\n{rest}"
+        length = _length(written, behind) or 0
         title = f"Write '{_shortened(meant)}'"
-        place = Location(self._location.file, self._location.line, self._location.column, length)
+        place = Location(self._location.file, self._location.line, at + 1, length)
         if here is None:
             indent = self._line[: len(self._line) - len(self._line.lstrip())]
             yield Fix(title if meant else f"Remove '{written}'", place, meant and _laid_out(meant, indent))
@@ -159,7 +175,10 @@ class _Line:
         end = behind.rfind("}")
         if end >= length:
             more = f"    {_laid_out(meant, '    ')}\n}}"
-            yield Fix(f"{title} in the robot", place, here, ((self._place_behind(behind[:end]), more),))
+            line, column = behind[:end].count("\n"), end - behind.rfind("\n", 0, end) - 1
+            column += 0 if line else at
+            behind_it = Location(self._location.file, self._location.line + line, column + 1, 1)
+            yield Fix(f"{title} in the robot", place, here, ((behind_it, more),))
 
     def _assumptions(self, assumptions: Sequence[str]) -> Iterator[Fix]:
         """Assumptions at the end of the robot, since a visit is in the middle of a mission."""

@@ -33,10 +33,12 @@ class Distribution:
 
 
 JAZZY = Distribution("ROS 2 Jazzy", 2, "ros2_jazzy.txt")
+KILTED = Distribution("ROS 2 Kilted", 2, "ros2_kilted.txt", JAZZY)
+LYRICAL = Distribution("ROS 2 Lyrical", 2, "ros2_lyrical.txt", JAZZY)
 HUMBLE = Distribution("ROS 2 Humble", 2, "ros2_humble.txt", JAZZY)
 NOETIC = Distribution("ROS 1 Noetic", 1, "ros1_noetic.txt", JAZZY)
 
-DISTRIBUTIONS = (JAZZY, HUMBLE, NOETIC)
+DISTRIBUTIONS = (JAZZY, KILTED, LYRICAL, HUMBLE, NOETIC)
 """The distributions; of those of one version, the first is what findings speak of."""
 
 

@@ -18,6 +18,7 @@ from robosc.language.advice import fix_syntax, is_said_elsewhere, misplaced
 from robosc.language.control_node_advice import Place, advise, why
 from robosc.language.control_nodes import Declared, NodeReader, family_of
 from robosc.language.limits import MAXIMUM_NAME, MAXIMUM_NESTING, MAXIMUM_SYNTAX_ERRORS
+from robosc.language.sentence_advice import MAXIMUM_SENTENCE, Advice, SentenceReader
 from robosc.language.tokens import Kind, Places, Tokens
 from robosc.language.words import RESERVED_WORDS, STARTS, expected_words, unescape
 from robosc.source import Location, SourceFile
@@ -28,6 +29,12 @@ _NAME, _WORD, _NUMBER, _STRING, _END = (
 _UNQUOTED = re.compile(r"[“”‘’]?([\w/~{}.\-]+)[“”‘’]?")
 _MAXIMUM_SHOWN = 40
 _MAXIMUM_FIX = 300
+MAXIMUM_ADVICE = 600
+"""Characters of advice on a sentence, which may have a component in it."""
+
+_WITH_LISTS = frozenset({"component", "behaviour", "datatype", "mission", "robot", "library", ""})
+"""Words that begin what contains lists, whose own items are looked at."""
+
 _NEAR = 0.75
 """Share that a misspelt word must have in common with the one that was meant."""
 
@@ -88,6 +95,7 @@ class Cursor:
         self._faults = 0
         self._declared = Declared(tokens)
         self._nodes = NodeReader(file.text, tokens, self._declared)
+        self._sentences = SentenceReader(file.text, tokens, self._declared)
 
     # Places
 
@@ -290,25 +298,81 @@ class Cursor:
         self._braces.append(opening)
         self._lists.append(words)
         self._depth += 1
+        before = -1
         while True:
-            begin = self.place
+            begin, known = self.place, len(self.diagnostics)
             parser = parser_here()
             if parser is None:
-                if self._ends(expected):
+                is_end = self._ends(expected)
+                self._read_as_sentence(begin, known, before)
+                if is_end:
                     break
                 continue
             try:
                 item = parser()
             except Fault:
                 self._recover(begin)
+                self._read_as_sentence(begin, known)
                 continue
+            if "visit" in words:
+                self._read_as_sentence(begin, known)
             found.append(item)
+            before = begin
             last = self.place - 1
             self.extents.append(Extent(item, self._starts[begin], self._starts[last] + len(self.texts[last])))
         self._braces.pop()
         self._lists.pop()
         self._depth -= 1
         return tuple(found)
+
+    def _read_as_sentence(self, begin: int, known: int, before: int = -1) -> None:
+        """Report what is broken as a sentence of another language, if it is one, instead of its first wrong word.
+
+        Args:
+            begin: Its first token.
+            known: Number of the findings before it.
+            before: First token of the item before it, which it may go on with on the same line; -1: there is none.
+        """
+        words = self._lists[-1] if self._lists else {}
+        if len(self.diagnostics) == known or not words or self.texts[begin] in _WITH_LISTS:
+            return
+        if self.diagnostics[-1].message.startswith("there is no '"):
+            # A control node, which has been read as a whole.
+            return
+        starts = [begin] if before < 0 or not self._is_on_line(before, begin) else [before, begin]
+        end = max(self.place, begin + 1)
+        line = next(
+            (at for at in range(begin + 1, min(end, begin + MAXIMUM_SENTENCE)) if not self._is_on_line(begin, at)), end
+        )
+        # A sentence ends with its line if it is one so far.
+        ends = [end] if "{" in self.texts[line:end] else [line, end]
+        for start, behind in ((start, behind) for behind in dict.fromkeys(ends) for start in starts):
+            advice = self._sentences.read(start, behind, words)
+            if advice is not None and len(fix := self._obeyed(advice)) <= MAXIMUM_ADVICE and "\n" not in fix:
+                del self.diagnostics[known:]
+                message = f"{shown(advice.word)} does not fit here: {advice.reason}"
+                if advice.more:
+                    message = f"there is no {shown(advice.word)} in the language: {advice.reason}"
+                self.diagnostics.append(Diagnostic(Severity.ERROR, "syntax-error", message, self.at(advice.index), fix))
+                self.place = max(advice.end, behind)
+                return
+
+    def _obeyed(self, advice: Advice) -> str:
+        """The sentence that says what to write."""
+        written = self._quoted(advice.begin, advice.end)
+        if advice.age is not None:
+            name, age = advice.age
+            return f"Write 'max_age: {age}' in the 'with' list of '{name}' instead of '{written}'."
+        if advice.more:
+            here = f", and '{advice.meant}'" if advice.meant else ""
+            return f"Write '{advice.more}' in the robot{here} instead of '{written}'."
+        return f"Write '{advice.meant}' instead of '{written}'." if advice.meant else f"Remove '{written}'."
+
+    def _is_on_line(self, first: int, last: int) -> bool:
+        """Return True if two tokens stand on one line, not too far from one another."""
+        return (
+            last - first <= MAXIMUM_SENTENCE and "\n" not in self._file.text[self._starts[first] : self._starts[last]]
+        )
 
     def _brace(self, words: Mapping[str, object]) -> int:
         """Read the `{` of a list; its index."""
@@ -354,7 +418,8 @@ class Cursor:
     def _is_control_node(self, index: int, expected: tuple[str, ...]) -> bool:
         """Return True if a node of a behaviour tree stands in the list, after reporting it and reading behind it."""
         word = self.texts[index]
-        family = family_of(word) if self._lists[-1] and self.kinds[index] in (_NAME, _WORD) else None
+        is_verb = self.texts[index + 1] == "to"
+        family = family_of(word) if self._lists[-1] and not is_verb and self.kinds[index] in (_NAME, _WORD) else None
         if family is None:
             return False
         read = self._nodes.read(index)

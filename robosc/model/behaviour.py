@@ -317,8 +317,8 @@ class BehaviourBuilder:
                 updates = self._updates(tree, communication, kind)
                 yield Transition(source, communication.event(kind), None, updates, target)
 
-    def _checker(self, received: Type | None) -> ExpressionChecker:
-        return ExpressionChecker(self._scope.with_received(received), self._findings)
+    def _checker(self, received: Type | None, sender: str = "") -> ExpressionChecker:
+        return ExpressionChecker(self._scope.with_received(received, sender), self._findings)
 
     def _target(self, name: syntax.Name | None) -> str | None:
         if name is None:
@@ -414,7 +414,7 @@ class BehaviourBuilder:
                 tree.updates[0].target.location,
                 "Update on something that is received, or use a service.",
             )
-        checker = self._checker(communication.received_type(kind))
+        checker = self._checker(communication.received_type(kind), communication.name)
         updates: dict[str, Update] = {}
         places: dict[str, Location] = {}
         for update in tree.updates:

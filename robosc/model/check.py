@@ -29,7 +29,9 @@ from robosc.model.findings import Bindings, Findings
 from robosc.model.goals import build_goals
 from robosc.model.interfaces import InterfaceChecker
 from robosc.model.limits import check_together
+from robosc.model.message_outcomes import message_outcomes
 from robosc.model.missions import build_missions, build_preferences
+from robosc.model.needless import PropertyUses, without
 from robosc.model.own_requests import OwnRequests
 from robosc.model.places import Places
 from robosc.model.restrictions import Restrictions
@@ -185,7 +187,10 @@ class _RobotChecker:
             for part in self.parts
         }
         constants = Constants(self._types, self._libraries, self.findings)
-        self.scopes = scopes = RobotScopes(self._unit, self._types, self.parts, self._libraries, names, constants)
+        outcomes = message_outcomes(trees, filter(None, behaviour_trees.values()), names)
+        self.scopes = scopes = RobotScopes(
+            self._unit, self._types, self.parts, self._libraries, names, constants, outcomes
+        )
         scopes.of(self._unit)  # Also a file whose constants nothing uses has them checked.
         enums = self._enums(scopes)
         behaviours = self._behaviours(behaviour_trees, scopes, communications)
@@ -206,11 +211,12 @@ class _RobotChecker:
             if tree is not None:
                 check_synthesis_variables(tree, behaviour, communications, self._types, self.findings)
                 partial_updates(tree, behaviour, self.findings)
-        interfaces = InterfaceChecker(self._bundle, self._types, self.findings)
-        fitting = interfaces.check(trees, communications, self._unit)
-        self.fields = interfaces.fields
         limits = tuple(restrictions.limits)
         check_together(limits, self.places.limits, marked, self.findings)
+        uses = PropertyUses(communications.values(), behaviours.values(), provides, limits, enums, self._types.objects)
+        interfaces = InterfaceChecker(self._bundle, self._types, self.findings, uses)
+        fitting = interfaces.check(trees, communications, self._unit)
+        self.fields = interfaces.fields
         self._check_data(trees, communications, provides, limits, fitting)
         self._check_indices(trees, communications, behaviour_trees, fitting)
         self._check_requests(communications, marked, requirements)
@@ -218,12 +224,14 @@ class _RobotChecker:
         self.places.objects.update(self._types.object_places)
         if self.findings.has_errors:
             return None
+        needed = without(communications.values(), enums, self._types.objects.values(), interfaces.left_out)
+        self.places.objects.update((name, self.places.objects[old]) for name, old in needed.origins.items())
         return Model(
             name=self._tree.name.text,
             components=tuple(Component(part.name, marked.get(part.name)) for part in self.parts),
-            communications=tuple(communications.values()),
-            enums=enums,
-            objects=tuple(self._types.objects.values()),
+            communications=needed.communications,
+            enums=needed.enums,
+            objects=needed.objects,
             requirements=requirements,
             provides=provides,
             invariants=invariants,

@@ -37,6 +37,7 @@ from robosc.expressions import (
 from robosc.language import syntax
 from robosc.language.words import spelled
 from robosc.model.findings import MAXIMUM_CHOICES, Findings
+from robosc.model.outcomes import DATA_ELSEWHERE
 from robosc.model.ranges import Range, Ranges, narrowed
 from robosc.model.scope import ComponentNames, Scope
 from robosc.model.typed import (
@@ -443,7 +444,7 @@ class ExpressionChecker:
                 return None if walked is None else Typed(Element(level, walked[0]), walked[1])
         if tree.steps and name in self._scope.components:
             self._bind(tree.root, self._scope.component_places.get(name))
-            return self._component_part(tree, self._scope.components[name])
+            return self._component_part(tree, self._scope.components[name], wanted)
         if own and name in own.variables:
             return self._variable(tree, own, tree.root, tree.steps)
         if not tree.steps and name in self._scope.constants:
@@ -481,6 +482,8 @@ class ExpressionChecker:
             if isinstance(wanted, EnumType) and not tree.steps and len(wanted.values) <= MAXIMUM_CHOICES:
                 self._findings.unknown(f"value of '{wanted.name}'", name, tree.root.location, wanted.values)
                 return None
+            if self._is_message(tree, name, tree.steps, wanted):
+                return None
             known = self._scope.known_names()
             fix = ""
             if name in self._findings.bindings.communications:
@@ -488,7 +491,37 @@ class ExpressionChecker:
             self._findings.unknown("name", name, tree.root.location, known, fix=fix, words=_WORDS)
         return None
 
-    def _component_part(self, tree: syntax.Access, component: ComponentNames) -> Typed | None:
+    def _is_message(self, tree: syntax.Access, name: str, steps: Sequence[_Step], wanted: Type | None) -> bool:
+        """Report that a communication, or a word for its data, stands where a value is due; False: it is neither."""
+        words = tuple(step.text for step in steps if isinstance(step, syntax.Name))
+        if self._scope.received is not None and name in {*DATA_ELSEWHERE, self._scope.sender}:
+            properties = self._scope.types.property_names(self._scope.received)
+            meant = ".".join(("value", *words)) if words and words[0] in properties else "value"
+            message = f"what was received is called 'value', not '{name}'"
+            self._findings.error("unknown-name", message, tree.location, f"Write '{meant}'.")
+            return True
+        outcome = self._scope.outcomes.get(name)
+        if outcome is None:
+            return False
+        meant = outcome.value(words, wanted)
+        if meant:
+            message = f"'{name}' is a communication, not a value: '{meant}' says what became of it"
+            self._findings.error("unknown-name", message, tree.location, f"Write '{meant}'.")
+        elif outcome.is_requested:
+            return False
+        else:
+            kept = outcome.free or f"{name}_seen"
+            message = f"'{name}' is a message, not a value: a variable keeps what comes with it"
+            line = f"on response from {spelled(name)} do {kept} := value"
+            fix = (
+                f"Let the behaviour of '{outcome.component}' keep it: '{line}', and write '{outcome.component}.{kept}'."
+            )
+            self._findings.error("unknown-name", message, tree.location, fix)
+        return True
+
+    def _component_part(
+        self, tree: syntax.Access, component: ComponentNames, wanted: Type | None = None
+    ) -> Typed | None:
         step = tree.steps[0]
         if not isinstance(step, syntax.Name):
             self._findings.error(
@@ -503,6 +536,8 @@ class ExpressionChecker:
                 self._no_parts(tree.steps[1], "a state")
                 return None
             return Typed(StateTest(component.name, step.text), _BOOLEAN)
+        if self._is_message(tree, step.text, tree.steps[1:], wanted):
+            return None
         known = chain(component.variables, component.states)
         self._findings.unknown(f"state or variable of '{component.name}'", step.text, step.location, known)
         return None

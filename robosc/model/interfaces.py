@@ -7,7 +7,7 @@ depend on the packages that are installed where it is read.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from robosc.expressions import Type
 from robosc.interfaces import DISTRIBUTIONS, INTERFACE_KINDS, Field, Part
@@ -17,6 +17,7 @@ from robosc.language.words import spelled
 from robosc.model.communications import CommunicationTree
 from robosc.model.findings import Findings
 from robosc.model.message_fields import Comparison, Fault, FieldChecker, Language, Message, fields_of_objects
+from robosc.model.needless import LeftOut, PropertyUses
 from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.model.types import Types
 from robosc.model.units import Unit
@@ -103,12 +104,14 @@ class InterfaceChecker:
         bundle: Texts with the definitions that were found; what is missing comes with RoboSC, if it has it.
         types: Types of the model.
         findings: Findings to which faults are reported.
+        uses: Properties that are read or filled.
 
     Attributes:
         fields: Fields that properties of object types can stand for, by model name of the type and name of the field.
+        left_out: Properties that nothing needs and no distribution has a field for, by name of the communication.
     """
 
-    def __init__(self, bundle: Bundle, types: Types, findings: Findings) -> None:
+    def __init__(self, bundle: Bundle, types: Types, findings: Findings, uses: PropertyUses) -> None:
         found = FoundInterfaces({file.name: file.text for file in bundle.interfaces})
         self._are_searched = bool(bundle.searched)
         self._catalogues = tuple(Catalogue(distribution, found) for distribution in DISTRIBUTIONS)
@@ -121,7 +124,9 @@ class InterfaceChecker:
         self._findings = findings
         self._noted: set[str] = set()
         self._reported: set[Fault] = set()
+        self._uses = uses
         self.fields: dict[str, dict[str, Field]] = {}
+        self.left_out: dict[str, LeftOut] = {}
 
     def check(
         self, trees: Iterable[CommunicationTree], communications: Mapping[str, Communication], unit: Unit
@@ -150,7 +155,7 @@ class InterfaceChecker:
         outcomes: dict[tuple[int, Language], _Outcome] = {}
         for (distribution, language), checker in self._checkers.items():
             key = (distribution.version, language)
-            found = _outcome(item, checker)
+            found = _outcome(item, checker, self._uses.of(item.communication.name))
             if found is not None and (key not in outcomes or len(found.faults) < len(outcomes[key].faults)):
                 outcomes[key] = found
         for outcome in tuple(outcomes.values())[:1]:
@@ -159,6 +164,7 @@ class InterfaceChecker:
         if not outcomes:
             self._note_missing(item.package, f"{item.package}/{item.type}", item.interface.package.location)
             return None
+        outcomes = self._without_needless(item, outcomes)
         fitting = next((outcome for outcome in outcomes.values() if not outcome.faults), None)
         if fitting is None:
             # Faults are reported against the version that fits best.
@@ -174,6 +180,26 @@ class InterfaceChecker:
         )
         self._report_limits(ros1, ros2)
         return fitting.catalogue
+
+    def _without_needless(
+        self, item: _Linked, outcomes: dict[tuple[int, Language], _Outcome]
+    ) -> dict[tuple[int, Language], _Outcome]:
+        """Return the outcomes without the properties that nothing needs and no distribution has, which are reported."""
+        lacking = [
+            {fault.needless: fault for fault in outcome.faults if fault.needless} for outcome in outcomes.values()
+        ]
+        needless = LeftOut(set(lacking[0]).intersection(*lacking[1:]))
+        if not needless:
+            return outcomes
+        self.left_out[item.communication.name] = needless
+        for key in sorted(needless):
+            fault = lacking[0][key]
+            message = f"{fault.message}, and nothing reads or fills it"
+            self._report_once(replace(fault, code="needless-property", message=message))
+        return {
+            key: replace(outcome, faults=tuple(fault for fault in outcome.faults if fault.needless not in needless))
+            for key, outcome in outcomes.items()
+        }
 
     def _report_once(self, fault: Fault) -> None:
         """Report a fault that all nodes have, once."""
@@ -238,7 +264,7 @@ class InterfaceChecker:
             self._note_missing(package, f"{package}/{type_}", interface.package.location)
 
 
-def _outcome(item: _Linked, checker: FieldChecker) -> _Outcome | None:
+def _outcome(item: _Linked, checker: FieldChecker, used: frozenset[str]) -> _Outcome | None:
     """Compare a communication as nodes of one kind do at their start; None where the interface is not known."""
     catalogue = checker.catalogue
     definition = catalogue.definition(item.kind, item.package, item.type)
@@ -251,7 +277,7 @@ def _outcome(item: _Linked, checker: FieldChecker) -> _Outcome | None:
     found = Comparison()
     for part, (type_, location) in zip(definition, item.parts(), strict=False):
         if type_ is not None:
-            found.include(checker.compare(type_, Message(name, part), location))
+            found.include(checker.compare(type_, Message(name, part), location, used))
     if item.communication.frame is not None:
         found.add(*_header_faults(item, definition[0], name, catalogue))
     return _Outcome(catalogue, tuple(dict.fromkeys(found.faults)), found.unknown)

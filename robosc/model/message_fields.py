@@ -5,7 +5,7 @@ that of C++ nodes, which their compilers make.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from dataclasses import field as dataclass_field
 from enum import StrEnum
 
@@ -70,6 +70,8 @@ class Fault:
         name: Name that nothing has; empty if the fault is another one. The hint and the fix are for where no known name
             is near.
         known: Known names.
+        needless: Object type and name of a property that nothing reads or fills, if the fault is that it stands for
+            no field.
     """
 
     code: str
@@ -80,6 +82,7 @@ class Fault:
     related: tuple[RelatedPlace, ...] = ()
     name: str = ""
     known: tuple[str, ...] = ()
+    needless: tuple[str, str] | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,16 +134,19 @@ class FieldChecker:
         self._language = language
         self._types = types
         # The message is kept, so that its identity stays its own.
-        self._known: dict[tuple[str, int], tuple[Part, Comparison]] = {}
+        self._known: dict[tuple[str, int, frozenset[str]], tuple[Part, Comparison]] = {}
+        self._used = frozenset[str]()
 
-    def compare(self, type_: Type, message: Message, location: Location) -> Comparison:
+    def compare(self, type_: Type, message: Message, location: Location, used: frozenset[str]) -> Comparison:
         """Compare data of a type with the message as which it crosses.
 
         Args:
             type_: Type of the data.
             message: The message.
             location: Place where the type is written.
+            used: Names of the properties that are read or filled.
         """
+        self._used = used
         basic = self._source(type_)
         if isinstance(basic, ObjectType):
             return self._object(basic, message, location)
@@ -157,14 +163,16 @@ class FieldChecker:
         return self._types.sources[type_.name] if isinstance(type_, EnumType) else type_
 
     def _object(self, type_: ObjectType, message: Message, used: Location) -> Comparison:
-        key = (type_.name, id(message.part))
+        key = (type_.name, id(message.part), self._used)
         if key not in self._known:
             found = Comparison()
             for item in self._types.objects[type_.name].properties:
                 place = self._types.property_places[type_.name, item.name]
                 field = message.part.fields.get(item.name)
                 if field is None:
-                    found.add(_unknown_field(item.name, message, place, used))
+                    fault = _unknown_field(item.name, message, place, used)
+                    is_used = item.name in self._used
+                    found.add(fault if is_used else replace(fault, needless=(type_.name, item.name)))
                 else:
                     written = self._types.property_type_places[type_.name, item.name]
                     self._field(field, item.type, message.name, (written, used), found)

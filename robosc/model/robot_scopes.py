@@ -6,6 +6,7 @@ from dataclasses import replace
 from robosc.expressions import Type
 from robosc.language import syntax
 from robosc.model.constants import Constants
+from robosc.model.outcomes import Outcome
 from robosc.model.scope import ComponentNames, Scope, enums_of
 from robosc.model.types import Types
 from robosc.model.units import Libraries, Part, Unit
@@ -21,6 +22,7 @@ class RobotScopes:
         libraries: The libraries that they come from.
         names: Names that can be read of each component, by its name in the robot.
         constants: Resolver of constants.
+        outcomes: Outcomes of the communications.
     """
 
     def __init__(
@@ -31,7 +33,9 @@ class RobotScopes:
         libraries: Libraries,
         names: Mapping[str, ComponentNames],
         constants: Constants,
+        outcomes: Mapping[str, Outcome],
     ) -> None:
+        self._outcomes = outcomes
         self._main = main
         self._constants = constants
         self._types = types
@@ -54,6 +58,7 @@ class RobotScopes:
                 ambiguous=shared,
                 component_places={name: tree.name.location for name, tree in unit.components.items()},
                 constant_places=constants.places,
+                outcomes=self._outcomes,
             )
         return self._scopes[unit]
 

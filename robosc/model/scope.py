@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field, replace
 
 from robosc.expressions import EnumType, Type
+from robosc.model.outcomes import Outcome
 from robosc.model.typed import Typed
 from robosc.model.types import Types
 from robosc.model.units import Libraries, Unit
@@ -39,6 +40,8 @@ class Scope:
         enums: Enums whose values can be named here, by the name they have here.
         own: The component whose behaviour this is, if any.
         received: Type of `value`, or None where there is no received data.
+        sender: Communication that `value` comes from, or empty.
+        outcomes: Outcomes of the robot's communications.
         absent: Components whose import has failed, which has been reported.
         constants: Constants by name; None for one that is broken, which has been reported.
         ambiguous: Names of constants and enums that several libraries define, with the libraries' names.
@@ -51,6 +54,8 @@ class Scope:
     enums: Mapping[str, EnumType]
     own: ComponentNames | None = None
     received: Type | None = None
+    sender: str = ""
+    outcomes: Mapping[str, Outcome] = field(default_factory=dict)
     absent: frozenset[str] = frozenset()
     constants: Mapping[str, Typed | None] = field(default_factory=dict)
     ambiguous: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
@@ -58,9 +63,9 @@ class Scope:
     constant_places: Mapping[str, Location] = field(default_factory=dict)
     _values: dict[str, tuple[EnumType, ...]] = field(default_factory=dict)
 
-    def with_received(self, received: Type | None) -> "Scope":
-        """The same names, with `value` of another type."""
-        return replace(self, received=received)
+    def with_received(self, received: Type | None, sender: str = "") -> "Scope":
+        """The same names, with `value` of another type and communication."""
+        return replace(self, received=received, sender=sender)
 
     def enums_with(self, value: str) -> tuple[EnumType, ...]:
         """The enums that have a value."""

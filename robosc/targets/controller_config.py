@@ -9,6 +9,7 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from robosc.errors import RoboscError
+from robosc.model.structure import Deployment
 from robosc.targets.registry import GenerateOptions, PackageMetadata, StateMessage, SupervisedController
 
 CONFIG_FILE = "controller-config.json"
@@ -19,9 +20,19 @@ _WRITES = "writeEventsToLog"
 _LOCATIONS = "outputLocations"
 _SUPERVISED = "supervisedController"
 _SUPERVISED_KEYS = ("package", "executable", "launchFile")
+_OUTPUT = "output"
+_SUPERVISOR = "supervisor"
+_NODES: Mapping[str, tuple[tuple[str, ...], Deployment]] = {
+    "ros1ControllerNodeLocation": (("ros1", "ros1-cpp"), Deployment.CONTROLLER),
+    "ros2ControllerNodeLocation": (("ros2", "ros2-cpp"), Deployment.CONTROLLER),
+    "ros2SupervisorNodeLocation": (("ros2", "ros2-cpp"), Deployment.LAYER),
+}
+"""Names in `output` of the original, with the targets and the deployment of their packages."""
+_RUN_KEYS = ("packageName", "namespace", "executable", "name")
+_LAUNCH_KEYS = ("packageName", "file")
 _METADATA = ("maintainer", "license", "version", "copyright")
 _STATE_MESSAGE = "stateMessage"
-_KEYS = (_PUBLISHES, _WRITES, _LOCATIONS, _SUPERVISED, *_METADATA, _STATE_MESSAGE)
+_KEYS = (_PUBLISHES, _WRITES, _LOCATIONS, _SUPERVISED, *_METADATA, _STATE_MESSAGE, _OUTPUT, _SUPERVISOR)
 
 _TARGET = re.compile(r"[a-z0-9-]{1,40}\Z")
 
@@ -38,6 +49,7 @@ class ControllerConfig:
         publish_state: True if `/state` is published.
         log_events: True if the event log is written.
         locations: Folder to generate into by target, below the folder of the file.
+        nodes: Folder to generate into by target and deployment, as the original has it.
         supervised: The existing controller, or None.
         metadata: Maintainer, licence, version and copyright of a generated ROS package.
         state_message: Form of the state of a generated ROS 2 node.
@@ -47,10 +59,15 @@ class ControllerConfig:
     publish_state: bool = False
     log_events: bool = False
     locations: Mapping[str, Path] = field(default_factory=dict)
+    nodes: Mapping[tuple[str, Deployment], Path] = field(default_factory=dict)
     supervised: SupervisedController | None = None
     metadata: PackageMetadata = field(default_factory=PackageMetadata)
     state_message: StateMessage = StateMessage.JSON
     warnings: tuple[str, ...] = ()
+
+    def location(self, target: str, deployment: Deployment) -> Path | None:
+        """Return the folder to generate a target into, or None if the file names none."""
+        return self.locations.get(target) or self.nodes.get((target, deployment))
 
     def options(self, package: str | None) -> GenerateOptions:
         """Return the options that a target is called with."""
@@ -110,7 +127,8 @@ class _Reader:
             publish_state=self._boolean(document, _PUBLISHES),
             log_events=self._boolean(document, _WRITES),
             locations=self._locations(document.get(_LOCATIONS, {})),
-            supervised=self._supervised(document.get(_SUPERVISED)),
+            nodes=self._nodes(document.get(_OUTPUT)),
+            supervised=self._supervised(document.get(_SUPERVISED)) or self._supervisor(document.get(_SUPERVISOR)),
             metadata=self._metadata(document),
             state_message=self._state_message(document.get(_STATE_MESSAGE, StateMessage.JSON)),
             warnings=tuple(self._warnings),
@@ -141,12 +159,53 @@ class _Reader:
             target = name.lower()
             if not _TARGET.match(target) or target in found:
                 raise self._wrong(_LOCATIONS, "an object whose names are those of targets, each once")
-            if not isinstance(folder, str) or not _is_below(folder):
-                raise self._wrong(
-                    f"{_LOCATIONS}.{target}", "the relative path of a folder, with `/` and without `..`; see also -o"
-                )
-            found[target] = self._path.parent / folder
+            found[target] = self._folder(f"{_LOCATIONS}.{target}", folder)
         return found
+
+    def _folder(self, place: str, folder: object) -> Path:
+        if not isinstance(folder, str) or not _is_below(folder):
+            raise self._wrong(place, "the relative path of a folder, with `/` and without `..`; see also -o")
+        return self._path.parent / folder
+
+    def _nodes(self, value: object) -> dict[tuple[str, Deployment], Path]:
+        """Return the folders that the original copies its packages into."""
+        found: dict[tuple[str, Deployment], Path] = {}
+        for name, folder in self._object(_OUTPUT, value, tuple(_NODES)).items():
+            targets, deployment = _NODES.get(name, ((), Deployment.CONTROLLER))
+            if targets and folder is not None:
+                path = self._folder(f"{_OUTPUT}.{name}", folder)
+                found.update(((target, deployment), path) for target in targets)
+        return found
+
+    def _object(self, place: str, value: object, known: tuple[str, ...]) -> dict[str, Any]:
+        """Return an object of the original's; an empty one where there is none."""
+        if value is None:
+            return {}
+        if not isinstance(value, dict):
+            raise self._wrong(place, f"an object with {', '.join(known)}")
+        self._warn_of_unknown(value, known, f"{place}.")
+        return value
+
+    def _supervisor(self, value: object) -> SupervisedController | None:
+        """Return the existing controller as the original names it: what it runs, or launches."""
+        place = f"{_SUPERVISOR}.controller"
+        controller = self._object(
+            place, self._object(_SUPERVISOR, value, ("controller",)).get("controller"), ("run", "launch")
+        )
+        given = {word: controller[word] for word in ("run", "launch") if controller.get(word) is not None}
+        if not given:
+            return None
+        if len(given) > 1:
+            raise self._wrong(place, "an object with either run or launch")
+        ((word, described),) = given.items()
+        found = self._object(f"{place}.{word}", described, _RUN_KEYS if word == "run" else _LAUNCH_KEYS)
+        if not all(item is None or isinstance(item, str) for item in found.values()):
+            raise self._wrong(f"{place}.{word}", "an object of texts")
+        names = {name: found.get(name) or None for name in ("executable", "namespace", "name") if word == "run"}
+        try:
+            return SupervisedController(found.get("packageName") or "", launch_file=found.get("file"), **names)
+        except ValueError as error:
+            raise ControllerConfigError(f"{self._path}: '{place}.{word}': {error}") from error
 
     def _metadata(self, document: Mapping[str, Any]) -> PackageMetadata:
         given = {name: document[name] for name in _METADATA if document.get(name) is not None}

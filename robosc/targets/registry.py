@@ -25,6 +25,8 @@ ENTRY_POINT_GROUP = "robosc.targets"
 
 _PACKAGE = re.compile(r"[A-Za-z][A-Za-z0-9_-]{0,199}\Z")
 _FILE = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.+-]{0,199}\Z")
+_NODE = re.compile(r"[A-Za-z][A-Za-z0-9_]{0,199}\Z")
+_NAMESPACE = re.compile(r"(?=.{1,200}\Z)/?[A-Za-z][A-Za-z0-9_]*(/[A-Za-z][A-Za-z0-9_]*)*/?\Z")
 _MAINTAINER = re.compile(r"(.*\S)\s*<([^<>]*)>\s*\Z")
 # The address is one that catkin_pkg, which reads package.xml, takes.
 _EMAIL = re.compile(r"[-A-Za-z0-9_%+]+(\.[-A-Za-z0-9_%+]+)*@([-A-Za-z0-9]+\.)+[A-Za-z]{2,}\Z")
@@ -42,14 +44,18 @@ class SupervisedController:
         package: Its package.
         executable: Its program, or None where a launch file starts it.
         launch_file: Its launch file, or None where it is a program.
+        namespace: Namespace of its program below that of the layer, or None for the layer's own.
+        name: Name of the node of its program, or None for the program's own.
 
     Raises:
-        ValueError: A name is none of a package or a file, or there is not exactly one file; says which.
+        ValueError: A name is none of a package, file, namespace or node, or there is not exactly one file; says which.
     """
 
     package: str
     executable: str | None = None
     launch_file: str | None = None
+    namespace: str | None = None
+    name: str | None = None
 
     def __post_init__(self) -> None:
         if not _PACKAGE.match(self.package):
@@ -59,6 +65,12 @@ class SupervisedController:
         for name in (self.executable, self.launch_file):
             if name is not None and not _FILE.match(name):
                 raise ValueError("an executable or launch file must be the name of a file, without a path")
+        if self.launch_file is not None and (self.namespace, self.name) != (None, None):
+            raise ValueError("a launch file names its nodes itself: namespace and name are for an executable")
+        if self.namespace is not None and not _NAMESPACE.match(self.namespace):
+            raise ValueError("'namespace' must be a name of ROS, or several with '/' between them")
+        if self.name is not None and not _NODE.match(self.name):
+            raise ValueError("'name' must be the name of a node: letters, digits and underscores")
 
 
 @dataclass(frozen=True, slots=True)

@@ -40,12 +40,14 @@ class Mistake:
         text: The whole text.
         begin: Offset of what is wrong; of something missing, of the token before it.
         end: Offset behind it; of something missing, behind the token after it.
+        meant: Texts of which the first message has to show one; none where any sound model will do.
     """
 
     category: str
     text: str
     begin: int
     end: int
+    meant: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -81,7 +83,16 @@ def obeyed(text: str, found: Diagnostic) -> str | None:
     lines = text.split("\n")
     for fix in fixes(found, lines[place.line - 1], lambda: "\n".join(lines[place.line :])):
         return changed(text, fix)
-    return None
+    return aged(text, found.fix)
+
+
+def aged(text: str, fix: str) -> str | None:
+    """Return the text after a fix that is obeyed in another line: an option of a communication."""
+    found = re.fullmatch(r"Write '(.+?)' in the 'with' list of '(.+?)' instead of '(.+)'\.", fix)
+    if found is None:
+        return None
+    option, name, written = found.groups()
+    return re.sub(rf"(message {name} with (.*?)type: \w+)", rf"\1, {option}", text).replace(written, "", 1)
 
 
 def changed(text: str, fix: Fix) -> str:
@@ -106,7 +117,10 @@ def judge(mistake: Mistake) -> Verdict:
         for begin, place in zip(begins, places, strict=True)
     )
     text: str | None = mistake.text
-    for _ in range(STEPS):
+    if mistake.meant and not any(words in first.fix for words in mistake.meant):
+        return Verdict(first, is_placed, is_mended=False)
+    # Advice that shows a line is obeyed once, and that is all.
+    for _ in range(2 if mistake.meant else STEPS):
         if found is None:
             return Verdict(first, is_placed, is_mended=True)
         text = obeyed(text or "", found)
@@ -383,6 +397,7 @@ def by_hand() -> Iterator[Mistake]:
 
 
 def _marked(category: str, frame: str, written: str) -> Mistake:
+    written, _, meant = written.partition("\n=> ")
     place, _, line = written.partition(": ")
     before, found, after = frame.partition(f"// {place}\n")
     assert found, place
@@ -390,7 +405,7 @@ def _marked(category: str, frame: str, written: str) -> Mistake:
     assert match, written
     text = before + _MARK.sub(r"\1", line) + "\n" + after
     begin = len(before) + match.start()
-    return Mistake(category, text, begin, begin + max(1, len(match[1])))
+    return Mistake(category, text, begin, begin + max(1, len(match[1])), tuple(filter(None, meant.split(" | "))))
 
 
 def every_mistake(seed: int = 1) -> tuple[Mistake, ...]:

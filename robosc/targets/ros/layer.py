@@ -4,6 +4,7 @@ from collections.abc import Callable, Iterable
 
 from robosc.errors import UnsupportedModelError
 from robosc.model.structure import Communication, CommunicationKind
+from robosc.targets.registry import SupervisedController
 from robosc.targets.ros.runtime.supervised import BLOCKED, SUPERVISED
 from robosc.targets.ros.topics import Topic
 
@@ -49,6 +50,28 @@ def require_names_of_a_layer(found: tuple[Topic, ...], asked: tuple[Communicatio
     _require_one_each("topics", ((topic.identifier, topic.identifier) for topic in found))
     for kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
         _require_one_each(f"{kind}s", ((item.identifier, item.identifier) for item in asked if item.kind is kind))
+
+
+def require_reachable_controller(
+    controller: SupervisedController | None, found: Iterable[Topic | Communication]
+) -> None:
+    """Do nothing if an existing controller in a namespace of its own has the names that the layer offers.
+
+    Args:
+        controller: The controller, if it is known.
+        found: The topics, services and actions.
+
+    Raises:
+        UnsupportedModelError: A relative name would be found in another namespace than that of the layer; says which.
+    """
+    if controller is None or controller.namespace is None:
+        return
+    for item in found:
+        if not item.identifier.startswith("/"):
+            raise UnsupportedModelError(
+                f"the existing controller's namespace {controller.namespace} parts it from the layer, because the "
+                f"name {item.identifier} is relative; write '/{item.identifier}' in the model"
+            )
 
 
 def require_own_topics(

@@ -17,7 +17,13 @@ from robosc.targets.code.python.generate import header
 from robosc.targets.code.python.package import beside_supervisor, python_text
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions, StateMessage
-from robosc.targets.ros.layer import Renamed, remapped_names, require_names_of_a_layer, require_own_topics
+from robosc.targets.ros.layer import (
+    Renamed,
+    remapped_names,
+    require_names_of_a_layer,
+    require_own_topics,
+    require_reachable_controller,
+)
 from robosc.targets.ros.notices import is_known, with_notices
 from robosc.targets.ros.package import chosen, context, error_context, packages, release_identifiers, require_own_names
 from robosc.targets.ros.runtime.parameters import Parameter, declarations
@@ -117,6 +123,7 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
         if deployment is Deployment.LAYER:
             require_names_of_a_layer(found, asked)
             require_own_topics(found, asked, middleware.parts_of_actions)
+            require_reachable_controller(options.supervised, (*found, *asked))
         values = context(supervisor, name, found, asked, options)
     policy = "fair" if supervisor.strategy is None else "strategy"
     declared = (*declarations(release_identifiers(found), str(deployment), policy), *middleware.parameters)

@@ -172,7 +172,7 @@ def test_what_a_distribution_has_is_whole(distribution: Any) -> None:
 
 
 def test_distributions_differ_where_they_are_known_to() -> None:
-    jazzy, humble, noetic = (Catalogue(item, FoundInterfaces({})) for item in DISTRIBUTIONS)
+    jazzy, *_, humble, noetic = (Catalogue(item, FoundInterfaces({})) for item in DISTRIBUTIONS)
     for catalogue, has in ((jazzy, True), (humble, False), (noetic, False)):
         assert catalogue.has("msg", "geometry_msgs", "VelocityStamped") is has
     fields = [catalogue.definition("msg", "sensor_msgs", "CameraInfo")[0].fields for catalogue in (jazzy, noetic)]  # type: ignore[index]
@@ -185,3 +185,52 @@ def test_distributions_differ_where_they_are_known_to() -> None:
     assert noetic.definition("action", "move_base_msgs", "MoveBaseAction") is not None
     assert not jazzy.knows("move_base_msgs")
     assert importlib.import_module("robosc.interfaces").DISTRIBUTIONS[0].title == "ROS 2 Jazzy"
+
+
+def test_nav2_differs_where_it_is_known_to() -> None:
+    jazzy, kilted, lyrical, humble, noetic = (Catalogue(item, FoundInterfaces({})) for item in DISTRIBUTIONS)
+
+    def parts(catalogue: Catalogue, type_: str) -> list[Part]:
+        found = catalogue.definition("action", "nav2_msgs", type_)
+        assert found is not None
+        return list(found)
+
+    # Humble says nothing about a failure but that there is one.
+    assert list(parts(humble, "NavigateToPose")[1].fields) == ["result"]
+    for catalogue in (jazzy, kilted, lyrical):
+        result = parts(catalogue, "NavigateToPose")[1]
+        assert list(result.fields) == ["error_code", "error_msg"]
+        assert ("GOAL_REJECTED" in result.constants) is (catalogue is lyrical)
+    codes = {
+        catalogue.distribution.title: parts(catalogue, "NavigateToPose")[1].constants for catalogue in (jazzy, kilted)
+    }
+    assert "TIMEOUT" not in codes["ROS 2 Jazzy"]
+    assert codes["ROS 2 Kilted"]["TIMEOUT"] == "9003"
+    poses = {
+        catalogue.distribution.title: parts(catalogue, "NavigateThroughPoses")[0].fields["poses"].type_text
+        for catalogue in (humble, jazzy, kilted, lyrical)
+    }
+    assert poses == {
+        "ROS 2 Humble": "geometry_msgs/PoseStamped[]",
+        "ROS 2 Jazzy": "geometry_msgs/PoseStamped[]",
+        "ROS 2 Kilted": "nav_msgs/Goals",
+        "ROS 2 Lyrical": "nav_msgs/Goals",
+    }
+    for type_, having in {
+        "MissedWaypoint": (jazzy,),
+        "WaypointStatus": (kilted, lyrical),
+        "TrackingFeedback": (lyrical,),
+    }.items():
+        assert [item for item in (jazzy, kilted, lyrical, humble) if item.has("msg", "nav2_msgs", type_)] == [
+            *having
+        ], type_
+    assert list(parts(lyrical, "FollowPath")[2].fields) == ["tracking_feedback"]
+    assert list(parts(jazzy, "FollowPath")[2].fields) == ["distance_to_goal", "speed"]
+    assert not noetic.knows("nav2_msgs")
+    for catalogue in (jazzy, kilted, lyrical, humble):
+        assert catalogue.has("action", "opennav_docking_msgs", "DockRobot")
+        assert catalogue.has("action", "nav2_msgs", "DockRobot") is (catalogue is not humble)
+    for catalogue in (jazzy, kilted, lyrical, humble, noetic):
+        for type_ in ("FollowJointTrajectory", "GripperCommand", "PointHead"):
+            assert catalogue.has("action", "control_msgs", type_), (catalogue.distribution, type_)
+        assert catalogue.has("msg", "geographic_msgs", "GeoPoseStamped")

@@ -10,6 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc.cli.main import main
+from robosc.model.structure import Deployment
 from robosc.targets.controller_config import (
     CONFIG_FILE,
     MAXIMUM_BYTES,
@@ -67,6 +68,58 @@ def test_everything_that_it_may_say(tmp_path: Path) -> None:
     assert options.state_message is StateMessage.BOTH
 
 
+def test_what_the_original_writes(tmp_path: Path) -> None:
+    run = {"packageName": "controller", "namespace": "controller", "executable": "interface", "name": "controller"}
+    written(
+        tmp_path,
+        {
+            "publishStateInformation": True,
+            "output": {
+                "ros1ControllerNodeLocation": "./catkin_ws/",
+                "ros2ControllerNodeLocation": "./controller/",
+                "ros2SupervisorNodeLocation": "./supervisor",
+            },
+            "supervisor": {"controller": {"run": run}},
+        },
+    )
+    config = read_controller_config(tmp_path)
+    assert config.warnings == ()
+    controller, layer = Deployment.CONTROLLER, Deployment.LAYER
+    assert {config.location(name, controller) for name in ("ros2", "ros2-cpp")} == {tmp_path / "controller"}
+    assert {config.location(name, controller) for name in ("ros1", "ros1-cpp")} == {tmp_path / "catkin_ws"}
+    assert config.location("ros2", layer) == tmp_path / "supervisor"
+    assert config.location("ros1", layer) is None
+    assert config.location("c99", controller) is None
+    assert config.supervised == SupervisedController(
+        "controller", "interface", namespace="controller", name="controller"
+    )
+
+
+def test_a_launch_file_as_the_original_names_it(tmp_path: Path) -> None:
+    launch = {"packageName": "turtlebot3_example", "file": "drive.launch.py"}
+    written(tmp_path, {"output": None, "supervisor": {"controller": {"launch": launch, "run": None}}})
+    config = read_controller_config(tmp_path)
+    assert config.warnings == ()
+    assert config.supervised == SupervisedController("turtlebot3_example", launch_file="drive.launch.py")
+
+
+def test_our_own_names_go_before_those_of_the_original(tmp_path: Path) -> None:
+    written(
+        tmp_path,
+        {
+            "outputLocations": {"ros2": "ours"},
+            "output": {"ros2ControllerNodeLocation": "theirs"},
+            "supervisedController": {"package": "ours", "executable": "x"},
+            "supervisor": {"controller": {"run": {"packageName": "theirs", "executable": "x"}}},
+        },
+    )
+    config = read_controller_config(tmp_path)
+    assert config.location("ros2", Deployment.CONTROLLER) == tmp_path / "ours"
+    assert config.location("ros2-cpp", Deployment.CONTROLLER) == tmp_path / "theirs"
+    assert config.supervised is not None
+    assert config.supervised.package == "ours"
+
+
 @pytest.mark.parametrize(
     ("content", "problem"),
     [
@@ -91,6 +144,26 @@ def test_everything_that_it_may_say(tmp_path: Path) -> None:
         ({"supervisedController": {"package": "p", "executable": "x", "launchFile": "y"}}, "either an executable"),
         ({"supervisedController": {"package": "p", "executable": "../x"}}, "without a path"),
         ({"supervisedController": {"package": "p", "executable": 3}}, "an object of texts"),
+        ({"output": "x"}, "'output' must be an object with ros1ControllerNodeLocation"),
+        (
+            {"output": {"ros2ControllerNodeLocation": "/x"}},
+            "'output.ros2ControllerNodeLocation' must be the relative path",
+        ),
+        ({"output": {"ros2ControllerNodeLocation": "../x"}}, "must be the relative path"),
+        ({"supervisor": []}, "'supervisor' must be an object with controller"),
+        ({"supervisor": {"controller": 3}}, "'supervisor.controller' must be an object with run, launch"),
+        ({"supervisor": {"controller": {"run": {}, "launch": {}}}}, "with either run or launch"),
+        ({"supervisor": {"controller": {"run": {}}}}, "'supervisor.controller.run': 'package' must be the name"),
+        ({"supervisor": {"controller": {"run": {"packageName": "p", "executable": 3}}}}, "an object of texts"),
+        (
+            {"supervisor": {"controller": {"run": {"packageName": "p", "executable": "x", "namespace": "a//b"}}}},
+            "'namespace' must be a name of ROS",
+        ),
+        (
+            {"supervisor": {"controller": {"run": {"packageName": "p", "executable": "x", "name": "a b"}}}},
+            "'name' must be the name of a node",
+        ),
+        ({"supervisor": {"controller": {"launch": {"packageName": "p"}}}}, "either an executable or a launch file"),
         ({"stateMessage": "xml"}, "'stateMessage' must be one of json, typed, both"),
         ({"stateMessage": ["json"]}, "'stateMessage' must be one of json, typed, both"),
         ({"maintainer": 3}, "'maintainer' must be a text"),
@@ -120,19 +193,29 @@ def test_what_is_wrong_is_reported_with_its_place(tmp_path: Path, content: Any, 
 def test_what_is_not_known_is_a_warning(tmp_path: Path) -> None:
     written(
         tmp_path,
-        {"publishStateInformations": True, "supervisedController": {"package": "p", "executable": "x", "a": 1}},
+        {
+            "publishStateInformations": True,
+            "supervisedController": {"package": "p", "executable": "x", "a": 1},
+            "output": {"ros2ControllerNodeLocations": "x"},
+        },
     )
     config = read_controller_config(tmp_path)
     assert not config.publish_state
-    assert len(config.warnings) == 2
+    assert len(config.warnings) == 3
+    assert "did you mean 'ros2ControllerNodeLocation'?" in config.warnings[1]
+    assert not config.nodes
     assert "did you mean 'publishStateInformation'?" in config.warnings[0]
-    assert "'supervisedController.a' is not known" in config.warnings[1]
+    assert "'supervisedController.a' is not known" in config.warnings[2]
 
 
 _PLAIN = st.none() | st.booleans() | st.integers(-2, 2) | st.sampled_from(["", "a", "a/b", "..", "/a", "ros2", "a\nb"])
-_NAMES = st.sampled_from(["ros2", "ROS2", "c99", "..", "package", "executable", "launchFile", "x"])
+_NAMES = st.sampled_from(
+    "ros2 ROS2 c99 .. package executable launchFile ros2ControllerNodeLocation controller run launch x".split()
+)
 _JSON = _PLAIN | st.lists(_PLAIN, max_size=2) | st.dictionaries(_NAMES, _PLAIN, max_size=3)
-_KEYS = st.sampled_from(["publishStateInformation", "writeEventsToLog", "outputLocations", "supervisedController", "x"])
+_KEYS = st.sampled_from(
+    "publishStateInformation writeEventsToLog outputLocations supervisedController output supervisor x".split()
+)
 
 
 @given(st.dictionaries(_KEYS, _JSON))
@@ -142,7 +225,7 @@ def test_any_document_is_read_or_refused(tmp_path_factory: pytest.TempPathFactor
         config = read_controller_config(written(folder, document))
     except ControllerConfigError:
         return
-    for place in config.locations.values():
+    for place in (*config.locations.values(), *config.nodes.values()):
         assert place.resolve().is_relative_to(folder.resolve())
 
 
@@ -168,6 +251,39 @@ class TestCommand:
         parameters = yaml.safe_load(file.read_text())["/**"]["ros__parameters"]
         assert parameters["publish_state"] is True
         assert parameters["log_folder"] == "event_log"
+
+    def test_a_layer_goes_where_the_original_puts_it_and_starts_its_controller(self, model: Path) -> None:
+        run = {"packageName": "controller", "namespace": "c", "executable": "interface", "name": "follower"}
+        written(
+            model.parent,
+            {
+                "output": {"ros2ControllerNodeLocation": "controller", "ros2SupervisorNodeLocation": "supervisor"},
+                "supervisor": {"controller": {"run": run}},
+            },
+        )
+        assert main(["generate", str(model), "--target", "ros2", "--deployment", "layer"]) == 0
+        assert not (model.parent / "controller").exists()
+        text = (model.parent / "supervisor/launch/layer.launch.py").read_text()
+        compile(text, "layer.launch.py", "exec")
+        assert "name='follower'," in text
+        assert "namespace=[namespace, '/c']," in text
+        written(model.parent, {"supervisor": {"controller": {"run": run}}})
+        chosen = ["--deployment", "layer", "-o", str(model.parent / "ros1")]
+        assert main(["generate", str(model), "--target", "ros1", *chosen]) == 0
+        text = (model.parent / "ros1/launch/layer.launch").read_text()
+        assert 'name="controller_name" default="follower"' in text
+        assert 'name="$(arg controller_name)" ns="c" output' in text
+
+    def test_a_controller_in_another_namespace_has_no_relative_names(
+        self, model: Path, capsys: pytest.CaptureFixture[str]
+    ) -> None:
+        model.write_text(MODEL.replace('"/blink"', '"blink"'))
+        run = {"packageName": "controller", "namespace": "c", "executable": "interface"}
+        written(
+            model.parent, {"output": {"ros2SupervisorNodeLocation": "s"}, "supervisor": {"controller": {"run": run}}}
+        )
+        assert main(["generate", str(model), "--target", "ros2", "--deployment", "layer"]) == 1
+        assert "the name blink is relative; write '/blink' in the model" in capsys.readouterr().err
 
     def test_what_is_given_on_the_command_line_has_the_last_word(self, model: Path, tmp_path: Path) -> None:
         written(model.parent, {"outputLocations": {"python": "there"}})

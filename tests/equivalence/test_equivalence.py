@@ -1,7 +1,7 @@
 """Every target does what the reference executor does: the same runs, compared step by step."""
 
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import islice
 from pathlib import Path
@@ -36,6 +36,7 @@ from support.random_controllers import random_controller, random_robot
 from support.random_couriers import strategic_courier
 from support.random_goals import strategic_controller
 from support.random_supervisors import CERTIFICATE, random_supervisor
+from support.random_travels import random_travels
 from support.random_waiting import strategic_waiting
 from support.rounds import long_detour_supervisor
 
@@ -53,11 +54,13 @@ def python_target(supervisor: Supervisor) -> PythonTarget:
 
 def _some_supervisor(seed: int) -> Supervisor:
     """A random robot, of one kind or another."""
-    match Random(seed).randrange(3):
+    match Random(seed).randrange(4):
         case 0:
             return msgspec.structs.replace(random_supervisor(seed), deployment=Deployment.CONTROLLER)
         case 1:
             return random_robot(seed)
+        case 2:
+            return random_travels(seed)
         case _:
             return random_controller(seed) or random_robot(seed)
 
@@ -109,6 +112,45 @@ def test_random_robots_in_python(seed: int) -> None:
     compare(generated_python(supervisor, module), scenario, expected)
     compare(generated_python(supervisor, module, has_log=False), scenario, expected)
     compare(reference(supervisor, has_log=False), scenario, expected)
+
+
+def _ends(observations: Sequence[Observation]) -> Counter[str]:
+    """Count how the goals ended that were being cancelled, by the event and what came."""
+    found: Counter[str] = Counter()
+    asked: set[str] = set()
+    for line in (line for item in observations for line in item.log):
+        name, _, kind = line.get("event", "").rpartition(".")
+        if line["kind"] == "cancelling" and "requirement" in line["why"]:
+            asked.add(line["action"])
+        elif line["kind"] == "event" and name in asked and kind in ("response", "error", "cancel"):
+            asked.remove(name)
+            found[f"{kind}: {line['data']}" if kind == "error" else kind] += 1
+        elif line["kind"] == "event" and name in asked and kind == "feedback":
+            found[kind] += 1
+        elif line["kind"] == "cancel_overdue" or (line["kind"] == "fault" and "refused" in line["what"]):
+            found[line["kind"]] += 1
+        elif line["kind"] == "restart":
+            asked.clear()
+    return found
+
+
+ENDS_OF_CANCELLED = (
+    *("cancel", "response", "feedback", "cancel_overdue", "fault"),
+    *(f"error: {why}" for why in ("cancelled", "aborted", "rejected", "lost", "timeout")),
+)
+"""Fates of a goal that is being cancelled."""
+
+
+def test_goals_that_are_being_cancelled_in_python() -> None:
+    found: Counter[str] = Counter()
+    for seed in range(60):
+        supervisor = random_travels(seed)
+        scenario = random_scenario(supervisor, seed, 150)
+        expected = observe(supervisor, scenario)
+        compare(generated_python(supervisor, load_module(supervisor)), scenario, expected)
+        found += _ends(expected)
+    print(dict(found))
+    assert all(found[end] for end in ENDS_OF_CANCELLED), found
 
 
 @needs_gcc

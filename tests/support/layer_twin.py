@@ -38,8 +38,10 @@ class TwinGoal:
     history: list[Holds] = field(default_factory=list)
     runs_in_model: bool = True
     is_accepted: bool = False
-    is_cancel_wanted: bool = False
+    asked: float | None = None
     is_cancel_sent: bool = False
+    is_late: bool = False
+    turned_first: bool = False
     was_cancelled_by_caller: bool = False
     has_ended_for_caller: bool = False
 
@@ -97,6 +99,7 @@ class LayerTwin:
     Attributes:
         reported: All that was reported to either side, in order; the caller's ends of one step come last, sorted.
         events: Every event that happened.
+        late: The action of each goal that did not end in time after its cancel, in the order of these reports.
         unexpected: Number of replies that the model did not wait for, and of cancels of what has ended for the
             caller.
     """
@@ -109,6 +112,7 @@ class LayerTwin:
         self.reported: list[MessageReceived] = []
         self.events: list[str] = []
         self.unexpected = 0
+        self.late: list[str] = []
         self.calls: list[TwinCall] = []
         self.goals: list[TwinGoal] = []
         self.last_call = self.last_goal = 0
@@ -160,11 +164,10 @@ class LayerTwin:
                     self.zero(identifier)
 
     def silent(self) -> str | None:
-        for goal in sorted(self.goals, key=lambda item: self.actions.index(item.action)):
+        for goal in self.sorted_goals():
             if goal.runs_in_model and turned([*goal.history, self.system.requirements(goal.action)]):
-                goal.runs_in_model = False
+                goal.turned_first = goal.turned_first or goal.asked is None
                 self.cancel(goal)
-                return f"{goal.action}.cancel"
         description = self.system.description
         return next((event for event in (*description.resets, *description.taus) if self.system.enabled(event)), None)
 
@@ -175,8 +178,15 @@ class LayerTwin:
         self.acting.pop(identifier, None)
         self.reported.append(("default", identifier))
 
+    def sorted_goals(self) -> list[TwinGoal]:
+        return sorted(self.goals, key=lambda item: self.actions.index(item.action))
+
+    def cancelling(self) -> tuple[str, ...]:
+        """Return the actions whose goal is being cancelled."""
+        return tuple(goal.action for goal in self.sorted_goals() if goal.asked is not None)
+
     def cancel(self, goal: TwinGoal) -> None:
-        goal.is_cancel_wanted = True
+        goal.asked = self.now if goal.asked is None else goal.asked
         if goal.is_accepted and not goal.is_cancel_sent:
             goal.is_cancel_sent = True
             self.reported.append(("cancel", goal.action, goal.number))
@@ -184,7 +194,7 @@ class LayerTwin:
     def rest(self) -> None:
         for identifier in self.settings["release_identifiers"]:
             self.zero(identifier)
-        for goal in sorted(self.goals, key=lambda item: self.actions.index(item.action)):
+        for goal in self.sorted_goals():
             self.cancel(goal)
 
     @property
@@ -249,10 +259,6 @@ class LayerTwin:
         if goal.was_cancelled_by_caller:
             return
         goal.was_cancelled_by_caller = True
-        goal.runs_in_model = False
-        with self.guard():
-            assert self.take(f"{goal.action}.cancel")
-            self.settle()
         self.cancel(goal)
         self.finish()
 
@@ -290,7 +296,7 @@ class LayerTwin:
 
     def accept(self, goal: TwinGoal) -> None:
         goal.is_accepted = True
-        if goal.is_cancel_wanted:
+        if goal.asked is not None:
             self.cancel(goal)
 
     def feedback(self, goal: TwinGoal, data: Any) -> None:
@@ -308,8 +314,10 @@ class LayerTwin:
     def end(self, goal: TwinGoal, outcome: str, data: Any) -> None:
         self.goals.remove(goal)
         if goal.runs_in_model:
+            is_ours = goal.turned_first or goal.was_cancelled_by_caller
+            kind = "cancel" if outcome == "cancelled" and is_ours else "error"
             with self.guard():
-                assert self.take(f"{goal.action}.{'response' if outcome == 'succeeded' else 'error'}")
+                assert self.take(f"{goal.action}.{'response' if outcome == 'succeeded' else kind}")
                 self.settle()
         elif outcome == "succeeded":
             self.unexpected += 1
@@ -337,12 +345,20 @@ class LayerTwin:
             assert self.take(f"{call.service}.error")
             self.reported.append(("no answer", call.service, call.caller))
             self.settle()
-        for goal in sorted(self.goals, key=lambda item: self.actions.index(item.action)):
+        for goal in self.sorted_goals():
             if goal.runs_in_model and self.now >= goal.until:
                 goal.runs_in_model = False
                 assert self.take(f"{goal.action}.error")
                 self.settle()
                 self.cancel(goal)
+        for goal in self.sorted_goals():
+            if (
+                goal.asked is not None
+                and not goal.is_late
+                and self.now >= goal.asked + self.settings["cancel_timeout_s"]
+            ):
+                goal.is_late = True
+                self.late.append(goal.action)
         for name, age in self.sensors.items():
             if self.now - self.seen.get(name, self.started) >= age and name not in self.reasons:
                 self.reasons.add(name)

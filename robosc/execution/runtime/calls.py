@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
 
-from robosc.execution.runtime.falling_conditions import have_fallen, held_ever
+from robosc.execution.runtime.falling_conditions import held_ever, the_fallen
 from robosc.execution.runtime.protocol import ControlledSystem, RobotSide
 
 FOREVER = float('inf')
@@ -83,10 +83,15 @@ class Goal:
 
     :ivar number: Its id.
     :ivar action: Name of the action.
-    :ivar is_running: True if the model's action executes it; no longer after its cancel or error.
+    :ivar is_running: True if the model's action executes it; no longer after its time was over or
+        after a restart.
     :ivar is_accepted: True if its server accepted it.
-    :ivar is_cancel_wanted: True if it is to be cancelled.
+    :ivar is_cancelling: True if its cancel was decided.
+    :ivar cancelled_by: The one whose cancel is an event of the model when the goal has ended:
+        `supervisor` or `caller`; empty: nobody so far.
+    :ivar asked_s: Reading of the clock when its cancel was decided.
     :ivar is_cancel_sent: True if its server was asked to cancel it.
+    :ivar is_overdue: True if it was reported that it has not ended in time after that.
     :ivar deadline_s: Reading of the clock at which it counts as failed.
     :ivar held: Values for the requirements of the action: True if one held in a stable state since
         the request.
@@ -94,11 +99,14 @@ class Goal:
 
     __slots__ = (
         'action',
+        'asked_s',
+        'cancelled_by',
         'deadline_s',
         'held',
         'is_accepted',
         'is_cancel_sent',
-        'is_cancel_wanted',
+        'is_cancelling',
+        'is_overdue',
         'is_running',
         'number',
     )
@@ -110,8 +118,11 @@ class Goal:
         self.action = action
         self.is_running = True
         self.is_accepted = False
-        self.is_cancel_wanted = False
+        self.is_cancelling = False
+        self.cancelled_by = ''
+        self.asked_s = 0.0
         self.is_cancel_sent = False
+        self.is_overdue = False
         self.deadline_s = deadline_s
         self.held = held
 
@@ -189,20 +200,21 @@ class Goals:
             (goal.deadline_s for goal in self._goals.values() if goal.is_running), default=FOREVER
         )
 
-    def to_cancel(self) -> Optional[Goal]:
+    def turned(self) -> List[Tuple[Goal, Tuple[int, ...]]]:
         """
-        Return a goal to be cancelled now.
+        Return goals whose cancel is due: a requirement that held since the request has turned.
 
-        A goal is cancelled if a requirement that held since its request holds no longer and the
-        cancel is allowed. A requirement that the request itself made false never held since, and
-        cancels nothing.
+        A requirement that the request itself made false never held since, and cancels nothing.
+
+        :returns: Each goal with the numbers, from 1, of the action's requirements that turned.
         """
+        found = []
         for goal in self._goals.values():
-            if goal.is_running and any(goal.held):
-                has_turned = have_fallen(goal.held, self._system.requirements(goal.action))
-                if has_turned and self._system.enabled(goal.action + '.cancel'):
-                    return goal
-        return None
+            if goal.is_running and not goal.is_cancelling and any(goal.held):
+                fallen = the_fallen(goal.held, self._system.requirements(goal.action))
+                if fallen:
+                    found.append((goal, fallen))
+        return found
 
     def observe_stable_state(self) -> None:
         """Remember which requirements of the running goals hold."""

@@ -10,6 +10,8 @@ An entry is a dict with `time` (seconds since 1970-01-01 UTC), `kind` and, by ki
     unknown     event and what was unknown; a request of this kind was not issued
     release     the default message went out: identifier
     blocked     a supervision layer held a request back: identifier, why
+    cancelling  the cancel of a goal was decided, and its end is awaited: action, why
+    cancel_overdue  that goal did not end within cancel_timeout_s: action, asked_s (so long ago)
     reached     an aim of the strategy has become true: aim, count (how often so far), what
     approach    the strategy approaches another aim now: aim (null: all are met), what
     owed        an assumption has been owed for too long: assumption, owed_s, what

@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Any, Callable, Dict, Optional, Sequence, Tuple
 
 from robosc.execution.runtime.callers import Callers
+from robosc.execution.runtime.cancels import BY_CALLER
 from robosc.execution.runtime.clock import Clock
 from robosc.execution.runtime.command_timeouts import CommandTimeouts
 from robosc.execution.runtime.event_log import EventLog
@@ -26,7 +27,7 @@ from robosc.execution.runtime.protocol import (
 )
 from robosc.execution.runtime.requests import Request
 from robosc.execution.runtime.runner import DeploymentError, guarded, Runner, Status
-from robosc.execution.runtime.safe_stop import describe_error, request_cancel
+from robosc.execution.runtime.safe_stop import describe_error
 from robosc.execution.runtime.settings import Settings
 from robosc.execution.runtime.steps import ExecutionError
 
@@ -149,7 +150,8 @@ class Layer(Runner):
         """
         Cancel a goal for the existing controller.
 
-        The cancel is always forwarded, also while the robot is stopped.
+        The cancel is always forwarded, also while the robot is stopped; its event follows when the
+        goal has ended.
 
         :param action: Name of the action in the model.
         :param goal_id: Id of the goal on the caller's side.
@@ -160,15 +162,8 @@ class Layer(Runner):
         if waiting is None or goal is None:
             self._recorder.unexpected({'what': 'a cancel of no goal of {}'.format(action)})
             return
-        if waiting.is_cancelled:
-            return
         waiting.is_cancelled = True
-        goal.is_running = False
-        try:
-            self._steps.happen(action + '.cancel', None, None)
-            self._end_batch()
-        finally:
-            request_cancel(self._robot, goal)
+        self._cancels.ask(goal, 'the caller', BY_CALLER)
 
     @guarded
     def on_silent(self, identifier: str) -> None:

@@ -103,6 +103,15 @@ class Recorder:
         """Note that the default message goes out on an identifier."""
         self._write({'kind': 'release', 'identifier': identifier})
 
+    def cancelling(self, action: str, why: str) -> None:
+        """Note that the cancel of a goal was decided; its end is awaited."""
+        self._write({'kind': 'cancelling', 'action': action, 'why': why})
+
+    def cancel_overdue(self, action: str, asked_s: float) -> None:
+        """Note that a goal has not ended in time after its cancel was decided."""
+        asked = round(asked_s, 3)
+        self._write({'kind': 'cancel_overdue', 'action': action, 'asked_s': asked})
+
     def blocked(self, identifier: str, why: str) -> None:
         """Note that a supervision layer held a request back."""
         self._write({'kind': 'blocked', 'identifier': identifier, 'why': why})

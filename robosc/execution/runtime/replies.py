@@ -5,9 +5,8 @@ from __future__ import annotations
 from typing import Any, Optional
 
 from robosc.execution.runtime.calls import Calls, Goal, Goals, OUTCOMES
-from robosc.execution.runtime.protocol import RobotSide
+from robosc.execution.runtime.cancels import BY_NONE, Cancels
 from robosc.execution.runtime.recorder import Recorder
-from robosc.execution.runtime.safe_stop import request_cancel
 from robosc.execution.runtime.steps import ExecutionError, Steps
 
 
@@ -18,19 +17,19 @@ class Replies:
     Methods that take an event return whether they did.
 
     :param steps: Steps that take the events.
-    :param middleware: Middleware that cancels goals.
+    :param cancels: Cancels of goals.
     :param recorder: Recorder of replies that match no request.
     :param calls: Service calls under way.
     :param goals: Goals under way.
     """
 
-    __slots__ = ('_calls', '_goals', '_middleware', '_recorder', '_steps')
+    __slots__ = ('_calls', '_cancels', '_goals', '_recorder', '_steps')
 
     def __init__(
-        self, steps: Steps, middleware: RobotSide, recorder: Recorder, calls: Calls, goals: Goals
+        self, steps: Steps, cancels: Cancels, recorder: Recorder, calls: Calls, goals: Goals
     ) -> None:
         self._steps = steps
-        self._middleware = middleware
+        self._cancels = cancels
         self._recorder = recorder
         self._calls = calls
         self._goals = goals
@@ -45,23 +44,25 @@ class Replies:
         self._goals.leave_model()
 
     def deadline_s(self) -> float:
-        """Return the clock's reading, in seconds, at which the next call or goal is late."""
-        return min(self._calls.deadline_s(), self._goals.deadline_s())
+        """Return the clock's reading, in seconds, at which the next call, goal or end is late."""
+        return min(self._calls.deadline_s(), self._goals.deadline_s(), self._cancels.deadline_s())
 
     def expire(self, now_s: float) -> None:
-        """Fail the calls and goals that exceeded their time, and cancel such goals."""
+        """
+        Fail the calls and goals that exceeded their time, and cancel such goals.
+
+        Report the cancelled goals that should have ended by now.
+        """
         for number in self._calls.expired(now_s):
             service = self._calls.close(number)
             self._steps.happen('{}.error'.format(service), None, 'timeout')
             self._steps.settle()
         for goal in self._goals.expired(now_s):
-            if not goal.is_running:
-                # The end of another goal has led to a cancellation of this one.
-                continue
             goal.is_running = False
             self._steps.happen(goal.action + '.error', None, 'timeout')
             self._steps.settle()
-            request_cancel(self._middleware, goal)
+            self._cancels.ask(goal, 'timeout', BY_NONE)
+        self._cancels.report_overdue(now_s)
 
     def reply(self, request_id: int, data: Any) -> bool:
         """Take in the reply to a service call."""
@@ -84,8 +85,7 @@ class Replies:
         goal = self._find_goal(goal_id, 'an acceptance')
         if goal is not None:
             goal.is_accepted = True
-            if goal.is_cancel_wanted:
-                request_cancel(self._middleware, goal)
+            self._cancels.send(goal)
 
     def feedback(self, goal_id: int, data: Any) -> bool:
         """Take in the feedback on a goal."""
@@ -114,6 +114,8 @@ class Replies:
         self._steps.candidates = None
         if goal.is_running and outcome == 'succeeded':
             self._steps.happen_with_data(goal.action + '.response', data)
+        elif goal.is_running and outcome == 'cancelled':
+            self._steps.end_cancelled(goal)
         elif goal.is_running:
             self._steps.happen(goal.action + '.error', None, outcome)
         elif outcome == 'succeeded':

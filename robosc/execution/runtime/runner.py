@@ -17,6 +17,7 @@ from functools import wraps
 from typing import Any, Callable, cast, Optional, Tuple, TypeVar
 
 from robosc.execution.runtime.calls import Calls, Goals
+from robosc.execution.runtime.cancels import Cancels
 from robosc.execution.runtime.clock import Clock, SystemClock
 from robosc.execution.runtime.event_log import EventLog, NullLog
 from robosc.execution.runtime.progress import Progress, ProgressAccount
@@ -125,7 +126,9 @@ class Runner:
             self.settings.max_age_s,
         )
         self._has_watched_sensors = bool(self._sensors)
-        self._safe_stop = SafeStop(robot, self._releases, self._goals)
+        self._cancels = Cancels(robot, self._recorder, self._goals, self.settings.cancel_timeout_s)
+        self._cancels.wake = self._wake_at
+        self._safe_stop = SafeStop(robot, self._releases, self._goals, self._cancels)
         self._progress = self._new_progress()
         self._steps = Steps(
             system,
@@ -133,10 +136,13 @@ class Runner:
             self._recorder,
             self._releases,
             self._goals,
+            self._cancels,
             self.settings.on_unknown,
             self._progress,
         )
-        self._replies = Replies(self._steps, robot, self._recorder, self._calls, self._goals)
+        self._replies = Replies(
+            self._steps, self._cancels, self._recorder, self._calls, self._goals
+        )
         self._batches = batches(infos)
         self._is_started = False
         self._may_request = False
@@ -178,6 +184,16 @@ class Runner:
     def counters(self) -> Counters:
         """Return counts of what went wrong so far."""
         return self._recorder.counters()
+
+    @property
+    def cancelling(self) -> Tuple[str, ...]:
+        """Return the actions whose goal was to be cancelled and has not ended, in source order."""
+        return self._cancels.cancelling()
+
+    @property
+    def overdue_cancels(self) -> Tuple[str, ...]:
+        """Return those of them whose goal has not ended within the time for that."""
+        return self._cancels.overdue()
 
     @property
     def progress(self) -> Optional[Progress]:
@@ -304,7 +320,7 @@ class Runner:
         The adapter calls it on a signal, or, with `is_fault`, on a fault that it found. Running
         goals are cancelled: the status is `stopping` until they have ended, for at most 0.5 s.
         """
-        self._now_s = self._clock.monotonic()
+        self._now_s = self._recorder.began_s = self._clock.monotonic()
         if is_fault:
             self._fail(reason)
         else:
@@ -317,7 +333,7 @@ class Runner:
 
         Goals and calls under way belong to the old run.
         """
-        self._now_s = self._clock.monotonic()
+        self._now_s = self._recorder.began_s = self._clock.monotonic()
         if not self._safe_stop.reasons or self._safe_stop.unsent:
             self._come_to_rest()
         if self._safe_stop.unsent:

@@ -8,7 +8,8 @@ from __future__ import annotations
 
 from typing import Dict, List, Tuple
 
-from robosc.execution.runtime.calls import Goal, Goals
+from robosc.execution.runtime.calls import Goals
+from robosc.execution.runtime.cancels import BY_NONE, Cancels
 from robosc.execution.runtime.protocol import RobotSide
 from robosc.execution.runtime.release import Releases
 
@@ -24,32 +25,36 @@ def describe_error(error: BaseException) -> str:
     return '{}: {}'.format(type(error).__name__, text) if text else type(error).__name__
 
 
-def request_cancel(middleware: RobotSide, goal: Goal) -> None:
-    """Ask once for the cancel of a goal; before its acceptance the cancel is only remembered."""
-    goal.is_cancel_wanted = True
-    if goal.is_accepted and not goal.is_cancel_sent:
-        middleware.cancel_goal(goal.action, goal.number)
-        goal.is_cancel_sent = True
-
-
 class SafeStop:
     """
     The reasons why an executor has stopped, and the actions of its safe stop.
 
-    :param middleware: Middleware that sends default messages and cancels.
+    :param middleware: Middleware that sends default messages.
     :param releases: The release identifiers.
     :param goals: Goals under way.
+    :param cancels: Cancels of these goals.
     :ivar reasons: Reasons in words, by a key; while there is one, no request is issued.
     :ivar awaited_until_s: Time until which the goals' ends are awaited, in seconds.
     :ivar unsent: Release identifiers whose default message could not be sent so far.
     """
 
-    __slots__ = ('_goals', '_middleware', '_releases', 'awaited_until_s', 'reasons', 'unsent')
+    __slots__ = (
+        '_cancels',
+        '_goals',
+        '_middleware',
+        '_releases',
+        'awaited_until_s',
+        'reasons',
+        'unsent',
+    )
 
-    def __init__(self, middleware: RobotSide, releases: Releases, goals: Goals) -> None:
+    def __init__(
+        self, middleware: RobotSide, releases: Releases, goals: Goals, cancels: Cancels
+    ) -> None:
         self._middleware = middleware
         self._releases = releases
         self._goals = goals
+        self._cancels = cancels
         self.reasons: Dict[str, str] = {}
         self.awaited_until_s = 0.0
         self.unsent: Tuple[str, ...] = ()
@@ -58,7 +63,7 @@ class SafeStop:
         """Send every default message, cancel every goal; return what failed. Never raises."""
         self.unsent = self._releases.identifiers
         for goal in self._goals.open_goals():
-            goal.is_cancel_wanted = True
+            self._cancels.decide(goal, 'stop', BY_NONE)
         self.awaited_until_s = now_s + CANCEL_WAIT_S
         failures = self.retry()
         self._releases.clear()
@@ -84,13 +89,12 @@ class SafeStop:
                 )
         self.unsent = tuple(owed)
         for goal in self._goals.open_goals():
-            if goal.is_cancel_wanted:
-                try:
-                    request_cancel(self._middleware, goal)
-                except Exception as error:
-                    failures.append(
-                        'cancel of {} failed: {}'.format(goal.action, describe_error(error))
-                    )
+            try:
+                self._cancels.send(goal)
+            except Exception as error:
+                failures.append(
+                    'cancel of {} failed: {}'.format(goal.action, describe_error(error))
+                )
         return failures
 
     def is_awaiting(self, now_s: float) -> bool:

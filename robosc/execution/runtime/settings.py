@@ -38,6 +38,8 @@ class Settings(NamedTuple):
     :ivar service_timeout_s: Seconds until a service call without a reply counts as failed; None:
         never.
     :ivar action_timeout_s: Seconds until a goal without a result counts as failed; None: never.
+    :ivar cancel_timeout_s: Seconds after the cancel of a goal was decided until it is reported
+        that the goal has not ended; 0: never.
     :ivar on_unknown: Reaction if an enum gets its default because a rule is unknown: `default`,
         `keep`, `fault`.
     :ivar command_timeout_s: Seconds without a message from the existing controller on a release
@@ -55,6 +57,7 @@ class Settings(NamedTuple):
     max_age_s: Mapping[str, float] = {}
     service_timeout_s: Optional[float] = 10.0
     action_timeout_s: Optional[float] = None
+    cancel_timeout_s: float = 5.0
     on_unknown: str = 'default'
     command_timeout_s: float = 1.0
     assumption_timeout_s: float = 30.0
@@ -102,6 +105,7 @@ def validated(settings: Settings) -> Settings:
         max_age_s=_ages(settings.max_age_s),
         service_timeout_s=_optional_seconds('service_timeout_s', settings.service_timeout_s),
         action_timeout_s=_optional_seconds('action_timeout_s', settings.action_timeout_s),
+        cancel_timeout_s=_seconds_or_zero('cancel_timeout_s', settings.cancel_timeout_s),
         on_unknown=_choice('on_unknown', settings.on_unknown, ON_UNKNOWN),
         command_timeout_s=_seconds_or_zero('command_timeout_s', settings.command_timeout_s),
         assumption_timeout_s=_seconds_or_zero(

@@ -10,13 +10,13 @@ from __future__ import annotations
 
 from typing import Any, Dict, Optional, Tuple
 
-from robosc.execution.runtime.calls import Goals
+from robosc.execution.runtime.calls import Goal, Goals
+from robosc.execution.runtime.cancels import BY_SUPERVISOR, Cancels
 from robosc.execution.runtime.livelock import LivelockDetector
 from robosc.execution.runtime.progress import ProgressAccount
 from robosc.execution.runtime.protocol import ControlledSystem, Reading, RobotSide
 from robosc.execution.runtime.recorder import Recorder
 from robosc.execution.runtime.release import Releases
-from robosc.execution.runtime.safe_stop import request_cancel
 
 
 class ExecutionError(Exception):
@@ -28,10 +28,11 @@ class Steps:
     Part of an executor that takes events of a controlled system.
 
     :param system: The controlled system.
-    :param middleware: Middleware that default messages and cancels go to.
+    :param middleware: Middleware that default messages go to.
     :param recorder: Recorder of everything that happens.
     :param releases: Messages that keep acting.
     :param goals: Goals under way.
+    :param cancels: Cancels of these goals.
     :param on_unknown: Meaning of an unknown enum: `default`, `keep` or `fault`.
     :param progress: Account of the strategy's progress; None where there is no strategy.
     :ivar candidates: Numbers of the requests that may be issued in the stable state, or None
@@ -42,6 +43,7 @@ class Steps:
     """
 
     __slots__ = (
+        '_cancels',
         '_goals',
         '_middleware',
         '_on_unknown',
@@ -62,6 +64,7 @@ class Steps:
         recorder: Recorder,
         releases: Releases,
         goals: Goals,
+        cancels: Cancels,
         on_unknown: str,
         progress: Optional[ProgressAccount] = None,
     ) -> None:
@@ -70,6 +73,7 @@ class Steps:
         self._recorder = recorder
         self._releases = releases
         self._goals = goals
+        self._cancels = cancels
         self._on_unknown = on_unknown
         self._progress = progress
         self.candidates: Optional[Tuple[int, ...]] = None
@@ -140,23 +144,39 @@ class Steps:
         if skipped:
             self._skip(event, skipped)
 
-    def take(self, event: str, data: Any) -> None:
+    def take(self, event: str, data: Any, is_controllable: bool = True) -> None:
         """
-        Take a controllable event that is enabled.
+        Take an event that is enabled.
 
+        :param event: The event.
+        :param data: Data that the log reports for it.
+        :param is_controllable: False for what somebody else decides: a caller's cancel.
         :raises ExecutionError: The state does not accept it.
         """
         skipped = self._system.step(event)
         if skipped is None:
             raise ExecutionError('{} is enabled, but the state does not accept it'.format(event))
         if self._recorder.is_active:
-            self._recorder.event(event, True, data)
+            self._recorder.event(event, is_controllable, data)
         if skipped:
             self._skip(event, skipped)
 
+    def end_cancelled(self, goal: Goal) -> None:
+        """
+        Take the event of a running goal that its server has ended as cancelled.
+
+        It is `error` if somebody else wanted the cancel, or if the supervisor does not allow it
+        now.
+        """
+        cancel = goal.action + '.cancel'
+        if goal.cancelled_by and self._system.enabled(cancel):
+            self.take(cancel, None, goal.cancelled_by == BY_SUPERVISOR)
+        else:
+            self.happen(goal.action + '.error', None, 'cancelled')
+
     def settle(self, issuing: Optional[str] = None) -> bool:
         """
-        Take silent steps until none is enabled.
+        Take silent steps until none is enabled; first ask for the cancels that are due.
 
         Then releases and running goals are checked, if the stable state is a new one.
 
@@ -202,18 +222,12 @@ class Steps:
 
     def _silent_step(self) -> Optional[str]:
         """
-        Take one silent step, cancels first, then resets, then taus.
+        Ask for the cancels that are due, and take one silent step: resets first, then taus.
 
         :returns: Its event, or None if none is enabled.
         """
         if self._goals:
-            goal = self._goals.to_cancel()
-            if goal is not None:
-                event = goal.action + '.cancel'
-                self.take(event, None)
-                goal.is_running = False
-                request_cancel(self._middleware, goal)
-                return event
+            self._cancels.ask_where_due()
         silent = self._system.enabled_silent()
         if silent is not None:
             self.take(silent, None)

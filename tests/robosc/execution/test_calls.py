@@ -212,12 +212,124 @@ def test_a_requirement_that_turns_cancels_the_goal() -> None:
     b = driving()
     b.executor.on_goal_accepted(1)
     assert b.receive("safe", False) == [CANCEL]
-    assert b.events == ["drive.request", "safe.response", "drive.cancel"]
+    # Asking ends nothing: the goal is executing until its server has ended it.
+    assert b.events == ["drive.request", "safe.response"]
+    assert b.executor.cancelling == ("drive",)
+    (entry,) = b.entries("cancelling")
+    assert (entry["action"], entry["why"]) == ("drive", "requirement 1 no longer holds")
+    assert b.system.location("drive") == "executing"
+    assert b.tick(3) == []
+    b.executor.on_goal_ended(1, "cancelled")
+    assert b.events[2:] == ["drive.cancel"]
+    assert b.entries("event")[-1]["controllable"] is True
     assert b.state("Driver") == "home"
     assert b.system.location("drive") == "idle"
-    b.executor.on_goal_ended(1, "cancelled")
+    assert b.executor.cancelling == ()
     assert b.executor.counters.unexpected == 0
+
+
+@pytest.mark.parametrize("outcome", ["rejected", "aborted", "lost"])
+def test_a_goal_that_ends_otherwise_while_it_is_being_cancelled_is_an_error(outcome: str) -> None:
+    b = driving()
+    b.receive("safe", False)
+    b.executor.on_goal_ended(1, outcome)
+    assert b.events[2:] == ["drive.error", "drive.reset"]
+    assert b.entries("event")[2]["data"] == outcome
+
+
+def test_a_goal_that_succeeds_in_spite_of_the_cancel_is_a_response() -> None:
+    b = driving()
+    b.executor.on_goal_accepted(1)
+    b.receive("safe", False)
+    b.executor.on_feedback(1, {"left": 2.0})
+    assert b.variable("Driver", "left") == 2.0
+    b.executor.on_goal_ended(1, "succeeded", {"code": 1})
+    assert b.events[2:] == ["drive.feedback", "drive.response", "drive.reset"]
+    assert b.variable("Driver", "code") == 1
+    assert b.executor.counters.unexpected == 0
+
+
+def test_a_cancelled_goal_whose_requirements_hold_again_is_an_error() -> None:
+    b = driving()
+    b.executor.on_goal_accepted(1)
+    b.receive("safe", False)
+    b.receive("safe", True)
+    assert b.executor.cancelling == ("drive",)
+    b.executor.on_goal_ended(1, "cancelled")
+    assert b.events[-2:] == ["drive.error", "drive.reset"]
+    assert b.state("Driver") == "failed"
+
+
+def test_a_goal_is_asked_once_to_cancel() -> None:
+    b = driving()
+    b.executor.on_goal_accepted(1)
+    assert b.receive("safe", False) == [CANCEL]
+    assert b.receive("safe", True) + b.receive("safe", False) + b.receive("near", True) + b.tick(3) == []
+    assert len(b.entries("cancelling")) == 1
+
+
+def test_all_requirements_that_turned_are_named() -> None:
+    b = bench(ACTION.replace("requirement Sensor.is_near disables drive", "requirement drive needs Sensor.is_safe"))
+    b.tick()
+    b.receive("safe", False)
+    assert b.entries("cancelling")[0]["why"] == "requirements 1, 2 no longer hold"
+
+
+def overdue_periods(cancel_timeout_s: float) -> list[float]:
+    """Return the seconds since the cancel at which it is reported that the goal did not end."""
+    b = driving(cancel_timeout_s=cancel_timeout_s)
+    b.executor.on_goal_accepted(1)
+    b.receive("safe", False)
+    b.tick(100)
+    assert b.executor.overdue_cancels == (("drive",) if b.entries("cancel_overdue") else ())
+    # It goes on blocking what it blocks, and nothing is wrong with the controller itself.
+    assert b.status() is Status.RUNNING
+    assert b.system.location("drive") == "executing"
+    b.executor.on_goal_ended(1, "cancelled")
+    assert b.executor.overdue_cancels == ()
     assert b.events[-1] == "drive.cancel"
+    return [entry["asked_s"] for entry in b.entries("cancel_overdue")]
+
+
+def test_a_goal_that_does_not_end_in_time_is_reported_once() -> None:
+    assert overdue_periods(0.35) == [pytest.approx(0.4)]
+    assert overdue_periods(5.05) == [pytest.approx(5.1)]
+    assert overdue_periods(0.0) == []
+    assert bench(ACTION).executor.settings.cancel_timeout_s == 5.0
+
+
+def test_the_time_for_a_cancel_begins_when_it_is_decided_and_not_on_acceptance() -> None:
+    b = driving(cancel_timeout_s=1.0)
+    b.receive("safe", False)
+    b.tick(6)
+    b.executor.on_goal_accepted(1)
+    assert b.middleware.sent[-1] == CANCEL
+    b.tick(5)
+    assert b.executor.overdue_cancels == ("drive",)
+
+
+def test_a_goal_that_is_cancelled_when_its_time_is_over_is_reported_if_it_does_not_end() -> None:
+    b = driving(action_timeout_s=1.0, cancel_timeout_s=2.0)
+    b.executor.on_goal_accepted(1)
+    b.tick(11)
+    assert [entry["why"] for entry in b.entries("cancelling")] == ["timeout"]
+    assert b.executor.cancelling == ("drive",)
+    b.tick(21)
+    assert b.executor.overdue_cancels == ("drive",)
+    # It is not requested again before it has ended.
+    b.receive("near", False)
+    assert b.system.enabled("drive.request")
+    assert b.tick(5) == []
+
+
+def test_a_goal_that_is_being_cancelled_still_takes_too_long() -> None:
+    b = driving(action_timeout_s=1.0)
+    b.executor.on_goal_accepted(1)
+    assert b.receive("safe", False) == [CANCEL]
+    assert b.tick(11) == []
+    assert b.events[2:] == ["drive.error", "drive.reset"]
+    assert b.executor.cancelling == ("drive",)
+    assert len(b.entries("cancelling")) == 1
 
 
 def test_each_requirement_cancels_by_itself_also_one_that_disables() -> None:
@@ -229,7 +341,7 @@ def test_each_requirement_cancels_by_itself_also_one_that_disables() -> None:
 def test_a_cancel_before_acceptance_is_sent_on_acceptance() -> None:
     b = driving()
     assert b.receive("safe", False) == []
-    assert b.events[-1] == "drive.cancel"
+    assert b.executor.cancelling == ("drive",)
     b.executor.on_goal_accepted(1)
     assert b.middleware.sent[-1] == CANCEL
     b.executor.on_goal_accepted(1)
@@ -261,10 +373,10 @@ def test_an_action_without_requirements_is_never_cancelled_by_the_executor() -> 
 
 
 def test_no_request_while_the_old_goal_may_still_run() -> None:
-    b = driving()
+    b = driving(action_timeout_s=1.0)
     b.executor.on_goal_accepted(1)
-    b.receive("safe", False)
-    b.receive("safe", True)
+    b.tick(11)
+    b.receive("near", False)
     assert b.system.enabled("drive.request")
     assert b.tick(5) == []
     b.executor.on_goal_ended(1, "cancelled")
@@ -272,13 +384,13 @@ def test_no_request_while_the_old_goal_may_still_run() -> None:
 
 
 def test_the_old_goal_is_over_when_its_server_is_lost() -> None:
-    b = driving()
-    b.receive("safe", False)
-    b.receive("safe", True)
+    b = driving(action_timeout_s=1.0)
+    b.tick(11)
+    b.receive("near", False)
     assert b.tick() == []
     b.executor.on_goal_ended(1, "lost")
     assert b.tick() == [("goal", "drive", 2, {"x": 1.5})]
-    assert b.events.count("drive.error") == 0
+    assert b.events.count("drive.error") == 1
 
 
 def test_a_refused_cancel_of_an_ended_goal_means_nothing() -> None:
@@ -299,17 +411,17 @@ def test_a_refused_cancel_of_a_running_goal_is_a_fault() -> None:
     assert "refused" in b.executor.reasons[0]
 
 
-def test_feedback_and_results_of_a_cancelled_goal_are_unexpected() -> None:
-    b = driving()
+def test_feedback_and_results_of_a_goal_that_took_too_long_are_unexpected() -> None:
+    b = driving(action_timeout_s=1.0)
     b.executor.on_goal_accepted(1)
-    b.receive("safe", False)
+    b.tick(11)
     b.executor.on_feedback(1, {"left": 2.0})
     b.executor.on_goal_ended(1, "succeeded", {"code": 1})
     assert b.executor.counters.unexpected == 2
     assert b.variable("Driver", "left") == 0.0
 
 
-def test_cancels_come_before_resets_and_resets_before_taus() -> None:
+def test_cancels_are_asked_for_before_resets_and_resets_come_before_taus() -> None:
     b = bench(
         """
         robot Order {
@@ -334,7 +446,10 @@ def test_cancels_come_before_resets_and_resets_before_taus() -> None:
     )
     assert [sent[1] for sent in b.tick(2)] == ["drive", "ask"]
     b.executor.on_reply(1, {})
-    assert b.events[2:] == ["ask.response", "drive.cancel", "ask.reset", "Early.tau_1"]
+    entries = [entry.get("event", entry["kind"]) for entry in b.log.entries]
+    assert entries[2:] == ["ask.response", "cancelling", "ask.reset", "Early.tau_1"]
+    b.executor.on_goal_ended(1, "cancelled")
+    assert b.events[-1] == "drive.cancel"
 
 
 def test_the_navigation_example() -> None:
@@ -399,7 +514,8 @@ def test_a_requirement_that_came_true_since_the_request_cancels_when_it_turns_ag
     assert b.receive("out") == [CANCEL]
 
 
-def test_a_cancel_that_the_supervisor_forbids_waits_until_it_does_not() -> None:
+@pytest.mark.parametrize(("is_near", "event"), [(False, "drive.error"), (True, "drive.cancel")])
+def test_a_cancel_is_asked_for_where_the_supervisor_forbids_its_event(is_near: bool, event: str) -> None:
     diagram = DecisionDiagram((DecisionNode("Sensor", "is_near", (0, 1), (0, 1)),), 2)
     text = ACTION.replace("requirement Sensor.is_near disables drive", "requirement Sensor.is_near disables other")
     text = text.replace("component Driver {", "component Driver { incoming message other with type: none")
@@ -407,9 +523,11 @@ def test_a_cancel_that_the_supervisor_forbids_waits_until_it_does_not() -> None:
     b = Bench(InterpretedSystem(supervisor), policy="priority", priority=("drive",))
     assert b.tick() == [GOAL]
     b.executor.on_goal_accepted(1)
-    assert b.receive("safe", False) == []
-    assert b.receive("out") == []
-    assert b.receive("near", True) == [CANCEL]
+    assert b.receive("safe", False) == [CANCEL]
+    assert not b.system.enabled("drive.cancel")
+    b.receive("near", is_near)
+    b.executor.on_goal_ended(1, "cancelled")
+    assert event in b.events
 
 
 def test_several_cancels_go_out_in_source_order() -> None:
@@ -435,10 +553,11 @@ def test_several_cancels_go_out_in_source_order() -> None:
     )
     assert [sent[1] for sent in b.tick(2)] == ["second", "first"]
     b.receive("alarm")
-    assert b.events[-2:] == ["first.cancel", "second.cancel"]
+    assert [entry["action"] for entry in b.entries("cancelling")] == ["first", "second"]
+    assert b.executor.cancelling == ("first", "second")
 
 
-def test_a_goal_that_anothers_timeout_has_cancelled_does_not_time_out_as_well() -> None:
+def test_a_goal_that_anothers_timeout_has_cancelled_takes_too_long_as_well() -> None:
     b = bench(
         """
         robot Two {
@@ -462,5 +581,7 @@ def test_a_goal_that_anothers_timeout_has_cancelled_does_not_time_out_as_well() 
     assert [sent[1] for sent in b.tick(2)] == ["lead", "follow"]
     b.clock.advance(5.0)
     b.executor.watch()
-    assert b.events[2:] == ["lead.error", "follow.cancel", "lead.reset"]
+    entries = [entry.get("event", entry["kind"]) for entry in b.log.entries[2:]]
+    assert entries == ["lead.error", "cancelling", "lead.reset", "cancelling", "follow.error", "follow.reset"]
+    assert [entry["why"] for entry in b.entries("cancelling")] == ["requirement 1 no longer holds", "timeout"]
     assert b.executor.counters.unexpected == 0

@@ -239,13 +239,17 @@ def test_time_is_over_before_a_result_that_comes_at_the_same_moment() -> None:
 def test_a_goal_that_turns_against_its_requirements_is_cancelled_and_aborted() -> None:
     b = driving()
     sent = b.receive("safe", False)
-    assert sent == [("cancel", "drive", 1), *end("aborted"), ("pass", "safe", False)]
-    assert b.events[-2:] == ["safe.response", "drive.cancel"]
-    b.receive("safe", True)
-    # Its server has not ended it yet.
+    assert sent == [("cancel", "drive", 1), ("pass", "safe", False)]
+    assert b.events[-1] == "safe.response"
+    assert b.executor.cancelling == ("drive",)
+    # Its server has not ended it yet: neither the model nor the caller may believe that.
     assert b.goal("drive", "h", GOAL) == REJECTED
     assert b.entries("blocked")[0]["why"] == "its last goal may still be under way"
-    assert b.end(1, "cancelled") == []
+    assert b.feedback(1, {"left": 0.5}) == [("feedback", "drive", "g", {"left": 0.5})]
+    assert b.end(1, "cancelled") == end("aborted")
+    assert b.events[-1] == "drive.cancel"
+    assert b.entries("event")[-1]["controllable"] is True
+    b.receive("safe", True)
     assert b.goal("drive", "h", GOAL) == [("goal", "drive", 2, GOAL), ("accept", "drive", "h")]
 
 
@@ -255,19 +259,38 @@ def test_an_action_without_requirements_is_never_cancelled_by_the_supervisor() -
     assert b.receive("safe", False) == [("pass", "safe", False)]
 
 
-@pytest.mark.parametrize("outcome", ["cancelled", "succeeded", "aborted"])
-def test_a_callers_cancel_is_forwarded_and_its_goal_ends_as_the_server_ends_it(outcome: str) -> None:
+@pytest.mark.parametrize(
+    ("outcome", "event"), [("cancelled", "cancel"), ("succeeded", "response"), ("aborted", "error")]
+)
+def test_a_callers_cancel_is_forwarded_and_its_goal_ends_as_the_server_ends_it(outcome: str, event: str) -> None:
     b = driving()
     assert b.cancel("drive", "g") == [("cancel", "drive", 1)]
-    assert b.state("Driver") == "home"
-    (entry,) = [item for item in b.entries("event") if item["event"] == "drive.cancel"]
-    assert entry["controllable"] is False
+    assert b.state("Driver") == "away"
+    assert [entry["why"] for entry in b.entries("cancelling")] == ["the caller"]
     assert b.cancel("drive", "g") == []
     assert b.feedback(1, {"left": 0.1}) == [("feedback", "drive", "g", {"left": 0.1})]
-    assert b.variable("Driver", "left") == 0.0
+    assert b.variable("Driver", "left") == 0.1
     assert b.end(1, outcome, RESULT) == end(outcome, RESULT)
-    assert "drive.error" not in b.events
-    assert b.variable("Driver", "code") == 99
+    (entry,) = b.entries("event")[2:3]
+    assert (entry["event"], entry["controllable"]) == (f"drive.{event}", False)
+    assert b.variable("Driver", "code") == (3 if outcome == "succeeded" else 99)
+
+
+def test_a_goal_that_succeeds_although_it_turned_against_its_requirements_has_succeeded_for_its_caller() -> None:
+    b = driving()
+    b.receive("safe", False)
+    assert b.end(1, "succeeded", RESULT) == end("succeeded", RESULT)
+    assert b.events[-2:] == ["drive.response", "drive.reset"]
+    assert b.variable("Driver", "code") == 3
+
+
+def test_a_caller_may_cancel_a_goal_that_is_being_cancelled() -> None:
+    b = driving()
+    b.receive("safe", False)
+    assert b.cancel("drive", "g") == []
+    assert b.end(1, "cancelled") == end("cancelled")
+    assert b.events[-1] == "drive.cancel"
+    assert b.entries("event")[-1]["controllable"] is True
 
 
 @pytest.mark.parametrize("outcome", ["rejected", "lost"])
@@ -292,7 +315,7 @@ def test_a_callers_cancel_before_the_acceptance_is_sent_on_acceptance() -> None:
 
 def test_a_callers_cancel_of_a_goal_that_has_ended_is_unexpected() -> None:
     b = driving()
-    b.receive("safe", False)
+    b.end(1, "succeeded", RESULT)
     assert b.cancel("drive", "g") + b.cancel("drive", "other") + b.cancel("wave", "g") == []
     assert b.executor.counters.unexpected == 3
 
@@ -305,10 +328,12 @@ def test_a_cancelled_goal_no_longer_turns_against_its_requirements() -> None:
     assert b.executor.counters.unexpected == 0
 
 
-def test_a_cancelled_goal_no_longer_takes_too_long() -> None:
+def test_a_cancelled_goal_that_takes_too_long_is_an_error_but_ends_for_its_caller_as_its_server_ends_it() -> None:
     b = driving(action_timeout_s=2.0)
     b.cancel("drive", "g")
     assert b.wait(3.0) == []
+    assert b.events[-2:] == ["drive.error", "drive.reset"]
+    assert b.end(1, "cancelled") == end("cancelled")
     assert b.executor.counters.unexpected == 0
 
 
@@ -364,6 +389,8 @@ def test_a_caller_may_cancel_while_the_robot_is_stopped() -> None:
     b.cancel("drive", "g")
     assert b.during(b.executor.on_goal_accepted, 1) == [("cancel", "drive", 1)]
     assert b.end(1, "cancelled") == end("cancelled")
+    # The cancel that its caller has asked for is an event of the model.
+    assert b.events[-1] == "drive.cancel"
 
 
 def test_goals_of_the_old_run_are_aborted_at_a_restart_but_must_end() -> None:

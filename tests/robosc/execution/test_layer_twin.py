@@ -15,13 +15,14 @@ from robosc.execution.runtime.protocol import Reading
 from robosc.execution.runtime.runner import Status
 from robosc.expressions import BooleanType, EnumType
 from robosc.expressions.evaluate import evaluate
-from robosc.model.structure import Communication, CommunicationKind
+from robosc.model.structure import Communication, CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
 from support.effort import examples
 from support.generated import load_system
 from support.layer_twin import LayerTwin, TwinCall, TwinGoal
 from support.layers import LayerBench
 from support.random_layers import random_layer
+from support.random_travels import random_travels
 
 STEPS = 60
 OUTCOMES = ("succeeded", "rejected", "aborted", "cancelled", "lost")
@@ -61,7 +62,8 @@ class Pair:
 
     def __init__(self, seed: int, load: Callable[[Supervisor], Any] = Watched) -> None:
         dice = self.dice = Random(seed)
-        supervisor = random_layer(dice)
+        is_travel = dice.random() < 0.3
+        supervisor = random_travels(dice.randrange(2**32), Deployment.LAYER) if is_travel else random_layer(dice)
         model = supervisor.model
         self.topics = [item for item in model.communications if item.kind is CommunicationKind.OUTGOING_MESSAGE]
         self.requested = [item for item in model.communications if item.kind is not CommunicationKind.OUTGOING_MESSAGE]
@@ -72,6 +74,7 @@ class Pair:
             "on_unknown": dice.choice(("default", "default", "keep", "fault")),
             "service_timeout_s": dice.choice((1.0, 2.0)),
             "action_timeout_s": dice.choice((1.5, 1000.0)),
+            "cancel_timeout_s": dice.choice((0.5, 1.0)),
             "command_timeout_s": dice.choice((0.0, 0.5, 1.0)),
             "max_age_s": {name: 3.0 for name in topics if dice.random() < 0.2},
         }
@@ -108,6 +111,8 @@ class Pair:
         ]
         assert bench.events == twin.events
         assert bench.executor.counters.unexpected == twin.unexpected
+        assert bench.executor.cancelling == twin.cancelling()
+        assert [entry["action"] for entry in bench.entries("cancel_overdue")] == twin.late
         assert bench.system.state() == twin.system.state()
         assert (bench.status() in (Status.STOPPED, Status.STOPPING)) is bool(twin.reasons)
         assert bench.executor.is_faulty is ("fault" in twin.reasons)
@@ -202,7 +207,7 @@ class Pair:
                 twin.feedback(waiting, data)
                 return "feedback", bench.feedback(waiting.number, data)
             case 1:
-                outcome = self.dice.choice(OUTCOMES)
+                outcome = self.dice.choice(OUTCOMES if waiting.asked is None else (*OUTCOMES, "cancelled", "cancelled"))
                 twin.end(waiting, outcome, data)
                 return "end", bench.end(waiting.number, outcome, data)
             case 2:
@@ -233,9 +238,13 @@ def total() -> Counter[str]:
         found.update(pair.done)
         found["requests taken"] += pair.system.requests
         found["releases"] += len(pair.bench.entries("release"))
-        found["own cancels"] += sum(
-            entry["event"].endswith(".cancel") and entry["controllable"] for entry in pair.bench.entries("event")
+        found["ends too late"] += len(pair.twin.late)
+        found["own cancels asked for"] += sum(
+            "requirement" in entry["why"] for entry in pair.bench.entries("cancelling")
         )
+        for entry in pair.bench.entries("event"):
+            if entry["event"].endswith(".cancel"):
+                found[f"{'own' if entry['controllable'] else 'caller'} cancels"] += 1
     return found
 
 
@@ -247,4 +256,5 @@ def test_the_random_worlds_show_everything(total: Counter[str]) -> None:
     for what in ("releases", "requests taken", "cancel", "restart", "stop"):
         assert total[what] > 50, what
     assert total["own cancels"] > 5
+    assert total["ends too late"] > 50
     assert total["endless"] < 150

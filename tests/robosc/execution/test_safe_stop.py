@@ -186,6 +186,45 @@ def test_the_goal_then_ends_as_an_error() -> None:
     b.executor.on_goal_ended(1, "cancelled")
     assert b.status() is Status.STOPPED
     assert b.events == ["go.request", "go.error", "go.reset"]
+    (entry,) = b.entries("cancelling")
+    assert (entry["action"], entry["why"]) == ("go", "stop")
+
+
+def test_a_cancel_of_a_requirement_that_turned_before_the_stop_is_still_an_event() -> None:
+    b = bench(
+        ROBOT.replace("provide spin", "requirement go needs !Sensor.seen provide spin"),
+        policy="priority",
+        priority=("go",),
+    )
+    b.tick()
+    b.executor.on_goal_accepted(1)
+    b.receive("/scan", True)
+    b.executor.stop("SIGINT")
+    b.executor.on_goal_ended(1, "cancelled")
+    assert b.events[-1] == "go.cancel"
+
+
+def test_a_requirement_that_turns_after_the_stop_makes_no_cancel_of_the_models() -> None:
+    b = bench(
+        ROBOT.replace("provide spin", "requirement go needs !Sensor.seen provide spin"),
+        policy="priority",
+        priority=("go",),
+    )
+    b.tick()
+    b.executor.on_goal_accepted(1)
+    b.executor.stop("SIGINT")
+    b.receive("/scan", True)
+    b.executor.on_goal_ended(1, "cancelled")
+    assert b.events[-2:] == ["go.error", "go.reset"]
+
+
+def test_a_goal_that_does_not_end_after_a_stop_is_reported() -> None:
+    b = going()
+    b.executor.on_goal_accepted(1)
+    b.executor.stop("SIGINT")
+    b.tick(60)
+    assert [entry["action"] for entry in b.entries("cancel_overdue")] == ["go"]
+    assert b.executor.overdue_cancels == ("go",)
 
 
 def test_a_goal_that_is_not_accepted_yet_is_cancelled_on_acceptance() -> None:

@@ -36,6 +36,7 @@ class Observation:
         locations: Location of each service and action.
         status: Activity of the executor, and True if it is faulty.
         counters: Counts of what was unknown, of what was unexpected, and of faults.
+        cancelling: Actions whose goal is being cancelled, and those of them that should have ended by now.
         progress: Progress of the strategy.
     """
 
@@ -46,6 +47,7 @@ class Observation:
     locations: Mapping[str, str] | None = None
     status: tuple[str, bool] | None = None
     counters: tuple[int, int, int] | None = None
+    cancelling: tuple[Sequence[str], Sequence[str]] | None = None
     progress: Mapping[str, Any] | None = None
 
 
@@ -98,7 +100,7 @@ def difference(target: str, number: int, what: str, expected: Observation, found
     ]
     if sight.has_log:
         pairs.append(("the event log", _visible(expected.log, sight), _visible(found.log, sight)))
-    for name in ("state", "locations", "enabled", "status", "counters", "progress"):
+    for name in ("state", "locations", "enabled", "status", "counters", "cancelling", "progress"):
         if getattr(found, name) is not None:
             pairs.append((name, getattr(expected, name), getattr(found, name)))
     for name, left, right in pairs:

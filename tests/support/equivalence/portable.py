@@ -210,6 +210,8 @@ class Driver:
             executor.on_feedback(ids.last(name), data)
         elif do == "end":
             executor.on_goal_ended(ids.end(name), how, data)
+        elif do == "refuse":
+            executor.on_cancel_refused(ids.last(name), how == "ended")
         elif do == "stop":
             executor.stop("test")
         elif do == "restart":
@@ -244,6 +246,7 @@ class Driver:
             "locations": {name: system.location(name) for name in servers},
             "status": (self.executor.status.value, self.executor.is_faulty),
             "counters": (counters.unknown, counters.unexpected, counters.faults),
+            "cancelling": (self.executor.cancelling, self.executor.overdue_cancels),
             "progress": progress_of(self.executor.progress),
         }
 

@@ -83,6 +83,7 @@ def observation(seen: Mapping[str, Any]) -> Observation:
         locations=seen["locations"],
         status=tuple(seen["status"]),
         counters=tuple(seen["counters"]),
+        cancelling=tuple(map(tuple, seen["cancelling"])),
         progress=seen["progress"],
     )
 

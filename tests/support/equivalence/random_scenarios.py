@@ -32,6 +32,7 @@ _TEXTS = ("", "a", "it's", '"""\n\\', "é")
 _NAN = math.nan
 _ASKS = {CommunicationKind.SERVICE: "ask_call", CommunicationKind.ACTION: "ask_goal"}
 _OUTCOMES = ("succeeded", "succeeded", "rejected", "aborted", "cancelled", "lost")
+_ENDS_OF_CANCELLED = ("cancelled", "cancelled", "cancelled", "succeeded", "aborted", "rejected", "lost")
 
 
 class Dice:
@@ -145,7 +146,8 @@ def random_settings(supervisor: Supervisor, dice: Random) -> dict[str, Any]:
         "on_unknown": dice.choice(("default", "default", "keep", "fault")),
         "release_identifiers": tuple(topic for topic in topics if dice.random() < 0.7),
         "service_timeout_s": dice.choice((0.25, 1.5, 10.0)),
-        "action_timeout_s": dice.choice((None, 0.5, 2.0)),
+        "action_timeout_s": dice.choice((None, None, 0.5, 2.0)),
+        "cancel_timeout_s": dice.choice((0.0, 0.25, 1.0)),
     }
 
 
@@ -204,7 +206,10 @@ def _replies(model: Model, target: PythonTarget, dice: Random, drawn: Dice, outc
             found.append(Action("reply", item.name, drawn.received(item.name, "response")))
             found.append(Action("fail", item.name))
         else:
-            how = dice.choice(outcomes)
+            is_cancelling = item.name in target.executor.cancelling
+            if is_cancelling and outcomes is _OUTCOMES:
+                found.append(Action("refuse", item.name, how=dice.choice(("ended", "ended", "running"))))
+            how = dice.choice(_ENDS_OF_CANCELLED if is_cancelling and outcomes is _OUTCOMES else outcomes)
             result = drawn.received(item.name, "response") if how == "succeeded" else None
             found.append(Action("end", item.name, result, how=how))
             found.append(Action("feedback", item.name, drawn.received(item.name, "feedback")))

@@ -20,11 +20,11 @@ class Action:
 
     Attributes:
         do: Kind: `tick`, `wait` (no period, only time), `message`, `reply`, `fail` (a call), `accept`, `feedback`,
-            `end` (a goal), `stop`, `restart`. Kinds for an existing controller before a supervision layer: `ask` (a
-            message), `ask_call`, `ask_goal`, `ask_cancel` (its last goal there).
+            `end` (a goal), `refuse` (a goal's cancel), `stop`, `restart`. Kinds for an existing controller before a
+            supervision layer: `ask` (a message), `ask_call`, `ask_goal`, `ask_cancel` (its last goal there).
         subject: The topic (`message`, `ask`), or the name of the service or action.
         data: Data that comes with it, as plain values: dicts of properties, lists, numbers, texts, booleans, None.
-        how: Outcome of `end`.
+        how: Outcome of `end`; `ended` or `running` of `refuse`.
         seconds: Duration of `wait`, in seconds.
     """
 

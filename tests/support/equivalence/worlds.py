@@ -121,11 +121,14 @@ def _maze_solver() -> Run:
 
 
 def _navigation() -> Run:
-    """Calibrates at the second try; drives, meets a person, fails three times, is asked to go on, and struggles."""
-    goals = calls = 0
+    """Calibrates at the second try; drives, meets a person, fails three times, is asked to go on, and struggles.
+
+    After a cancel it brakes for some periods, in which it still drives.
+    """
+    goals = calls = braking = 0
     since_goal: int | None = None
     issued = yield []
-    for step in range(80):
+    for step in range(90):
         coming = []
         if step == 1:
             coming.append(_message("/person/distance", 3.0))
@@ -139,11 +142,17 @@ def _navigation() -> Run:
                 since_goal = 0
                 coming.append(Action("accept", name))
             elif kind == "cancel":
-                since_goal = None
-                coming.append(Action("end", name, how="cancelled"))
-        if since_goal is not None:
+                since_goal, braking = None, 3
+        if braking:
+            braking -= 1
+            if braking:
+                progress = {"distance_remaining": 1.0, "number_of_recoveries": 4 if goals == 6 else 0}
+                coming.append(Action("feedback", "navigate", progress))
+            else:
+                coming.append(Action("end", "navigate", how="cancelled"))
+        elif since_goal is not None:
             since_goal += 1
-            recoveries = 4 if goals == 7 and since_goal == 3 else 0
+            recoveries = 4 if goals == 6 and since_goal == 3 else 0
             if since_goal == 6:
                 since_goal = None
                 if goals == 1:

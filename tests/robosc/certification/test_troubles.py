@@ -7,35 +7,20 @@ import pytest
 from robosc.certification import OutcomeStatus, SynthesisOutcome, make_supervisor
 from robosc.errors import Diagnostic, Severity
 from robosc.model.structure import Deployment
-from support.models import bundle_of
-
-STOPPING = """robot Stopping {
-    interface i use Fibonacci from p
-    component Stop {
-        outgoing message stop with type: boolean
-        behaviour { variable pressed: boolean on response from stop do pressed := value initial marked state known { } }
-    }
-    component Drive {
-        action travel with request: none, response: none, feedback: none links i
-        behaviour {
-            initial marked state idle { on request to travel goto driving }
-            state driving {
-                on response from travel goto idle
-                on error from travel goto idle
-                on cancel to travel goto braking
-            }
-            state braking { on response from travel goto idle on error from travel goto idle }
-        }
-    }
-    requirement travel needs !Stop.pressed
-}
-"""
-"""A driver that waits for a reply after a cancel, as if a cancel were only asked for."""
+from robosc.source import Location
+from support.models import STOPPING, bundle_of
 
 
 def found(outcome: SynthesisOutcome, code: str) -> Diagnostic:
     (item,) = (item for item in outcome.diagnostics if item.code == code)
+    assert item.location is not None
     return item
+
+
+def line_of(location: Location | None) -> str:
+    """Return the line of the model that a place is in."""
+    assert location is not None
+    return STOPPING.splitlines()[location.line - 1].strip()
 
 
 def obeyed(text: str, item: Diagnostic) -> str:
@@ -68,10 +53,8 @@ def test_a_cancel_that_must_be_possible_is_an_error_with_its_run_and_a_fix_that_
         "'travel' cannot be cancelled after travel.request, stop.response, though a requirement on it does not hold "
         "any more: after travel.cancel, Drive stays in braking: nothing leaves it"
     )
-    assert STOPPING.splitlines()[item.location.line - 1].strip() == "on cancel to travel goto braking"
-    assert [STOPPING.splitlines()[place.location.line - 1].strip() for place in item.related] == [
-        "requirement travel needs !Stop.pressed"
-    ]
+    assert line_of(item.location) == "on cancel to travel goto braking"
+    assert [line_of(place.location) for place in item.related] == ["requirement travel needs !Stop.pressed"]
     assert {item.code for item in outcome.diagnostics} == {"forbidden-cancel", "unprompted-request"}
     mended = make_supervisor(bundle_of(obeyed(STOPPING, item)))
     assert mended.supervisor is not None

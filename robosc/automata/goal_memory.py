@@ -9,6 +9,8 @@ from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
+from robosc.automata.compile import subjects_read
+from robosc.automata.state import Subject
 from robosc.automata.structure import Automaton, DiscreteVariable, System
 from robosc.expressions import FALSE, TRUE, Binary, BooleanType, Expression, StateTest, Unary, VariableRead, conjunction
 from robosc.model.structure import Assumption, Detour, EventKind, Goal, GoalForm, Mission
@@ -86,32 +88,40 @@ def holds(condition: Expression) -> Expression:
 
 @dataclass(frozen=True, slots=True)
 class Cancel:
-    """A cancel that the executor issues by itself.
+    """A cancel that the executor asks for by itself, where a requirement held since the request and does not any more.
+
+    Asking is no event. The goal may end as cancelled from then on: that is the cancel event, if the supervisor allows
+    it, and a move of the surroundings. What is remembered is exact in stable states. Where silent steps can change what
+    a requirement reads, it may have fallen before them and hold again: that is not remembered, but counted as possible.
 
     Attributes:
         event: The cancel event.
-        running: Condition that a goal of its action runs.
-        places: For each requirement of the action, the place that remembers that it held since the request.
-        conditions: The requirements.
+        held: For each requirement of the action, the place that remembers that it held since the request; of no
+            requirement once the cancel was asked for.
+        asked: Place that remembers that the cancel was asked for.
+        passing: For each requirement, True if silent steps can change what it reads.
     """
 
     event: str
-    running: Expression
-    places: tuple[Place, ...]
-    conditions: tuple[Expression, ...]
+    held: tuple[Place, ...]
+    asked: Place
+    passing: tuple[bool, ...]
 
     @property
-    def is_due(self) -> Expression:
-        """Condition that a requirement held and does not hold any more."""
-        fallen: Expression | None = None
-        for place, condition in zip(self.places, self.conditions, strict=True):
-            item = Binary("and", place.read, Unary("not", condition))
-            fallen = item if fallen is None else Binary("or", fallen, item)
-        return self.running if fallen is None else Binary("and", self.running, fallen)
+    def places(self) -> tuple[Place, ...]:
+        """Its places of the memory."""
+        return (*self.held, self.asked)
+
+    @property
+    def may_end(self) -> Expression:
+        """Condition over a stable state and the memory that the cancel may have been asked for."""
+        unseen = [place.read for place, passes in zip(self.held, self.passing, strict=True) if passes]
+        return _any((self.asked.read, *unseen))
 
 
 def own_cancels(executable: "ExecutableSystem") -> Iterator[Cancel]:
-    """Yield the cancels that the executor may issue, in its order."""
+    """Yield the cancels that the executor may ask for, in source order."""
+    changed = _changed_silently(executable)
     for event in executable.events.values():
         if event.kind is not EventKind.CANCEL or not event.moves or not event.communication:
             continue
@@ -120,16 +130,36 @@ def own_cancels(executable: "ExecutableSystem") -> Iterator[Cancel]:
             continue
         (location,) = event.moves.targets
         running = StateTest(event.moves.plant, location)
-        conditions = tuple(holds(item.condition) for item in requirements)
-        places = tuple(
-            _held(f"requirement {number} of {event.communication.name} was met", running, condition)
-            for number, condition in enumerate(conditions, start=1)
+        action = event.communication.name
+        conditions = [holds(item.condition) for item in requirements]
+        names = [f"requirement {number} of {action} was met" for number, _ in enumerate(conditions, start=1)]
+        pairs = list(zip(map(_remembered, names), conditions, strict=True))
+        fallen = _any(Binary("and", held, Unary("not", condition)) for held, condition in pairs)
+        name = f"the cancel of {action} was asked for"
+        is_asked = Binary("or", _remembered(name), fallen)
+        going_on = Binary("and", running, Unary("not", is_asked))
+        yield Cancel(
+            event.name,
+            tuple(
+                Place(place, Binary("and", going_on, Binary("or", held, condition)))
+                for place, (held, condition) in zip(names, pairs, strict=True)
+            ),
+            Place(name, Binary("and", running, is_asked)),
+            tuple(not changed.isdisjoint(subjects_read(condition)) for condition in conditions),
         )
-        yield Cancel(event.name, running, places, conditions)
 
 
-def _held(name: str, running: Expression, condition: Expression) -> Place:
-    return Place(name, Binary("and", running, Binary("or", VariableRead(MEMORY, name), condition)))
+def _changed_silently(executable: "ExecutableSystem") -> set[Subject]:
+    """Return what resets and taus can change."""
+    silent = set(executable.resets_and_taus)
+    found: set[Subject] = set()
+    for automaton in executable.executed_automata.automata:
+        for edge in automaton.edges:
+            if edge.event in silent:
+                found.update(Subject(automaton.name, update.variable) for update in edge.updates)
+                if edge.source != edge.target:
+                    found.add(Subject(automaton.name))
+    return found
 
 
 def remembering(system: System, places: Sequence[Place]) -> System:
@@ -372,7 +402,7 @@ class Obligations:
     Attributes:
         aims: Aims: the goals, then the visits of each mission, those of its detours behind its own.
         assumptions: Condition of each assumption, true again and again.
-        cancels: Own cancels of the executor, in its order.
+        cancels: Cancels that the executor asks for by itself, in source order.
         places: Places of the memory: of the cancels, of the assumptions, of the goals, of the missions.
         tours: Tours of the missions and their detours; of the places of each, at most one is true at a time.
         rounds: For each mission, the condition that it is asked for and every visit of its own is true.

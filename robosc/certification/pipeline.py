@@ -19,6 +19,7 @@ from robosc.certification.certify import certify
 from robosc.certification.goals import GoalExplanation, goal_explanation
 from robosc.certification.progress import Progress
 from robosc.certification.strategies import verify_strategy
+from robosc.certification.troubles import forbidden_cancel_findings, told_troubles, without_consequences
 from robosc.controller_properties import Controller, check_controller, controller_findings
 from robosc.errors import Diagnostic, InternalError, NodeLimitError, sorted_diagnostics
 from robosc.model.check import check
@@ -48,6 +49,9 @@ from robosc.verification import DEFAULT_STATES, CheckOutcome, Limits
 
 if TYPE_CHECKING:
     from robosc.explanation import EmptyExplanation
+
+CANCEL_REASON = "no supervisor is made, because it would have to forbid a cancel that must be possible"
+"""Reason why there is no supervisor where it forbids what its executor asks for."""
 
 LIVELOCK_REASON = "no supervisor is made, because silent steps never end (--allow-livelock overrides this)"
 
@@ -130,6 +134,7 @@ def make_supervisor(
     engine: str | EngineOptions = "auto",
     verify_limit: int = DEFAULT_STATES,
     allow_livelock: bool = False,
+    only_shown: bool = False,
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[Progress], None] = lambda progress: None,
 ) -> SynthesisOutcome:
@@ -141,6 +146,8 @@ def make_supervisor(
         engine: Name of the engine for decision diagrams, or its options.
         verify_limit: States up to which the result is verified one by one; see `Limits.of`.
         allow_livelock: True if a supervisor is made even if silent steps of its executor never end.
+        only_shown: True if the supervisor is not to be executed: then one is made even if it forbids a cancel that must
+            be possible.
         should_stop: Function called again and again; once it returns true, the work ends.
         on_progress: Function called with the progress of the work.
 
@@ -189,7 +196,7 @@ def make_supervisor(
         should_stop=should_stop,
         on_progress=lambda message: on_progress(Progress("verification", message)),
     )
-    on_progress(Progress("controller", "finite response, confluence, nonblocking under control"))
+    on_progress(Progress("controller", "finite response, confluence, nonblocking under control, cancels"))
     controller = Controller(problem.system, result.added, semantics)
     properties = check_controller(
         problem.system,
@@ -199,15 +206,23 @@ def make_supervisor(
         controller=controller,
         should_stop=should_stop,
     )
+    words = explanations.ModelWords(model, places, system, deployment)
+    told = told_troubles(words, result.answers, engine=engine, should_stop=should_stop)
+    answers = without_consequences(model, result.answers, {item.event for item in properties.forbidden})
     diagnostics = sorted_diagnostics(
         (
             *problem.diagnostics,
-            *findings(model, places, result.answers),
+            *findings(model, places, answers, told),
             *controller_findings(model, system, places, properties, allow_livelock=allow_livelock),
+            *forbidden_cancel_findings(
+                words, properties, engine=engine, only_shown=only_shown, should_stop=should_stop
+            ),
         )
     )
     if properties.livelock is not None and not allow_livelock:
         return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, LIVELOCK_REASON)
+    if properties.forbidden and not only_shown:
+        return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, CANCEL_REASON)
     certificate = msgspec.structs.replace(certificate, controller=properties.certified())
     strategy = None
     if model.has_goals and deployment is Deployment.CONTROLLER:

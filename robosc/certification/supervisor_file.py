@@ -281,7 +281,7 @@ def _false_properties(stated: ControllerProperties, found: ControllerProperties)
     """Return the false claims of a certificate about the controller."""
     return [
         f"it says '{name.replace('_', ' ')} of the controller: passed', which is false"
-        for name in ("finite_response", "confluence", "nonblocking")
+        for name in ("finite_response", "confluence", "nonblocking", "cancels")
         if getattr(stated, name) == "passed" and getattr(found, name) == "failed"
     ]
 

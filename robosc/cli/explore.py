@@ -53,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
         return automata.explore(arguments)
     bundle = read_bundle(arguments)
     # The graph is of everything allowed, whatever an executor would choose.
-    outcome = synth.make(arguments, bundle, allow_livelock=True)
+    outcome = synth.make(arguments, bundle, allow_livelock=True, only_shown=True)
     if outcome.supervisor is None:
         if arguments.json:
             print_json(

@@ -70,7 +70,7 @@ def run(arguments: argparse.Namespace) -> int:
     model = check(bundle).model
     if model is not None and read_properties(arguments, model) is None:
         return ExitCode.USAGE
-    outcome = synth.make(arguments, bundle, allow_livelock=True)
+    outcome = synth.make(arguments, bundle, allow_livelock=True, only_shown=True)
     if outcome.supervisor is None:
         if arguments.json:
             print_json(

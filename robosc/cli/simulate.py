@@ -203,7 +203,7 @@ def counter_run(arguments: argparse.Namespace) -> "CounterRun | None":
 
     bundle = read_bundle(arguments)
     given = argparse.Namespace(**{**vars(arguments), "deployment": str(Deployment.CONTROLLER)})
-    outcome = synth.make(given, bundle, allow_livelock=True)
+    outcome = synth.make(given, bundle, allow_livelock=True, only_shown=True)
     if isinstance(outcome.explanation, GoalExplanation):
         try:
             return CounterRun(outcome.explanation)

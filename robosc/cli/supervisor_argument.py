@@ -34,7 +34,10 @@ def supervisor_of_arguments(arguments: argparse.Namespace, *, is_json: bool = Fa
     deployment = arguments.deployment or str(Deployment.CONTROLLER)
     # The log is of a run that has happened, however it would have gone on.
     outcome = synth.make(
-        argparse.Namespace(**{**vars(arguments), "deployment": deployment}), bundle, allow_livelock=True
+        argparse.Namespace(**{**vars(arguments), "deployment": deployment}),
+        bundle,
+        allow_livelock=True,
+        only_shown=True,
     )
     if outcome.supervisor is None:
         if is_json:

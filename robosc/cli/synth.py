@@ -121,7 +121,12 @@ def refuse_modular(arguments: argparse.Namespace) -> None:
 
 
 def make(
-    arguments: argparse.Namespace, bundle: Bundle, *, allow_livelock: bool, verify_limit: int = SYNTHESIS_STATES
+    arguments: argparse.Namespace,
+    bundle: Bundle,
+    *,
+    allow_livelock: bool,
+    only_shown: bool = False,
+    verify_limit: int = SYNTHESIS_STATES,
 ) -> "SynthesisOutcome":
     """Synthesize as the arguments say, with a progress line on a terminal."""
     from robosc.certification import make_supervisor
@@ -134,6 +139,7 @@ def make(
             engine=engine_options(arguments),
             verify_limit=verify_limit,
             allow_livelock=allow_livelock,
+            only_shown=only_shown,
             on_progress=lambda step: progress.show(f"{step.stage}: {step.message}"),
         )
     finally:

@@ -116,6 +116,8 @@ def summary_text(supervisor: Supervisor) -> str:
         lines.append(f"    {'finite response':<21} {found.finite_response}")
         lines.append(f"    {'confluence':<21} {found.confluence}")
         lines.append(f"    {'nonblocking':<21} {found.nonblocking}")
+        if found.cancels is not None:
+            lines.append(f"    {'cancels possible':<21} {found.cancels}")
         lines.append(f"    {'method':<21} {found.method}")
     lines.append("  certificate")
     checks = _checks(certificate)

@@ -8,7 +8,7 @@ from robosc.controller_properties.confluence import ConfluenceSearch
 from robosc.controller_properties.controller import Controller
 from robosc.controller_properties.outcome import Properties
 from robosc.controller_properties.search import search
-from robosc.controller_properties.silent_steps import always_end, never_conflict, stays_nonblocking
+from robosc.controller_properties.silent_steps import always_end, never_conflict, never_forbids, stays_nonblocking
 from robosc.supervisor import AddedCondition, PropertyResult
 
 DEFAULT_LIMIT = 10_000
@@ -28,9 +28,10 @@ def check_controller(
     controller: Controller | None = None,
     should_stop: Callable[[], bool] = lambda: False,
 ) -> Properties:
-    """Check finite response, confluence and nonblocking under control of a supervisor; deterministic.
+    """Check the properties of a controller that synthesis does not guarantee; deterministic.
 
-    A property is 'passed' only if it is proved, and 'failed' only if a trace shows it.
+    They are finite response, confluence, nonblocking under control, and that every cancel is possible that the executor
+    asks for. A property is 'passed' only if it is proved, and 'failed' only if a trace shows it.
 
     Args:
         system: Executable system of the robot.
@@ -52,18 +53,25 @@ def check_controller(
     # Not without an end of silent steps: what comes after them would not.
     is_live = ends and is_nonblocking and stays_nonblocking(system.model, controller, conditions)
     proved = (ends, is_confluent, is_live)
-    if all(proved):
-        return Properties("passed", "passed", "passed", "by the structure of silent steps")
-    if ends and is_confluent and states > HOPELESS * limit:
+    allows = never_forbids(controller, conditions)
+    cancels: PropertyResult | None = "passed" if controller.goals else None
+    if all(proved) and allows:
+        return Properties("passed", "passed", "passed", "by the structure of silent steps", cancels=cancels)
+    if ends and is_confluent and allows and states > HOPELESS * limit:
         how = f"not searched: more than {HOPELESS * limit} states in the controlled system"
-        return Properties("passed", "passed", "not checked", _method(proved, how))
+        return Properties("passed", "passed", "not checked", _method(proved, how), cancels=cancels)
     try:
         orders = None if is_confluent else ConfluenceSearch(controller, limit)
         found = search(controller, limit=limit, confluence=orders, should_stop=should_stop)
     except TooManyChoicesError as error:
-        outcomes = (_outcome(item, False, False) for item in proved)
-        finite_response, confluence, nonblocking = outcomes
-        return Properties(finite_response, confluence, nonblocking, _method(proved, f"not searched: {error}"))
+        finite_response, confluence, nonblocking = (_outcome(item, False, False) for item in proved)
+        return Properties(
+            finite_response,
+            confluence,
+            nonblocking,
+            _method(proved, f"not searched: {error}"),
+            cancels=cancels and _outcome(allows, False, False),
+        )
     how = f"search of every stable state ({found.states})"
     if not found.is_complete:
         how = f"search given up after {found.states} stable states"
@@ -79,6 +87,8 @@ def check_controller(
         livelock=found.livelock,
         conflict=found.conflict,
         blocking=found.blocking,
+        cancels=cancels and _outcome(allows, bool(found.forbidden), found.is_complete),
+        forbidden=tuple(found.forbidden.values()),
     )
 
 

@@ -1,20 +1,19 @@
 """Confluence: whether the order of silent steps matters.
 
-All orders are followed, not only the executor's. They agree if they have one outcome: the same stable state, or no end
-at all. Newman's lemma says that it is enough to compare single steps, but only if every order ends (M. H. A. Newman,
-"On theories with a combinatorial definition of 'equivalence'", Annals of Mathematics 43(2), 1942, pp. 223-243). So
-outcomes are compared here, and the lemma is used only if `robosc.controller_properties.silent_steps` has proved that
-every order ends.
+All orders are followed, not only the executor's. They agree if they have one outcome: the same stable state, with the
+same cancels asked for on the way, or no end at all. Newman's lemma says that it is enough to compare single steps, but
+only if every order ends (M. H. A. Newman, "On theories with a combinatorial definition of 'equivalence'", Annals of
+Mathematics 43(2), 1942, pp. 223-243). So outcomes are compared here, and the lemma is used only if
+`robosc.controller_properties.silent_steps` has proved that every order ends.
 """
 
 from collections.abc import Callable
 
-from robosc.automata.compile import State
 from robosc.controller_properties.controller import Controller, Node
 from robosc.controller_properties.outcome import Conflict, Order
 
-_Outcome = State | None
-"""The stable state in which silent steps end, or None if they do not end."""
+_Outcome = Node | None
+"""The stable state in which silent steps end, with the executor's memory, or None if they do not end."""
 
 _Step = tuple[str, Node]
 
@@ -52,9 +51,21 @@ class ConfluenceSearch:
         if len(outcomes) == 1:
             self._only.update(dict.fromkeys(steps, outcomes.pop()))
             return None
+        chosen, end = self._chosen(start)
+        return Conflict(trace(), chosen, self._other_order(start, steps, end))
+
+    def _chosen(self, start: Node) -> tuple[Order, _Outcome]:
+        """The executor's order, and its outcome."""
         run = self._controller.run(start)
-        chosen = Order(run.events, run.cycle, None if run.end is None else run.end[0])
-        return Conflict(trace(), chosen, self._other_order(start, steps, chosen.end))
+        if run.end is None:
+            return Order(run.events, run.cycle, None), None
+        end = start
+        for _ in run.events:
+            _, end = next(self._controller.silent_steps(end))
+        return self._ended(run.events, end), end
+
+    def _ended(self, events: tuple[str, ...], end: Node) -> Order:
+        return Order(events, (), end[0], tuple(goal.action for goal in self._controller.asked(end)))
 
     def _explore(self, start: Node) -> tuple[dict[Node, list[_Step]], set[_Outcome]]:
         """The states that silent steps reach in any order, with their steps, and every outcome, within the limit."""
@@ -72,7 +83,7 @@ class ConfluenceSearch:
                 steps[node] = list(self._controller.silent_steps(node))
                 open_.add(node)
                 if not steps[node]:
-                    outcomes.add(node[0])
+                    outcomes.add(node)
             if place == len(steps[node]):
                 open_.discard(node)
                 continue
@@ -92,8 +103,8 @@ class ConfluenceSearch:
         queue = [start]
         for node in queue:
             following = steps[node] if node in steps else list(self._controller.silent_steps(node))
-            if not following and node[0] != unwanted:
-                return Order(_events_to(parents, node), (), node[0])
+            if not following and node != unwanted:
+                return self._ended(_events_to(parents, node), node)
             for event, target in following:
                 if target not in parents:
                     parents[target] = (node, event)

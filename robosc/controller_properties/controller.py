@@ -1,9 +1,14 @@
 """The controller automaton: what a supervisor and its executor do together, state by state.
 
 A state consists of a state of the system and the executor's memory of running goals: which requirements of an action
-held in some stable state since its request. The state is *stable* if no silent step is enabled. Silent steps
-pre-empt everything else, in the executor's order: own cancels, resets, taus. In a stable state the environment
-may send a message or answer, and any enabled request may be issued.
+held in some stable state since its request, and whether the executor has asked for its cancel. The state is *stable* if
+no silent step is enabled. Silent steps pre-empt everything else, in the executor's order: resets, taus. In a stable
+state the environment may send a message or answer, and any enabled request may be issued.
+
+- The executor asks for a cancel where one of the requirements that held does not hold any more, before each silent step
+  and after the last one; once for each goal. Asking is no event. From then on the goal may end as cancelled, in any
+  stable state: that is the event `cancel` if the supervisor allows it there, else `error`. The goal may as well end
+  otherwise, or never. In a layer `cancel` is uncontrollable, a caller may ask at any time, and nothing is remembered.
 
 - One step of the environment is one middleware message, a *batch*: the events that stand for it, in source
   order, with no silent step between them. Under the setting `on_unknown: keep` an event whose enum is unknown does
@@ -11,8 +16,9 @@ may send a message or answer, and any enabled request may be issued.
 - Received data takes every value that matters. Events of one message carry data that the same fields can produce
   (`robosc.controller_properties.messages`). Code-only variables do not matter: no condition on events reads one.
   They only determine what is sent; a request whose data is unknown counts as possible.
-- The controller automaton omits that an action cannot be requested again before its cancelled goal has ended.
-  The end can become known in any state and changes nothing else, so the same states are reached.
+- The controller automaton omits that an action cannot be requested again before a goal has ended that is lost to the
+  model, as after a timeout. The end can become known in any state and changes nothing else, so the same states are
+  reached.
 - If two transitions on one event apply, the executor prefers the state's own to the behaviour's, and then the first
   one in source order.
 """
@@ -26,12 +32,15 @@ from robosc.automata.compile import NO_DATA, Function, State, compile_expression
 from robosc.automata.semantics import Semantics
 from robosc.automata.state import Subject, subjects
 from robosc.controller_properties.messages import Choice, choices_together
-from robosc.model.structure import EventKind
+from robosc.model.structure import Deployment, EventKind
 from robosc.supervisor import AddedCondition
 from robosc.supervisor.predicates import state_predicates
 
 Held = tuple[int, ...]
-"""Bits for each action with requirements: one for each requirement that held in a stable state since its request."""
+"""Bits for each action with requirements: one for each requirement that held in a stable state since its request.
+
+Once the executor has asked for the cancel of a goal, the bit after these stands alone: nothing else matters any more.
+"""
 
 Node = tuple[State, Held]
 """A state of the controller automaton."""
@@ -45,6 +54,7 @@ class Goal:
     """An action with requirements, whose goal the executor watches.
 
     Attributes:
+        action: Its name.
         index: Its place in `Held`.
         cancel: Its cancel event.
         place: Place of its plant's location in a state.
@@ -53,6 +63,7 @@ class Goal:
         reads: Subjects that they read.
     """
 
+    action: str
     index: int
     cancel: str
     place: int
@@ -60,9 +71,26 @@ class Goal:
     requirements: tuple[Function, ...]
     reads: frozenset[Subject]
 
+    @property
+    def asked(self) -> int:
+        """The bit that stands alone once the executor has asked for the cancel."""
+        return 1 << len(self.requirements)
+
     def holding(self, state: State) -> int:
         """Bits of the requirements that hold."""
         return sum(1 << bit for bit, holds in enumerate(self.requirements) if holds(state, NO_DATA) is True)
+
+    def judged(self, state: State, mask: int) -> int:
+        """Return the bits in a state, before any silent step: is the cancel asked for?"""
+        if not mask or state[self.place] != self.running:
+            return 0
+        return self.asked if mask & self.asked or mask & ~self.holding(state) else mask
+
+    def observed(self, state: State, mask: int) -> int:
+        """Return the bits after a stable state."""
+        if state[self.place] != self.running or mask & self.asked:
+            return self.judged(state, mask)
+        return mask | self.holding(state)
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +144,9 @@ class Controller:
         model = executable.model
         self._added = state_predicates(self.system, added)
         places = {subject: place for place, subject in enumerate(subjects(self.system))}
-        self.goals = tuple(_goals(executable, places))
+        # In a layer a cancel is one of the environment's own steps.
+        watches = executable.deployment is Deployment.CONTROLLER
+        self.goals = tuple(_goals(executable, places)) if watches else ()
         self.width = len(places)
         self._start: Node = (self._semantics.initial, (0,) * len(self.goals))
         moving = {edge.event for item in self.system.automata for edge in item.edges if edge.source != edge.target}
@@ -172,17 +202,11 @@ class Controller:
     def silent_steps(self, node: Node) -> Iterator[tuple[str, Node]]:
         """Every silent step that is enabled, with its target state; the executor's choice comes first."""
         state, held = node
-        for goal in self.goals:
-            mask = held[goal.index]
-            if mask and mask & ~goal.holding(state):
-                target = self.after(state, goal.cancel)
-                if target is not None:
-                    yield goal.cancel, (target, self.forgotten(target, held))
         for event in self.silent:
             target = self.after(state, event)
             # A tau that would change nothing is not taken.
             if target is not None and target != state:
-                yield event, (target, held)
+                yield event, (target, self.judged(target, held))
 
     def run(self, node: Node) -> SilentRun:
         """The silent steps that the executor takes from a state."""
@@ -216,16 +240,29 @@ class Controller:
         state, held = node
         if not held:
             return node
-        looked = tuple(
-            mask | goal.holding(state) if state[goal.place] == goal.running else 0
-            for goal, mask in zip(self.goals, held, strict=True)
+        return state, tuple(goal.observed(state, mask) for goal, mask in zip(self.goals, held, strict=True))
+
+    def asked(self, node: Node) -> tuple[Goal, ...]:
+        """Return the goals whose cancel the executor has asked for."""
+        return tuple(goal for goal, mask in zip(self.goals, node[1], strict=True) if mask & goal.asked)
+
+    def forbidden(self, node: Node) -> tuple[Goal, ...]:
+        """Return the goals whose cancel is asked for and forbidden in a stable state.
+
+        Where every requirement holds again, there is nothing to cancel for: a goal that ends as cancelled has failed.
+        """
+        state = node[0]
+        return tuple(
+            goal
+            for goal in self.asked(node)
+            if goal.holding(state) != goal.asked - 1 and self.after(state, goal.cancel) is None
         )
-        return state, looked
 
     def moves(self, node: Node) -> tuple[Move, ...]:
         """Return the moves that can change a stable state: first requests, then the environment's, in source order.
 
-        A state comes once for each request and once for each batch, as a whole batch if possible.
+        A state comes once for each request and once for each batch, as a whole batch if possible. Goals that end as
+        cancelled come last.
         """
         found = self._moves.get(node)
         if found is None:
@@ -237,12 +274,16 @@ class Controller:
         for event in self.requests:
             target = self.after(state, event)
             if target is not None and target != state:
-                yield (event,), True, (target, self.forgotten(target, held))
+                yield (event,), True, (target, self.judged(target, held))
         for batch in self.batches:
             for target, (events, is_whole) in sorted(
                 self._joint_targets(state, batch).items(), key=lambda item: item[0]
             ):
-                yield events, is_whole, (target, self.forgotten(target, held))
+                yield events, is_whole, (target, self.judged(target, held))
+        for goal in self.asked(node):
+            target = self.after(state, goal.cancel)
+            if target is not None:
+                yield (goal.cancel,), True, (target, self.judged(target, held))
 
     def _joint_targets(self, state: State, batch: tuple[str, ...]) -> dict[State, tuple[tuple[str, ...], bool]]:
         """Return the states that events of a batch lead to, with these events, and True if they are the whole batch."""
@@ -297,13 +338,11 @@ class Controller:
         found.pop(state, None)
         return found
 
-    def forgotten(self, state: State, held: Held) -> Held:
-        """Return the remembered bits, without those of goals that do not run."""
+    def judged(self, state: State, held: Held) -> Held:
+        """Return the remembered bits in a state that an event led to: what is over is forgotten, what is due asked."""
         if not any(held):
             return held
-        return tuple(
-            mask if state[goal.place] == goal.running else 0 for goal, mask in zip(self.goals, held, strict=True)
-        )
+        return tuple(goal.judged(state, mask) for goal, mask in zip(self.goals, held, strict=True))
 
 
 def _sources(system: System, event: str, places: dict[Subject, int]) -> Iterator[tuple[int, frozenset[str]]]:
@@ -323,6 +362,7 @@ def _goals(executable: ExecutableSystem, places: dict[Subject, int]) -> Iterator
             if requirements:
                 (running,) = event.moves.targets
                 yield Goal(
+                    action=event.communication.name,
                     index=index,
                     cancel=event.name,
                     place=places[Subject(event.moves.plant)],

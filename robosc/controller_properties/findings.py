@@ -84,6 +84,9 @@ def _order_words(model: Model, system: System, order: Order, beside: Order) -> s
         return f"{listed} never ends"
     if beside.end is None:
         return f"{listed} ends"
+    if order.end == beside.end:
+        cancels = ", ".join(order.asked)
+        return f"{listed} asks for {f'the cancel of {cancels}' if cancels else 'no cancel'}"
     return f"{listed} ends with {_difference(model, system, order.end, beside.end)}"
 
 

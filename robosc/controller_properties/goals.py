@@ -330,7 +330,7 @@ class _Search:
                 self.lost = MissedGoal(None, self._trace(number), state)
                 return False
             # Bits that are held for goals of other actions stay.
-            held = held if target == state else self._controller.forgotten(target, held)
+            held = held if target == state else self._controller.judged(target, held)
             turn = self._arrived((target, held), memory, after, number, (event,))
         if turn is None:
             return False

@@ -32,11 +32,13 @@ class Order:
         events: The steps; if the order does not end, the steps before its cycle.
         cycle: The steps that repeat for ever; empty if the order ends.
         end: The stable state at the end, or None if the order does not end.
+        asked: Actions whose cancel the executor has asked for at the end.
     """
 
     events: tuple[str, ...]
     cycle: tuple[str, ...]
     end: State | None
+    asked: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -68,6 +70,25 @@ class Blocking:
 
 
 @dataclass(frozen=True, slots=True)
+class ForbiddenCancel:
+    """A cancel that the executor has asked for and that the supervisor forbids.
+
+    Attributes:
+        trace: The events that lead there.
+        action: The action.
+        event: Its cancel event.
+        state: The state there.
+        fallen: Numbers of the action's requirements, from 0, that do not hold there.
+    """
+
+    trace: tuple[str, ...]
+    action: str
+    event: str
+    state: State
+    fallen: tuple[int, ...]
+
+
+@dataclass(frozen=True, slots=True)
 class Properties:
     """The properties of a controller.
 
@@ -79,6 +100,9 @@ class Properties:
         livelock: Reason why there is no finite response, or None.
         conflict: Reason why there is no confluence, or None.
         blocking: Reason why it is not nonblocking under control, or None.
+        cancels: Result of checking that the supervisor allows every cancel that the executor asks for; None if it asks
+            for none.
+        forbidden: For each action whose cancel is forbidden somewhere, where that is so.
     """
 
     finite_response: PropertyResult
@@ -88,7 +112,9 @@ class Properties:
     livelock: Livelock | None = None
     conflict: Conflict | None = None
     blocking: Blocking | None = None
+    cancels: PropertyResult | None = None
+    forbidden: tuple[ForbiddenCancel, ...] = ()
 
     def certified(self) -> ControllerProperties:
         """Return the properties that stand in a certificate."""
-        return ControllerProperties(self.finite_response, self.confluence, self.nonblocking, self.method)
+        return ControllerProperties(self.finite_response, self.confluence, self.nonblocking, self.method, self.cancels)

@@ -11,7 +11,7 @@ from heapq import heappop, heappush
 
 from robosc.controller_properties.confluence import ConfluenceSearch
 from robosc.controller_properties.controller import Controller, Node
-from robosc.controller_properties.outcome import Blocking, Conflict, Livelock
+from robosc.controller_properties.outcome import Blocking, Conflict, ForbiddenCancel, Livelock
 from robosc.errors import SynthesisCancelled
 
 STOP_INTERVAL = 64
@@ -32,6 +32,7 @@ class Searched:
         conflict: Silent steps whose order matters, or None.
         blocking: The nearest state, or cycle of silent steps, from which no marked state is reachable; None if there is
             none, or if the search is not complete.
+        forbidden: For each action, by the name of its cancel, the nearest state in which it is asked for and forbidden.
     """
 
     states: int = 0
@@ -39,6 +40,7 @@ class Searched:
     livelock: Livelock | None = None
     conflict: Conflict | None = None
     blocking: Blocking | None = None
+    forbidden: dict[str, ForbiddenCancel] = field(default_factory=dict)
 
 
 @dataclass(slots=True)
@@ -149,6 +151,13 @@ def search(
         if len(visited) % STOP_INTERVAL == 0 and should_stop():
             raise SynthesisCancelled("the search of the controller was stopped")
         visited.add(number)
+        for goal in controller.forbidden(graph.nodes[number]):
+            if goal.cancel not in found.forbidden:
+                state = graph.nodes[number][0]
+                fallen = tuple(bit for bit in range(len(goal.requirements)) if not goal.holding(state) >> bit & 1)
+                found.forbidden[goal.cancel] = ForbiddenCancel(
+                    graph.trace(number), goal.action, goal.cancel, state, fallen
+                )
         for events, is_sure, node in controller.moves(graph.nodes[number]):
             moves += 1
             enter(number, events, is_sure, node)

@@ -4,8 +4,10 @@ Each function returns True only if it proves its property; False means unknown. 
 model:
 
 - A tau changes the location of its own component and nothing else.
-- After a reset or an own cancel, only a request can move the service or action again, so each reset or cancel happens
-  at most once in a run of silent steps.
+- After a reset, only a request can move the service or action again, so each reset happens at most once in a run of
+  silent steps.
+- Which cancels the executor asks for depends on the states that silent steps pass, so on their order only where two
+  steps change what the requirements of one action read.
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
@@ -19,7 +21,7 @@ from robosc.automata.structure import Automaton, Edge, System
 from robosc.controller_properties.controller import Controller
 from robosc.controller_properties.graphs import components
 from robosc.errors import SynthesisCancelled
-from robosc.expressions import Value
+from robosc.expressions import Constant, IntegerType, Value
 from robosc.model.structure import CommunicationKind, EventKind, Model, is_tau
 from robosc.supervisor import AddedCondition
 
@@ -148,7 +150,7 @@ class _Step:
         event: Its event.
         reads: A bit for each place of a state that decides whether the step is enabled and where it leads.
         writes: A bit for each place that it may change.
-        home: The automaton of a tau; None for resets and cancels.
+        home: The automaton of a tau; None for resets.
         sources: The locations in which a tau stands.
     """
 
@@ -177,7 +179,6 @@ def never_conflict(
     system = controller.system
     diagrams = {item.event: item.condition for item in added}
     places = {subject: place for place, subject in enumerate(subjects(system))}
-    watched = {goal.cancel: goal for goal in controller.goals}
     alphabets: dict[str, list[Automaton]] = {}
     for automaton in system.automata:
         for event in automaton.alphabet:
@@ -199,25 +200,23 @@ def never_conflict(
             reads.update(Subject(node.automaton, node.variable) for node in diagrams[event].nodes)
         writes = {Subject(name) for name, edge in edges if edge.source != edge.target}
         writes.update(Subject(name, update.variable) for name, edge in edges for update in edge.updates)
-        mask = bits(reads)
-        if event in watched:
-            mask |= bits(watched[event].reads)
         home = automata[0].name if is_tau(event) and automata else None
-        return _Step(event, mask, bits(writes), home, frozenset(edge.source for _, edge in edges))
+        return _Step(event, bits(reads), bits(writes), home, frozenset(edge.source for _, edge in edges))
 
-    steps = [step(event) for event in (*watched, *controller.silent)]
+    steps = [step(event) for event in controller.silent]
+    required = [bits(goal.reads) for goal in controller.goals]
     domains = [subject_domain(system, subject) for subject in places]
     budget = MAXIMUM_VALUATIONS
     for number, first in enumerate(steps):
         if should_stop():
             raise SynthesisCancelled("the check of the controller was stopped")
         for second in steps[:number]:
-            if not (first.writes & (second.reads | second.writes) or second.writes & first.reads):
-                continue
             if first.home is not None and first.home == second.home and not first.sources & second.sources:
                 continue
-            if first.event in watched or second.event in watched:
+            if any(first.writes & read and second.writes & read for read in required):
                 return False
+            if not (first.writes & (second.reads | second.writes) or second.writes & first.reads):
+                continue
             read = [place for place in range(len(domains)) if (first.reads | second.reads) >> place & 1]
             budget -= prod(len(domains[place]) for place in read)
             if budget < 0 or not _commute(controller, first.event, second.event, read, domains):
@@ -251,6 +250,32 @@ def _taken(controller: Controller, state: State, event: str) -> State | None:
     """Return the target of a reset or tau, or None if it is not taken; a tau that would change nothing is not taken."""
     target = controller.after(state, event)
     return None if target == state else target
+
+
+def never_forbids(controller: Controller, added: Iterable[AddedCondition]) -> bool:
+    """Return True if the supervisor allows every cancel of its executor wherever a requirement does not hold.
+
+    This holds if synthesis adds no condition to the cancels, and none of them can take a variable out of its range.
+    """
+    restricted = {item.event for item in added}
+    return not any(
+        goal.cancel in restricted or _may_leave_range(controller.system, goal.cancel) for goal in controller.goals
+    )
+
+
+def _may_leave_range(system: System, event: str) -> bool:
+    """Return True unless it is plain that an event keeps every variable in its range."""
+    for automaton in system.automata:
+        types = {item.name: item.type for item in automaton.variables}
+        for edge in automaton.edges:
+            for update in edge.updates if edge.event == event else ():
+                match types[update.variable], update.expression:
+                    case IntegerType(low=low, high=high), Constant(value=int(value)):
+                        if low is None or high is None or not low <= value <= high:
+                            return True
+                    case IntegerType(), _:
+                        return True
+    return False
 
 
 def stays_nonblocking(model: Model, controller: Controller, added: Iterable[AddedCondition]) -> bool:

@@ -15,6 +15,7 @@ _NODE = re.compile(
     r"(?:Write '(?P<meant>.+?)'(?P<elsewhere> in the robot(?:, and '(?P<here>.+?)')?)? instead of|Remove) "
     r"'(?P<written>.+)'\."
 )
+_LED_ELSEWHERE = re.compile(r"Write '(goto \w+)' instead of '(goto \w+)' at ")
 _ASSUMED = re.compile(r"'(assume [^']+)'")
 _BEFORE = re.compile(r"Write '([^']+)' before it\b")
 _WORDS = {"&": "and", "|": "or"}
@@ -120,6 +121,11 @@ class _Line:
                     yield from self._changed("Remove 'initial'", head.start(), head.end(), "")
             case "type-mismatch":
                 yield from self._types(found.fix)
+            case "forbidden-cancel" if elsewhere := _LED_ELSEWHERE.match(found.fix):
+                begin = self._line.find(elsewhere[2], self._begin, self._end)
+                if begin >= 0:
+                    title = f"Write '{elsewhere[1]}'"
+                    yield from self._changed(title, begin, begin + len(elsewhere[2]), elsewhere[1])
             case "unreachable-goal":
                 yield from self._assumptions(_ASSUMED.findall(found.fix))
             case "syntax-error":

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     )
     from robosc.explanation.requests import RequestError
     from robosc.explanation.subjects import ModelWords, SystemWords
+    from robosc.explanation.troubles import Trouble, troubles_after
 
 _HOMES = {
     "EmptyExplanation": "explanations",
@@ -29,6 +30,7 @@ _HOMES = {
     "ModelWords": "subjects",
     "RequestError": "requests",
     "SystemWords": "subjects",
+    "Trouble": "troubles",
     "document": "explanations",
     "empty_text": "explanations",
     "explain_empty": "blame",
@@ -36,6 +38,7 @@ _HOMES = {
     "explanation_text": "explanations",
     "from_text": "explanations",
     "to_text": "explanations",
+    "troubles_after": "troubles",
     "whole_from_text": "explanations",
 }
 
@@ -45,6 +48,7 @@ __all__ = [
     "ModelWords",
     "RequestError",
     "SystemWords",
+    "Trouble",
     "document",
     "empty_text",
     "explain_empty",
@@ -52,6 +56,7 @@ __all__ = [
     "explanation_text",
     "from_text",
     "to_text",
+    "troubles_after",
     "whole_from_text",
 ]
 

@@ -364,6 +364,23 @@ class Analysis:
             )
         )
 
+    def stuck(self, state: State) -> dict[str, bool]:
+        """Return the automata that never get to a marked location from a state by the plants alone.
+
+        The value is True if nothing even leaves the location that the automaton is in.
+        """
+        false, here = self._manager.false, self.predicate(state)
+        reached = self._fixed_point.states_from(self._free, here, self._manager.true)
+        return {
+            item.name: not any(
+                self._encoding.in_location(item.name, location) & reached != false
+                for location in item.locations
+                if self._encoding.in_location(item.name, location) & here == false
+            )
+            for item in self._automata
+            if not any(self._encoding.in_location(item.name, location) & reached != false for location in item.marked)
+        }
+
     def detour(
         self, start: Any, goal: Any, good: Any, inside: Any | None = None, runs: ShortestRuns | None = None
     ) -> Detour | None:

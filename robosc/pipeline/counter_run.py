@@ -82,8 +82,7 @@ class CounterRun(Run):
         self._goals = [condition_of(aim.condition, places) for aim in owed.aims if aim.mission is None]
         self._missions = [MissionOfSystem(mission) for mission in executable.model.missions]
         self._places = tuple(mission.start for mission in self._missions)
-        self._cancels = [(item.event, condition_of(item.is_due, places)) for item in owed.cancels]
-        self._bits = [len(item.places) for item in owed.cancels]
+        self._cancels = [(item.event, condition_of(item.may_end, places)) for item in owed.cancels]
         self._memory = (False,) * len(owed.places)
         # The assumption that comes next; how often each came true at a turn; the surroundings have sent part of a move.
         self._aim = 0
@@ -126,7 +125,11 @@ class CounterRun(Run):
         """Return whose event it is: `you`, `executor` (silent steps) or `surroundings`."""
         if event in self._request_events:
             return "you"
-        return "executor" if self.is_controllable(event) else "surroundings"
+        return "executor" if self.is_controllable(event) and not self._ends_a_goal(event) else "surroundings"
+
+    def _ends_a_goal(self, event: str) -> bool:
+        """Return True if an event is the end of a goal that the executor wanted to be cancelled."""
+        return any(event == cancel for cancel, _ in self._cancels)
 
     def event_called(self, name: str) -> str:
         """The event that a name stands for; `wait` stands for itself.
@@ -275,7 +278,7 @@ class CounterRun(Run):
     def _settled(self) -> bool:
         """Take silent steps; return False if they do not end."""
         met: set[Any] = set()
-        while (event := self._silent()) is not None:
+        while (event := self._system.enabled_silent()) is not None:
             key = self._state_tuple, self._memory
             if key in met:
                 return False
@@ -299,6 +302,11 @@ class CounterRun(Run):
                         found[target] = move
             del found[here]
             yield from found.values()
+        for event, may_end in self._cancels:
+            if may_end(self._whole):
+                end = self._controller.after(here, event)
+                if end is not None:
+                    yield ((event, end, {}),)
 
     def _moves_of(self, case: Sequence[Happening], here: State) -> dict[State, _Move]:
         """Return what one message of a certain kind can bring about, by the state that it leads to."""
@@ -327,9 +335,7 @@ class CounterRun(Run):
 
     def _arrival(self, state: State) -> State | None:
         """Return the position in which silent steps end, with the memory then; None if they do not end."""
-        memory = iter(self._memory)
-        held = tuple(sum(next(memory) << bit for bit in range(count)) for count in self._bits)
-        end = self._controller.run((state, self._controller.forgotten(state, held))).end
+        end = self._controller.run((state, self._controller.start[1])).end
         return None if end is None else self._observed(end[0])
 
     def _observed(self, state: State) -> State:
@@ -371,14 +377,8 @@ class CounterRun(Run):
     def _whole(self) -> State:
         return (*self._state_tuple, "only", *self._memory)
 
-    def _silent(self) -> str | None:
-        """Return the silent step that the executor takes now, or None."""
-        whole = self._whole
-        cancel = next((event for event, is_due in self._cancels if is_due(whole) and self._system.enabled(event)), None)
-        return cancel or self._system.enabled_silent()
-
     def _observe(self) -> tuple[tuple[int, ...], tuple[str, ...]]:
-        if self._is_within or self._silent() is not None:
+        if self._is_within or self._system.enabled_silent() is not None:
             return (), ()
         before, places = self._reached, self._places
         state = self._system.snapshot().state
@@ -399,7 +399,9 @@ class CounterRun(Run):
     def _why_not(self, event: str) -> tuple[str, ...]:
         if event in self._request_events:
             return super()._why_not(event)
-        return ("the executor takes it by itself",) if self.is_controllable(event) else ("the surroundings decide it",)
+        return (
+            ("the executor takes it by itself",) if self.actor(event) == "executor" else ("the surroundings decide it",)
+        )
 
     def _snapshot(self) -> Any:
         return super()._snapshot(), self._memory, self._places, self._aim, self._came

@@ -163,6 +163,7 @@ def explained(
             engine=engine,
             verify_limit=0,
             allow_livelock=True,
+            only_shown=True,
             should_stop=should_stop,
             on_progress=on_progress,
         )

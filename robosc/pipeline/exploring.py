@@ -125,7 +125,7 @@ def explore(
             return Exploration(made.status, made.diagnostics, made.reason, None, made.explanation)
         return _explored(made.supervisor, limit, made.diagnostics, on_progress, should_stop)
     # The graph is of everything allowed, whatever an executor would choose.
-    attempt = make(bundle, options, on_progress, should_stop, allow_livelock=True)
+    attempt = make(bundle, options, on_progress, should_stop, allow_livelock=True, only_shown=True)
     diagnostics = findings_of(attempt, bundle)
     if isinstance(attempt, SynthesisOutcome) and attempt.supervisor is not None:
         return _explored(attempt.supervisor, limit, diagnostics, on_progress, should_stop)

@@ -352,14 +352,13 @@ class ModelWalker(Walker):
     def _candidates(self) -> Iterator[str]:
         """Yield the events that an executor and its environment could have happen now."""
         silent = self._system.enabled_silent()
-        if silent is None and self.follows_strategy:
-            silent = self._system.due_cancel()
         if silent is not None:
             yield silent
             return
         possible = self._run.possible
         if self.follows_strategy:
             possible = tuple(event for event in possible if not self._run.is_controllable(event))
+            possible += self._system.possible_cancels()
             if self._run.chosen is not None:
                 # The world and the controller are as likely to have their turn.
                 possible += (self._run.chosen,) * max(1, len(possible))

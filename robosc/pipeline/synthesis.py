@@ -145,6 +145,7 @@ def make(
     should_stop: ShouldStop,
     *,
     allow_livelock: bool,
+    only_shown: bool = False,
 ) -> Attempt:
     """Make a supervisor with some options."""
     states = options.verified_states
@@ -155,6 +156,7 @@ def make(
             engine=options.engine_options(),
             verify_limit=DEFAULT_STATES if states is None else states,
             allow_livelock=allow_livelock,
+            only_shown=only_shown,
             should_stop=should_stop,
             on_progress=on_progress,
         )

@@ -277,7 +277,7 @@ def _synthesized(
     errors = claims.errors(robot) if robot is not None and claims else None
     if errors is not None:
         return errors
-    attempt = make(model, options, on_progress, should_stop, allow_livelock=True)
+    attempt = make(model, options, on_progress, should_stop, allow_livelock=True, only_shown=True)
     if isinstance(attempt, Unsupported):
         raise UnsupportedModelError(attempt.reason)
     if attempt.supervisor is not None:

@@ -1,9 +1,9 @@
 """The game of a controller against its surroundings, on decision diagrams.
 
 A position is a stable state of the controlled system, with the memory as it was observed there. The surroundings move
-by batches: events of one message, in source order, with any data that it can hold, and no silent step
-in between. After a batch and after each request silent steps run to their end in the executor's order: own cancels,
-resets, taus. At its turn the controller issues one enabled request, or none.
+by batches: events of one message, in source order, with any data that it can hold, and no silent step in between. They
+also end goals as cancelled, once the executor may have asked for that. After each move silent steps run to their end in
+the executor's order: resets, taus. At its turn the controller issues one enabled request, or none.
 
 The events of one batch carry what one message can hold (`robosc.controller_properties.messages`). Where that would make
 too many cases, their data is taken to be independent, so the surroundings can do no less than they really can.
@@ -129,7 +129,7 @@ class ControllerArena:
         self._surrounded: list[tuple[Any, Any, Any]] = []
         self._followed: dict[Any, Any] = {}
         reachable = self._reachable()
-        self._silent = tuple(self._silent_steps(executable, owed.cancels, encoder, reachable))
+        self._silent = tuple(self._silent_steps(executable, reachable))
         self._led = tuple(steps.image(first) for first, steps in self._silent)
         """For each silent step the states that it leads to."""
         self._ends_alike = all(steps.is_deterministic for _, steps in self._silent)
@@ -142,8 +142,10 @@ class ControllerArena:
             self.observed = self.observed & ((before & after) | (~before & ~after))
         self._cases = tuple(
             tuple(part for part in case if part.steps.plant & reachable != self._manager.false)
-            for batch in executable.batches
-            for case in self._cases_of(executable, batch)
+            for case in (
+                *(case for batch in executable.batches for case in self._cases_of(executable, batch)),
+                *(self._ending_as_cancelled(item, encoder) for item in owed.cancels),
+            )
         )
         """Moves of the surroundings: for each, the events of one message, with data that it can hold."""
         self.requests = tuple(event for event in executable.requests if event in self._steps)
@@ -202,6 +204,11 @@ class ControllerArena:
             for case in message_cases(executable, self._encoding.system, batch)
         ]
 
+    def _ending_as_cancelled(self, cancel: Cancel, encoder: ExpressionEncoder) -> tuple[_Part, ...]:
+        """Return the case that a goal ends as cancelled."""
+        steps = self._steps[cancel.event]
+        return (_Part(steps.carrying(steps.condition & encoder.holds(cancel.may_end)), may_be_left_out=False),)
+
     def _carrying(self, event: str, options: Sequence[PossibleData]) -> Steps:
         """Return the steps of an event with some data."""
         inputs = self._encoding.inputs_of(event)
@@ -228,16 +235,14 @@ class ControllerArena:
         steps = self._steps[event]
         return steps.plant & steps.condition
 
-    def _silent_steps(
-        self, executable: ExecutableSystem, cancels: Sequence[Cancel], encoder: ExpressionEncoder, reachable: Any
-    ) -> Any:
+    def _silent_steps(self, executable: ExecutableSystem, reachable: Any) -> Any:
         """Yield the silent steps in the executor's order, each with the states in which it is the next one."""
         left = reachable
-        due = [(item.event, encoder.holds(item.is_due)) for item in cancels]
-        # A reset or tau that would change nothing is not taken.
-        due += [(event, self._steps[event].moving()) for event in executable.resets_and_taus if event in self._steps]
-        for event, condition in due:
-            here = left & condition & self._enabled(event)
+        for event in executable.resets_and_taus:
+            if event not in self._steps:
+                continue
+            # A reset or tau that would change nothing is not taken.
+            here = left & self._steps[event].moving() & self._enabled(event)
             if here != self._manager.false:
                 yield here, self._steps[event]
                 left = left & ~here

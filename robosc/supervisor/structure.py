@@ -92,7 +92,7 @@ CheckResult = Literal["passed", "not checked"]
 PropertyResult = Literal["passed", "failed", "not checked"]
 
 
-class ControllerProperties(msgspec.Struct, frozen=True):
+class ControllerProperties(msgspec.Struct, frozen=True, omit_defaults=True):
     """Properties of supervisor and executor together, which synthesis does not guarantee.
 
     Attributes:
@@ -100,12 +100,15 @@ class ControllerProperties(msgspec.Struct, frozen=True):
         confluence: Result of checking that their order does not matter.
         nonblocking: Result of checking that a marked state stays reachable under control.
         method: Method by which this was found out, in words.
+        cancels: Result of checking that the supervisor allows every cancel that the executor asks for; None if it asks
+            for none, or if this was not checked.
     """
 
     finite_response: PropertyResult
     confluence: PropertyResult
     nonblocking: PropertyResult
     method: str
+    cancels: PropertyResult | None = None
 
 
 class Certificate(msgspec.Struct, frozen=True, omit_defaults=True):

@@ -110,17 +110,20 @@ def _rivals(model: Model) -> tuple[tuple[str, ...], ...]:
     return tuple(tuple(group) for group in found.values() if len(group) > 1)
 
 
-def findings(model: Model, places: Places, answers: Answers) -> tuple[Diagnostic, ...]:
+def findings(
+    model: Model, places: Places, answers: Answers, told: Mapping[str, tuple[str, str]] | None = None
+) -> tuple[Diagnostic, ...]:
     """Return the warnings about a model.
 
     Args:
         model: The checked model.
         places: Source locations of its parts.
         answers: The answers to `questions_about` it.
+        told: For events that can never happen, reason and remedy, where more is known than the kind of cause.
     """
     never = {item.event: item for item in answers.never}
     return (
-        *_never_requested(model, places, never),
+        *_never_requested(model, places, never, told or {}),
         *_never_taken(model, places, never),
         *(_unused(model, places, number) for number in answers.unused),
         *(_competing(model, places, pair) for pair in answers.together),
@@ -175,7 +178,9 @@ _NEVER_TAKEN = (
 )
 
 
-def _never_requested(model: Model, places: Places, never: Mapping[str, NeverEnabled]) -> Iterator[Diagnostic]:
+def _never_requested(
+    model: Model, places: Places, never: Mapping[str, NeverEnabled], told: Mapping[str, tuple[str, str]]
+) -> Iterator[Diagnostic]:
     """Findings about the events of communications."""
     reactions = {item.event for component in model.components for item in _transitions(component)}
     for item in model.communications:
@@ -183,7 +188,7 @@ def _never_requested(model: Model, places: Places, never: Mapping[str, NeverEnab
         found = [event for event in item.events if event in never and (event != cancel or event in reactions)]
         for event in found[:1] if request in never else found:
             what = f"'{item.name}' can never be requested" if event == request else f"'{event}' can never happen"
-            why, fix = _EXPLANATIONS[never[event].cause, never[event].is_reached]
+            why, fix = told.get(event) or _EXPLANATIONS[never[event].cause, never[event].is_reached]
             related = _blamed(model, places, item.name, never[event])
             yield _warning("never-enabled", f"{what}: {why}", places.communications[item.name], fix, related)
 

@@ -300,7 +300,7 @@ class Steps:
         return other
 
     def carrying(self, data: Any) -> Self:
-        """The same event with some of its data alone, a predicate over received data; `plant` stays that of all."""
+        """The same event with some of its data, or in some states, alone: a predicate; `plant` stays that of all."""
         other = copy(self)
         # They are made on first use.
         other.__dict__.pop("_relation", None)

@@ -13,6 +13,7 @@ from robosc_lsp import server
 from robosc_lsp.project import Project
 from support.editor import Editor, part_of, position_of, with_edits
 from support.editor_models import LIBRARY, ROBOT, write_definitions
+from support.models import STOPPING
 
 # The robot cannot be kept from getting to a state without a way back.
 FALL = """robot Fall {
@@ -183,6 +184,19 @@ def test_that_there_is_no_supervisor_is_reported_at_the_robot(tmp_path: Path) ->
         parameters = lsp.CodeLensParams(editor.document("fall.rscd"))
         (lens,) = editor.run(editor.client.text_document_code_lens_async(parameters))
         assert lens.command.title == "no supervisor"
+
+
+def test_a_cancel_that_must_be_possible_is_an_error_at_its_transition(tmp_path: Path) -> None:
+    with Editor(tmp_path) as editor:
+        editor.open("stopping.rscd", STOPPING)
+        found = editor.findings("stopping.rscd", lambda found: any(item.code == "forbidden-cancel" for item in found))
+        shown = next(item for item in found if item.code == "forbidden-cancel")
+        assert shown.severity is lsp.DiagnosticSeverity.Error
+        assert part_of(STOPPING, shown.range) == "on cancel to travel goto braking"
+        assert "after travel.request, stop.response" in shown.message
+        assert shown.related_information is not None
+        (asking,) = shown.related_information
+        assert part_of(STOPPING, asking.location.range) == "requirement"
 
 
 DENIED = """robot Courier {

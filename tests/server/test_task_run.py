@@ -28,7 +28,7 @@ from robosc_server.tasks.memory import is_lack_of_memory
 from robosc_server.tasks.requests import RequestLimits, accept_request
 from robosc_server.tasks.run import PAUSE_S, ThrottledReports, run_task
 from robosc_server.tasks.task import Failure, Outcome, Reason, Report, Result, TaskKind, TaskLimits
-from support.models import EMPTY, EXAMPLES
+from support.models import EMPTY, EXAMPLES, STOPPING
 from support.requests import MESSAGES, RESPONSES, bundle_at, small_request
 
 LINE_FOLLOWER = EXAMPLES / "line_follower" / "line_follower.rscd"
@@ -191,6 +191,18 @@ class TestSynthesize:
         request.options.allow_livelock = True
         (answer,) = answers(TaskKind.SYNTHESIZE, request)
         assert answer.result.status == pb.SYNTHESIS_STATUS_SUPERVISOR
+
+    def test_a_cancel_that_must_be_possible(self) -> None:
+        request = small_request(TaskKind.SYNTHESIZE, STOPPING)
+        request.options.allow_livelock = True
+        (answer,) = answers(TaskKind.SYNTHESIZE, request)
+        assert answer.result.status == pb.SYNTHESIS_STATUS_MODEL_ERRORS
+        (item,) = (item for item in answer.result.diagnostics if item.code == "forbidden-cancel")
+        assert item.severity == pb.SEVERITY_ERROR
+        assert "forbid a cancel" in answer.result.reason
+        # A graph is only looked at.
+        result, *_ = answers(TaskKind.EXPLORE, small_request(TaskKind.EXPLORE, STOPPING))
+        assert result.result.status == pb.SYNTHESIS_STATUS_SUPERVISOR
 
     def test_the_same_request_gives_the_same_bytes(self) -> None:
         request = pb.SynthesizeRequest(bundle=bundle_at(MAZE_SOLVER))

@@ -21,12 +21,13 @@ StateKey = tuple[Any, ...]
 Move = tuple[str, ...]
 Held = tuple[tuple[str, tuple[bool, ...]], ...]
 
-_SILENT = ("reset", "cancel")
+ASKED = ()
+"""Stands for the requirements that held, once the cancel of a goal was asked for."""
 
 
 def _is_silent(event: str) -> bool:
     kind = event.rpartition(".")[2]
-    return kind in _SILENT or kind.startswith("tau_")
+    return kind == "reset" or kind.startswith("tau_")
 
 
 class _Watched(InterpretedSystem):
@@ -96,17 +97,25 @@ class World:
 
     def held(self) -> Held:
         goals = self.executor._replies._goals.open_goals()
-        return tuple((goal.action, goal.held if goal.held else ()) for goal in goals if goal.is_running and goal.held)
+        return tuple((goal.action, ASKED if goal.is_cancelling else goal.held) for goal in goals if goal.held)
+
+    def forbidden(self) -> set[str]:
+        """Return the actions whose cancel is asked for and not allowed, though a requirement does not hold."""
+        return {
+            name
+            for name, kept in self.held()
+            if kept is ASKED and not all(self.system.requirements(name)) and not self.system.enabled(f"{name}.cancel")
+        }
 
     def open_actions(self) -> set[str]:
         """Return the actions of which a goal is not known to have ended."""
         return {goal.action for goal in self.executor._replies._goals.open_goals()}
 
     def key(self) -> StateKey:
-        return (tuple(self.system.signature()), self.held())
+        return (self.system.situation(), self.held())
 
     def do(self, move: Move) -> None:
-        """Let one thing happen; a goal that was cancelled has then ended."""
+        """Let one thing happen."""
         self.system.steps.clear()
         kind, name, *data = move
         if kind == "request":
@@ -126,9 +135,6 @@ class World:
             self.executor.on_feedback(self._goal(name), None)
         else:
             self.executor.on_goal_ended(self._goal(name), data[0])
-        for goal in self.executor._replies._goals.open_goals():
-            if not goal.is_running:
-                self.executor.on_goal_ended(goal.number, "cancelled")
 
     def _calls(self) -> Any:
         return self.executor._replies._calls._calls
@@ -163,7 +169,7 @@ class World:
             yield ("service", call.service, "reply"), True
             yield ("service", call.service, "failed"), True
         for goal in self.executor._replies._goals.open_goals():
-            for outcome in ("feedback", "succeeded", "aborted"):
+            for outcome in ("feedback", "succeeded", "aborted", "cancelled"):
                 yield ("action", goal.action, outcome), True
 
 
@@ -176,12 +182,14 @@ class Twin:
         has_livelock: True if silent steps did not end.
         has_conflict: True if their order mattered.
         is_blocking: True if it got to a state from which no marked one can be reached.
+        forbidden: Actions whose cancel was asked for and forbidden somewhere.
     """
 
     states: set[StateKey] = field(default_factory=set)
     has_livelock: bool = False
     has_conflict: bool = False
     is_blocking: bool = False
+    forbidden: set[str] = field(default_factory=set)
 
 
 def twin_of(supervisor: Supervisor, limit: int) -> Twin | None:
@@ -214,6 +222,7 @@ def twin_of(supervisor: Supervisor, limit: int) -> Twin | None:
                 good.add(before)
             return None
         key = world.key()
+        found.forbidden |= world.forbidden()
         if world.system.is_marked(dict(world.system._state)):
             good.add(key)
         if before is not None and is_sure and loud:
@@ -246,27 +255,29 @@ def twin_of(supervisor: Supervisor, limit: int) -> Twin | None:
 
 
 def _live(world: World, state: dict[Any, Any], held: Held) -> Held:
-    """Return the data that is remembered of goals that still run."""
-    return tuple((name, kept) for name, kept in held if state[f"action {name}", None] == "executing")
+    """Return the data that is remembered of goals that still run, once the cancels are asked for that are due."""
+    running = [(name, kept) for name, kept in held if state[f"action {name}", None] == "executing"]
+    return tuple((name, _asked(world.system, state, name, kept)) for name, kept in running)
+
+
+def _asked(system: _Watched, state: dict[Any, Any], name: str, kept: tuple[bool, ...]) -> tuple[bool, ...]:
+    if kept is ASKED:
+        return ASKED
+    pairs = zip(kept, _requirements(system, state, name), strict=True)
+    return ASKED if any(before and not now for before, now in pairs) else kept
 
 
 def _silent_steps(system: _Watched, state: dict[Any, Any], held: Held) -> list[tuple[dict[Any, Any], Held]]:
     """Return the target of every enabled silent step; the executor's choice first."""
     found = []
     kept = system._state
-    candidates = [
-        f"{name}.cancel"
-        for name, before in held
-        if any(b and not now for b, now in zip(before, _requirements(system, state, name), strict=True))
-    ]
-    for event in (*candidates, *system.description.resets, *system.description.taus):
+    for event in (*system.description.resets, *system.description.taus):
         system._state = state
         if system.enabled(event):
             # The class's own step is not reported: this is only tried.
             assert InterpretedSystem.step(system, event) is not None
             target = dict(system._state)
-            left = tuple(item for item in held if target[f"action {item[0]}", None] == "executing")
-            found.append((target, left))
+            found.append((target, tuple((name, _asked(system, target, name, kept)) for name, kept in held)))
     system._state = kept
     return found
 
@@ -291,7 +302,7 @@ def _outcomes(system: _Watched, state: dict[Any, Any], held: Held, tried: set[An
         if node not in after:
             after[node] = [(tuple(s.items()), h) for s, h in _silent_steps(system, dict(node[0]), node[1])]
             queue += after[node]
-    ends = {node[0] for node, targets in after.items() if not targets}
+    ends = {node for node, targets in after.items() if not targets}
     left = dict(after)
     while done := [node for node, targets in left.items() if not any(target in left for target in targets)]:
         for node in done:
@@ -304,12 +315,8 @@ def _cycle(system: _Watched, state: dict[Any, Any], held: Held) -> list[dict[Any
     states = []
     for _ in range(2000):
         states.append(state)
-        steps = _silent_steps(system, state, _live_of(state, held))
+        steps = _silent_steps(system, state, held)
         assert steps
         state, held = steps[0]
     last = states[-1]
     return states[max(place for place, item in enumerate(states[:-1]) if item == last) + 1 :]
-
-
-def _live_of(state: dict[Any, Any], held: Held) -> Held:
-    return tuple((name, kept) for name, kept in held if state[f"action {name}", None] == "executing")

@@ -15,7 +15,7 @@ from robosc.automata import ExecutableSystem
 from robosc.automata.compile import NO_DATA, Function, compile_expression
 from robosc.automata.goal_memory import Obligations
 from robosc.automata.state import subjects
-from robosc.controller_properties.controller import Controller, Node
+from robosc.controller_properties.controller import Controller, Held, Node
 from robosc.expressions import Expression
 from robosc.model.structure import Assumption, Goal, GoalForm
 from robosc.supervisor import AddedCondition, Strategy
@@ -191,16 +191,41 @@ def game_of(executable: ExecutableSystem, added: Iterable[AddedCondition], limit
     game = Game(items(model.assumptions, "assumption"), [*items(model.goals, "goal"), *visits])
     everything = [*game.assumptions, *game.goals]
 
+    cancels = list(zip(controller.goals, executable.obligations.cancels, strict=True))
+    nothing = (0,) * len(cancels)
+
+    def held_after(state: Any, held: Held) -> Held:
+        """Return what a strategy remembers of running goals: it sees stable states, and none in between."""
+        found: list[int] = []
+        for (goal, _), mask in zip(cancels, held, strict=True):
+            holding = goal.holding(state)
+            if state[goal.place] != goal.running:
+                found.append(0)
+            else:
+                found.append(goal.asked if mask & goal.asked or mask & ~holding else mask | holding)
+        return tuple(found)
+
+    def ends(node: Node) -> Iterator[Node]:
+        """Yield the states that an end of a goal as cancelled leads to, wherever it may have been asked for."""
+        state, held = node
+        for (goal, cancel), mask in zip(cancels, held, strict=True):
+            unseen = sum(1 << bit for bit, passes in enumerate(cancel.passing) if passes)
+            target = controller.after(state, goal.cancel)
+            if target is not None and mask & (goal.asked | unseen):
+                yield target, held
+
     def arrived(node: Node, marks: Marks) -> Any:
-        end = controller.run(node).end
-        if end is None:
+        state, held = node
+        reached = controller.run((state, nothing)).end
+        if reached is None:
             return LOST
+        end = reached[0], held_after(reached[0], held)
         for item, mark in zip(everything, marks, strict=True):
             if isinstance(item, _Visit):
                 game.made |= item.mission.made(mark, end[0])
         return end, tuple(item.mark(mark, end[0]) for item, mark in zip(everything, marks, strict=True))
 
-    game.first = arrived(controller.start, tuple(item.start for item in everything))
+    game.first = arrived((controller.start[0], nothing), tuple(item.start for item in everything))
     queue = [] if game.first == LOST else [game.first]
     for position in queue:
         if position in game.choices:
@@ -210,11 +235,13 @@ def game_of(executable: ExecutableSystem, added: Iterable[AddedCondition], limit
         node, marks = position
         requests: dict[str, Any] = {}
         others: set[Any] = set()
-        for events, _, target in controller.moves(node):
+        state, held = node
+        for events, _, (target, _) in controller.moves((state, nothing)):
             if len(events) == 1 and events[0] in controller.requests:
-                requests[events[0]] = arrived(target, marks)
+                requests[events[0]] = arrived((target, held), marks)
             else:
-                others.add(arrived(target, marks))
+                others.add(arrived((target, held), marks))
+        others.update(arrived(target, marks) for target in ends(node))
         game.choices[position], game.successors[position] = requests, others
         queue += [target for target in (*requests.values(), *others) if target != LOST]
     return game
@@ -329,6 +356,7 @@ def values_of(game: Game, position: Position, owed: Obligations) -> tuple[Any, .
     state, held = position[0]
     memory = game.memory(position)
     for cancel, mask in zip(owed.cancels, held, strict=True):
+        # The bits of the requirements, then the one that the cancel was asked for.
         memory |= {place.name: bool(mask >> bit & 1) for bit, place in enumerate(cancel.places)}
     return (*state, "only", *(memory[place.name] for place in owed.places))
 

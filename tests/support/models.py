@@ -50,6 +50,29 @@ EMPTY = """robot R {
     }
 }"""
 
+STOPPING = """robot Stopping {
+    interface i use Fibonacci from p
+    component Stop {
+        outgoing message stop with type: boolean
+        behaviour { variable pressed: boolean on response from stop do pressed := value initial marked state known { } }
+    }
+    component Drive {
+        action travel with request: none, response: none, feedback: none links i
+        behaviour {
+            initial marked state idle { on request to travel goto driving }
+            state driving {
+                on response from travel goto idle
+                on error from travel goto idle
+                on cancel to travel goto braking
+            }
+            state braking { on response from travel goto idle on error from travel goto idle }
+        }
+    }
+    requirement travel needs !Stop.pressed
+}
+"""
+"""A driver that waits for a reply after a cancel, as if a cancel were only asked for."""
+
 DOOR = """component Door {
     incoming message open with type: none
     incoming message shut with type: none

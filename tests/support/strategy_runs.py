@@ -29,7 +29,7 @@ class _Loop:
         for events, _, target in self.controller.moves(node):
             if events[0] not in self.controller.requests:
                 # Events of one message that change nothing may be there or not.
-                batch = next(item for item in self.controller.batches if events[0] in item)
+                batch = next((item for item in self.controller.batches if events[0] in item), events)
                 for count in range(1, len(batch) + 1):
                     for some in combinations(batch, count):
                         yield self.arrived(target, memory, mode, some)
@@ -43,7 +43,7 @@ class _Loop:
         target = self.controller.after(state, event)
         if target is None:
             return (), state
-        return self.arrived((target, self.controller.forgotten(target, held)), memory, after, (event,))
+        return self.arrived((target, self.controller.judged(target, held)), memory, after, (event,))
 
 
 def fault_of(supervisor: Supervisor, strategy: Strategy, missed: MissedGoal) -> str:

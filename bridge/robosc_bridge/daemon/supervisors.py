@@ -18,7 +18,7 @@ from pathlib import Path
 from robosc.certification import make_supervisor
 from robosc.certification.supervisor_file import verify_supervisor_file
 from robosc.controller_properties import check_controller
-from robosc.errors import LanguageError, RoboscError
+from robosc.errors import Diagnostic, LanguageError, RoboscError, Severity
 from robosc.language import load_bundle
 from robosc.model.layers import confusable
 from robosc.model.structure import CommunicationKind, Deployment
@@ -32,7 +32,7 @@ from robosc.signatures import (
     signer,
 )
 from robosc.source import Bundle
-from robosc.supervisor import PropertyResult, Supervisor, decode
+from robosc.supervisor import ControllerProperties, Supervisor, decode
 from robosc.supervisor.codec import MAXIMUM_BYTES
 from robosc.verification import DEFAULT_STATES, Limits
 from robosc_api.security import Credentials
@@ -201,8 +201,9 @@ def _signed(
     if bundle is not None and supervisor.certificate.bundle_sha256 != bundle.digest:
         raise NoSupervisorError(f"{file}: it is signed, but was made of other texts than {bundle.main.name} beside it")
     claimed = supervisor.certificate.controller
-    outcome = _response(supervisor, str(file)) if claimed is None else claimed.finite_response
-    _require_response(outcome, str(file), source, report)
+    if claimed is None or _may_hide_cancels(supervisor, claimed):
+        claimed = _controller_properties(supervisor, str(file))
+    _require_controller(claimed, str(file), source, report)
     return supervisor
 
 
@@ -226,8 +227,20 @@ def _require_deployment(supervisor: Supervisor, deployment: Deployment, place: s
             )
 
 
-def _response(supervisor: Supervisor, place: str) -> PropertyResult:
-    """Check here whether silent steps end, and return the result."""
+def _may_hide_cancels(supervisor: Supervisor, claimed: ControllerProperties) -> bool:
+    """Return True if nothing is claimed about cancels, as in older files, and an executor may ask for some."""
+    model = supervisor.model
+    return (
+        claimed.cancels is None
+        and supervisor.deployment is Deployment.CONTROLLER
+        and any(
+            item.kind is CommunicationKind.ACTION and model.requirements_on(item.name) for item in model.communications
+        )
+    )
+
+
+def _controller_properties(supervisor: Supervisor, place: str) -> ControllerProperties:
+    """Check here whether silent steps end and cancels are possible, and return the results."""
     certificate = supervisor.certificate
     try:
         found = check_controller(
@@ -238,12 +251,20 @@ def _response(supervisor: Supervisor, place: str) -> PropertyResult:
         )
     except RoboscError as error:
         raise NoSupervisorError(f"{place}: {error}") from error
-    return found.finite_response
+    return found.certified()
 
 
-def _require_response(outcome: PropertyResult, place: str, source: Source, report: Callable[[str], None]) -> None:
-    """Silent steps that never end stop the executor with a fault in the middle of its work."""
-    if outcome == "failed":
+def _require_controller(found: ControllerProperties, place: str, source: Source, report: Callable[[str], None]) -> None:
+    """Refuse a supervisor that forbids a cancel which must be possible, or whose silent steps never end.
+
+    Such steps stop the executor with a fault in the middle of its work.
+    """
+    if found.cancels == "failed":
+        raise NoSupervisorError(
+            f"{place}: not executed, because it forbids a cancel that must be possible; 'robosc check --synthesize' of "
+            "its model says which"
+        )
+    if found.finite_response == "failed":
         if not source.allow_livelock:
             raise NoSupervisorError(
                 f"{place}: not executed, because its silent steps never end (--allow-livelock overrides this)"
@@ -278,11 +299,17 @@ def _made(bundle: Bundle, source: Source, report: Callable[[str], None]) -> Supe
     except RoboscError as error:
         raise NoSupervisorError(f"{bundle.main.name}: {error}") from error
     if made.supervisor is None:
-        raise NoSupervisorError(made.reason or str(made.diagnostics[0]))
+        raise NoSupervisorError(_why_none(made.reason, made.diagnostics))
     found = made.supervisor.certificate.controller
     if found is not None:
-        _require_response(found.finite_response, bundle.main.name, source, report)
+        _require_controller(found, bundle.main.name, source, report)
     return made.supervisor
+
+
+def _why_none(reason: str, diagnostics: Iterable[Diagnostic]) -> str:
+    """Return why there is no supervisor, with the first error in the text of the model."""
+    error = next((str(item) for item in diagnostics if item.severity is Severity.ERROR), "")
+    return ": ".join(part for part in (reason, error) if part)
 
 
 def _checked(data: bytes, place: str, bundle: Bundle, source: Source, report: Callable[[str], None]) -> Supervisor:
@@ -300,11 +327,14 @@ def _checked(data: bytes, place: str, bundle: Bundle, source: Source, report: Ca
         why = found.faults[0].message if found.faults else f"not checked: {', '.join(found.unchecked())}"
         raise NoSupervisorError(f"{place}: not a supervisor of {bundle.main.name} that can be trusted: {why}")
     claimed = supervisor.certificate.controller
-    outcome = "not checked" if claimed is None else claimed.finite_response
-    if outcome == "not checked":
+    if (
+        claimed is None
+        or "not checked" in (claimed.finite_response, claimed.cancels)
+        or _may_hide_cancels(supervisor, claimed)
+    ):
         # The verifier has judged the claim of a file; a file without a claim must not pass unchecked.
-        outcome = _response(supervisor, place)
-    _require_response(outcome, place, source, report)
+        claimed = _controller_properties(supervisor, place)
+    _require_controller(claimed, place, source, report)
     return supervisor
 
 
@@ -326,7 +356,7 @@ def _served(bundle: Bundle, server: str, source: Source, report: Callable[[str],
     except ClientError as error:
         raise NoSupervisorError(str(error)) from error
     if answer.status is not SynthesisStatus.SUPERVISOR:
-        raise NoSupervisorError(f"{server}: {answer.reason or answer.diagnostics[0]}")
+        raise NoSupervisorError(f"{server}: {_why_none(answer.reason, answer.diagnostics)}")
     supervisor = _checked(answer.supervisor, server, bundle, source, report)
     if cache is not None:
         store(cache, answer.supervisor)

@@ -54,19 +54,35 @@ class _Item:
         return holds(self._condition, state)
 
 
-class _Held:
-    """A requirement of an action, which held in a stable state while its goal runs."""
+class _Watched:
+    """An action with requirements: which of them held since its request, and whether its cancel was asked for.
 
-    def __init__(self, plant: str, condition: Function) -> None:
-        self._plant = plant
-        self._condition = condition
+    Args:
+        name: Name of the action.
+        conditions: Its requirements.
 
-    def after(self, before: bool, state: State) -> bool:
-        return state[self._plant, None] == "executing" and (before or holds(self._condition, state))
+    Attributes:
+        cancel: Its cancel event.
+        names: Names by which strategies know what is kept of its requirements.
+        asked: Name by which they know that its cancel was asked for.
+    """
 
-    def has_fallen(self, kept: bool, state: State) -> bool:
-        """Return True if it held in a stable state and does not hold any more, while its goal runs."""
-        return kept and state[self._plant, None] == "executing" and not holds(self._condition, state)
+    def __init__(self, name: str, conditions: Sequence[Function]) -> None:
+        self._plant = f"action {name}"
+        self._conditions = conditions
+        self.cancel = f"{name}.cancel"
+        self.names = [f"requirement {number} of {name} was met" for number, _ in enumerate(conditions, start=1)]
+        self.asked = f"the cancel of {name} was asked for"
+
+    def after(self, kept: Mapping[str, bool], state: State) -> dict[str, bool]:
+        """Return what is kept after a stable state."""
+        is_running = state[self._plant, None] == "executing"
+        holding = [holds(condition, state) for condition in self._conditions]
+        pairs = list(zip((kept[name] for name in self.names), holding, strict=True))
+        is_asked = kept[self.asked] or any(held and not now for held, now in pairs)
+        goes_on = is_running and not is_asked
+        after = {name: goes_on and (held or now) for name, (held, now) in zip(self.names, pairs, strict=True)}
+        return {**after, self.asked: is_running and is_asked}
 
 
 @dataclass(frozen=True, slots=True)
@@ -98,15 +114,11 @@ class GoalsOfSystem:
         self, model: Model, strategy: Strategy, requests: Sequence[str], domains: dict[Place, Sequence[Value]]
     ) -> None:
         self._kept: dict[str, _Kept] = {}
-        # Requirements of actions, each with the cancel that its fall brings about and its name in the memory.
-        self._held: list[tuple[str, str, _Held]] = []
-        for communication in model.communications:
-            if communication.kind is CommunicationKind.ACTION:
-                for number, item in enumerate(model.requirements_on(communication.name), start=1):
-                    held = _Held(f"action {communication.name}", function_of(item.condition))
-                    name = f"requirement {number} of {communication.name} was met"
-                    self._held.append((f"{communication.name}.cancel", name, held))
-                    self._kept[name] = held
+        actions = (item.name for item in model.communications if item.kind is CommunicationKind.ACTION)
+        requirements = ((name, model.requirements_on(name)) for name in actions)
+        self._watched = [
+            _Watched(name, [function_of(item.condition) for item in items]) for name, items in requirements if items
+        ]
         self._assumptions: list[_Item] = []
         for number, assumption in enumerate(model.assumptions, start=1):
             owed = _Item(assumption, f"assumption {number}")
@@ -116,7 +128,9 @@ class GoalsOfSystem:
         self._kept |= {item.name: item for item in self._goals}
         self._missions = [MissionOfSystem(mission) for mission in model.missions]
         places: dict[Place, Sequence[Value]] = dict(domains)
-        names = [*self._kept, *(name for mission in self._missions for name in mission.names)]
+        watched = (name for item in self._watched for name in (*item.names, item.asked))
+        self._names = (*watched, *self._kept)
+        names = [*self._names, *(name for mission in self._missions for name in mission.names)]
         places.update({(_MEMORY, name): (False, True) for name in names})
         self._modes = [
             [(requests.index(item.event), diagram_function(item.condition, places)) for item in mode]
@@ -127,20 +141,21 @@ class GoalsOfSystem:
     def restart(self) -> None:
         """Forget everything."""
         missions = tuple(mission.start for mission in self._missions)
-        self._account = Account(dict.fromkeys(self._kept, False), missions, 0)
+        self._account = Account(dict.fromkeys(self._names, False), missions, 0)
 
     def observe(self, state: State) -> None:
         """Take in a stable state."""
         before = self._account
-        kept = {name: item.after(before.kept[name], state) for name, item in self._kept.items()}
+        kept: dict[str, bool] = {}
+        for watched in self._watched:
+            kept |= watched.after(before.kept, state)
+        kept |= {name: item.after(before.kept[name], state) for name, item in self._kept.items()}
         places = zip(self._missions, before.missions, strict=True)
         self._account = Account(kept, tuple(item.after(place, state) for item, place in places), before.mode)
 
-    def due_cancels(self, state: State) -> Iterator[str]:
-        """Yield the cancels that an executor would issue by itself now, if they are allowed."""
-        for event, name, held in self._held:
-            if held.has_fallen(self._account.kept[name], state):
-                yield event
+    def asked_cancels(self) -> Iterator[str]:
+        """Yield the cancels that an executor has asked for by the last stable state that was taken in."""
+        return (item.cancel for item in self._watched if self._account.kept[item.asked])
 
     def are_met(self, state: State) -> tuple[bool, ...]:
         """Return for each goal, visit and assumption True if it is met in a stable state that was taken in."""
@@ -194,7 +209,7 @@ class GoalsOfSystem:
     def recall(self, remembered: tuple[int, tuple[bool, ...], tuple[MissionPlace, ...]]) -> None:
         """Remember what `remembered` has returned."""
         mode, kept, missions = remembered
-        self._account = Account(dict(zip(self._kept, kept, strict=True)), missions, mode)
+        self._account = Account(dict(zip(self._names, kept, strict=True)), missions, mode)
 
     def snapshot(self) -> Account:
         """Return what is kept, as a value to come back to."""

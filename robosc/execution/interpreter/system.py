@@ -255,16 +255,14 @@ class InterpretedSystem:
         return None if self._goals is None else self._goals.choose(self._state)
 
     def is_stable(self) -> bool:
-        """Return True if an executor would take no silent step now: no reset, no tau, no cancel of its own."""
-        if self.enabled_silent() is not None:
-            return False
-        return self.due_cancel() is None
+        """Return True if an executor would take no silent step now: no reset and no tau."""
+        return self.enabled_silent() is None
 
-    def due_cancel(self) -> str | None:
-        """Return the cancel that an executor would issue by itself now; known only where there is a strategy."""
+    def possible_cancels(self) -> tuple[str, ...]:
+        """Return the cancels that an executor has asked for and that may happen; known only with a strategy."""
         if self._goals is None:
-            return None
-        return next((event for event in self._goals.due_cancels(self._state) if self.enabled(event)), None)
+            return ()
+        return tuple(event for event in self._goals.asked_cancels() if self.enabled(event))
 
     def reached(self) -> tuple[bool, ...]:
         """Return for each goal True if it counts as come true in this stable state; nothing without a strategy."""

@@ -116,6 +116,9 @@ class ClosedLoop:
             return relations.relation(events[item.event], item.options)
 
         made = [self._message(relation_of, message) for message in dict.fromkeys(messages)]
+        made += [
+            self._end(relations.relation(events[item.event]), relations.truth(item.may_end)) for item in owed.cancels
+        ]
         self.moves = tuple(item for item in made if item.parts)
         false = self.variables.manager.false
         requests = {
@@ -145,6 +148,12 @@ class ClosedLoop:
             is_possible = relation.guard != self.variables.manager.false
             return Move((Part(relation, self.variables.manager.false),) if is_possible else ())
         return Move(tuple(parts))
+
+    def _end(self, relation: Relation, may_end: Any) -> Move:
+        """Return the move that a goal ends as cancelled, which is its cancel only where the supervisor allows it."""
+        guard = self.variables.work.count(relation.guard & may_end)
+        false = self.variables.manager.false
+        return Move((Part(replace(relation, guard=guard), false),) if guard != false else ())
 
     def _turn(self, choices: Choices, requests: Mapping[str, Move]) -> Turn:
         left = self.variables.manager.true

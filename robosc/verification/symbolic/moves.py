@@ -116,12 +116,10 @@ class Arrival:
 
     def _silent_steps(self, relations: Relations, executable: ExecutableSystem) -> Iterator[_Silent]:
         variables, events = self._variables, {event.name: event for event in self._variables.system.events}
-        due = {item.event: relations.truth(item.is_due) for item in executable.obligations.cancels}
-        for event in (*due, *(item for item in executable.resets_and_taus if item in events)):
+        for event in (item for item in executable.resets_and_taus if item in events):
             relation = relations.relation(events[event])
             # A reset or tau that would change nothing is not taken.
-            next_ = relation.guard & due[event] if event in due else moving(variables, relation).guard
-            here = variables.work.count(self._stable & next_)
+            here = variables.work.count(self._stable & moving(variables, relation).guard)
             if here != variables.manager.false:
                 yield _Silent(event, replace(relation, guard=here))
                 self._stable = variables.work.count(self._stable & ~here)

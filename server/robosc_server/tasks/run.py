@@ -296,7 +296,7 @@ def _explored(
     graph: Graph | None = None
     with attempt:
         # The graph is of everything allowed, whatever an executor would choose.
-        made = attempt.make(request, limits.nodes, on_report, allow_livelock=True)
+        made = attempt.make(request, limits.nodes, on_report, allow_livelock=True, only_shown=True)
         if made.supervisor is not None:
             on_report(Report("exploration", f"{made.supervisor.certificate.states} states"))
             graph = _graph(made.supervisor, request.maximum_states or DEFAULT_LIMIT)

@@ -53,7 +53,13 @@ class SynthesisAttempt:
         return False
 
     def make(
-        self, request: Request, maximum_nodes: int, on_report: OnReport, *, allow_livelock: bool
+        self,
+        request: Request,
+        maximum_nodes: int,
+        on_report: OnReport,
+        *,
+        allow_livelock: bool,
+        only_shown: bool = False,
     ) -> SynthesisOutcome:
         """Make the supervisor of a request."""
         options = request.options
@@ -63,6 +69,7 @@ class SynthesisAttempt:
             engine=from_proto.engine(options, maximum_nodes),
             verify_limit=from_proto.verified_states(options),
             allow_livelock=allow_livelock,
+            only_shown=only_shown,
             on_progress=lambda step: on_report(Report(step.stage, step.message)),
         )
         return self.made

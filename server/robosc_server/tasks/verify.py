@@ -92,7 +92,7 @@ def _verify_synthesized(request: pb.VerifyRequest, maximum_nodes: int, on_report
     errors = None if model is None else _property_errors(request, model)
     if errors is not None:
         return errors
-    made = SynthesisAttempt().make(request, maximum_nodes, on_report, allow_livelock=True)
+    made = SynthesisAttempt().make(request, maximum_nodes, on_report, allow_livelock=True, only_shown=True)
     if made.supervisor is not None:
         return _verdicts(request, made.supervisor, maximum_nodes, on_report)
     document = {"status": str(made.status), **reasons_json(made), **diagnostics_json(made.diagnostics)}

@@ -27,6 +27,7 @@ from robosc_bridge.daemon.supervisors import (
 )
 from support.certificates import Authority
 from support.effort import examples
+from support.models import STOPPING
 from support.service import secured, served
 
 GATE = """robot Carrier {
@@ -224,6 +225,36 @@ def test_they_are_refused_of_a_server_and_of_what_it_made_last(endless: Path, tm
         source = Source(endless.with_suffix(".rscd"), CONTROLLER, address, tmp_path / "kept")
         refused_unless_allowed(source)
     refused_unless_allowed(source)
+
+
+# Cancels that must be possible.
+
+
+@pytest.mark.parametrize("said", ["failed", "not checked", "nothing of them", "nothing"])
+def test_a_cancel_that_must_be_possible_is_refused(tmp_path: Path, said: str) -> None:
+    """Check that nothing overrides it: of a model, of a file that tells it, and of one that does not, as older ones."""
+    file = written(tmp_path, STOPPING).with_suffix(".rsup")
+    source = Source(file.with_suffix(".rscd"), CONTROLLER, allow_livelock=True)
+    problem = refusal(source)
+    assert "would have to forbid a cancel that must be possible" in problem
+    assert "'travel' cannot be cancelled after travel.request, stop.response" in problem
+    made = make_supervisor(load_bundle(file.with_suffix(".rscd")), only_shown=True).supervisor
+    assert made is not None and made.certificate.controller is not None
+    assert made.certificate.controller.cancels == "failed"
+    content = json.loads(encode(made))
+    certificate = content["supervisor"]["certificate"]
+    if said == "nothing":
+        del certificate["controller"]
+    elif said == "nothing of them":
+        del certificate["controller"]["cancels"]
+    else:
+        certificate["controller"]["cancels"] = said
+    file.write_text(json.dumps(content))
+    assert "because it forbids a cancel that must be possible" in refusal(replace(source, file=file))
+    certificate.setdefault("controller", json.loads(encode(made))["supervisor"]["certificate"]["controller"])
+    certificate["controller"]["cancels"] = "passed"
+    file.write_text(json.dumps(content))
+    assert "it says 'cancels of the controller: passed', which is false" in refusal(replace(source, file=file))
 
 
 def test_a_robot_without_a_supervisor_is_reported(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ import pytest
 from robosc.cli.main import main
 from robosc.supervisor import decode
 from support.commands import run_json
-from support.models import EXAMPLES
+from support.models import EXAMPLES, STOPPING
 
 LINE_FOLLOWER = str(EXAMPLES / "line_follower" / "line_follower.rscd")
 NAVIGATION = str(EXAMPLES / "navigation" / "navigation.rscd")
@@ -461,3 +461,29 @@ def test_options_of_the_program_itself_may_be_shortened(capsys: pytest.CaptureFi
         main(["--vers"])
     assert left.value.code == 0
     assert capsys.readouterr().out.startswith("robosc ")
+
+
+def test_a_cancel_that_must_be_possible_is_an_error_and_nothing_overrides_it(
+    capsys: pytest.CaptureFixture[str], tmp_path: Path
+) -> None:
+    model, target, folder = tmp_path / "model.rscd", tmp_path / "out.rsup", tmp_path / "out"
+    model.write_text(STOPPING, encoding="utf-8")
+    said = "error: 'travel' cannot be cancelled after travel.request, stop.response"
+    for command in (
+        ["synth", "--allow-livelock", "-o", str(target)],
+        ["generate", "--target", "python", "--allow-livelock", "-o", str(folder)],
+        ["check", "--synthesize"],
+    ):
+        assert main([command[0], str(model), *command[1:]]) == 1
+        printed = capsys.readouterr().err
+        assert said in printed and "because it would have to forbid a cancel that must be possible" in printed
+    assert not target.exists() and not folder.exists()
+    # The graph is only looked at.
+    assert main(["explore", str(model)]) == 0
+    assert main(["explain-synthesis", str(model)]) == 0
+    capsys.readouterr()
+    model.write_text(STOPPING.replace("cancel to travel goto braking", "cancel to travel goto idle"), encoding="utf-8")
+    assert main(["synth", str(model), "-o", str(target)]) == 0
+    assert "cancels possible      passed" in capsys.readouterr().out
+    controller = decode(target.read_bytes()).certificate.controller
+    assert controller is not None and controller.cancels == "passed"

@@ -7,7 +7,7 @@ from robosc.certification import OutcomeStatus, make_supervisor
 from robosc.conditions.summary import summary_json, summary_text
 from robosc.controller_properties import Properties, check_controller
 from robosc.controller_properties.confluence import ConfluenceSearch
-from robosc.controller_properties.controller import Controller
+from robosc.controller_properties.controller import Controller, Node
 from robosc.controller_properties.search import search
 from robosc.errors import Severity, SynthesisCancelled
 from robosc.model.structure import Deployment
@@ -245,8 +245,36 @@ def test_what_only_part_of_a_message_could_bring_is_no_way_out() -> None:
 # Own cancels
 
 
-def test_an_own_cancel_and_a_tau_that_ask_for_each_other() -> None:
-    """Cancels are silent steps: in the dark the arm is cancelled, at once, and the order matters."""
+def events_after(controller: Controller, *events: str) -> dict[str, Node]:
+    """Return the moves from the stable state that some moves lead to, each by its first event."""
+    node = controller.run(controller.start).end
+    for wanted in events:
+        assert node is not None
+        run = controller.run(next(after for found, _, after in controller.moves(node) if found == (wanted,)))
+        node = run.end
+    assert node is not None
+    return {found[0]: after for found, _, after in controller.moves(node)}
+
+
+def controller_of(text: str, *added: AddedCondition) -> Controller:
+    return Controller(ExecutableSystem(model_of(text), Deployment.CONTROLLER), added)
+
+
+def test_a_cancel_happens_when_the_goal_has_ended_not_when_it_is_asked_for() -> None:
+    """Check that the goal goes on in the dark: it may end as cancelled, or otherwise, and messages come as ever."""
+    controller = controller_of(robot(INTERFACE, EYE, ARM, "requirement reach needs !Eye.dark"))
+    assert set(events_after(controller, "reach.request")) == {"dusk.response", "reach.response", "reach.error"}
+    asked = events_after(controller, "reach.request", "dusk.response")
+    assert set(asked) == {"dusk.response", "reach.response", "reach.error", "reach.cancel"}
+    # Light again: a goal that ends as cancelled has failed.
+    again = events_after(controller, "reach.request", "dusk.response", "dusk.response")
+    assert set(again) == {"dusk.response", "reach.response", "reach.error"}
+    assert "reach.cancel" in events_after(controller, "reach.request", *["dusk.response"] * 3)
+    assert controller.silent == ("reach.reset",)
+
+
+def test_an_end_as_cancelled_is_part_of_no_run_of_silent_steps() -> None:
+    """A tau that waits for the arm to be out is taken in either order: there is no race with a cancel any more."""
     text = robot(
         INTERFACE,
         EYE,
@@ -258,12 +286,28 @@ def test_an_own_cancel_and_a_tau_that_ask_for_each_other() -> None:
         ),
         "requirement reach needs !Eye.dark",
     )
+    assert outcomes(properties(text)) == ("passed", "passed", "passed")
+
+
+def test_orders_that_ask_for_other_cancels_differ() -> None:
+    """Both orders end in one state, but on the way of one of them the requirement does not hold."""
+    text = robot(
+        INTERFACE,
+        EYE,
+        ARM,
+        component("A", "initial marked state a { transition if Eye.dark goto b } marked state b { }"),
+        component("B", "initial marked state a { transition if Eye.dark goto b } marked state b { }"),
+        "requirement reach needs A.a or B.b",
+    )
     found = properties(text)
-    assert outcomes(found) == ("passed", "failed", "passed")
     assert found.conflict is not None
+    chosen, other = found.conflict.chosen, found.conflict.other
     assert found.conflict.trace == ("reach.request", "dusk.response")
-    assert found.conflict.chosen.events == ("reach.cancel",)
-    assert found.conflict.other.events == ("Log.tau_1", "reach.cancel")
+    assert (chosen.events, chosen.asked) == (("A.tau_1", "B.tau_1"), ("reach",))
+    assert (other.events, other.asked, other.end) == (("B.tau_1", "A.tau_1"), (), chosen.end)
+    (warning,) = (item for item in make_supervisor(bundle_of(text)).diagnostics if item.code == "not-confluent")
+    assert "A.tau_1, B.tau_1 asks for the cancel of reach, but the order" in warning.message
+    assert "B.tau_1, A.tau_1 asks for no cancel" in warning.message
 
 
 AGAIN = """component Arm {
@@ -293,26 +337,57 @@ def test_what_the_request_itself_makes_false_never_cancels() -> None:
     assert outcomes(properties(turned)) == ("passed", "passed", "passed")
 
 
-def test_a_cancel_that_was_forbidden_when_it_was_due_comes_later() -> None:
-    """Check that everything that held in some stable state since the request is remembered, not only in the last."""
+def test_a_cancel_that_was_forbidden_when_it_was_asked_for_comes_later() -> None:
+    """Check that it is asked for once; while the supervisor forbids it, a goal that ends as cancelled has failed."""
     gate = component(
         "Gate",
         "initial marked state shut { on response from open goto opened } marked state opened { }",
         "outgoing message open with type: none",
     )
-    model = model_of(robot(INTERFACE, EYE, gate, AGAIN, "requirement reach needs !Eye.dark"))
+    text = robot(INTERFACE, EYE, gate, AGAIN, "requirement reach needs !Eye.dark")
     if_opened = DecisionDiagram((DecisionNode("Gate", None, (0, 1), (0, 1)),), 2)
-    controller = Controller(
-        ExecutableSystem(model, Deployment.CONTROLLER), (AddedCondition("reach.cancel", if_opened),)
+    controller = controller_of(text, AddedCondition("reach.cancel", if_opened))
+    assert "reach.cancel" not in events_after(controller, "reach.request", "dusk.response")
+    assert "reach.cancel" in events_after(controller, "reach.request", "dusk.response", "open.response")
+    found = search(controller, limit=100, confluence=None).forbidden
+    (item,) = found.values()
+    assert (item.action, item.trace, item.fallen) == ("reach", ("reach.request", "dusk.response"), (0,))
+
+
+ENDED = robot(INTERFACE, EYE, ARM.replace("cancel to reach goto home", "cancel to reach goto out"), "%s")
+"""An arm that waits for a reply to a goal that has ended as cancelled."""
+
+
+def test_a_cancel_that_must_be_possible_is_forbidden() -> None:
+    found = properties(ENDED % "requirement reach needs !Eye.dark")
+    assert (outcomes(found), found.cancels) == (("passed", "passed", "passed"), "failed")
+    (item,) = found.forbidden
+    assert (item.event, item.trace) == ("reach.cancel", ("reach.request", "dusk.response"))
+    # The request itself makes it false, so nothing asks for the cancel.
+    assert properties(ENDED % "requirement reach needs Arm.home").cancels == "passed"
+    # An action without requirements is never cancelled; in a layer the caller cancels, and nothing may forbid it.
+    assert properties(ENDED % "").cancels is None
+    assert properties(robot(INTERFACE, EYE, ARM, "requirement reach needs !Eye.dark"), Deployment.LAYER).cancels is None
+
+
+def test_a_cancel_that_would_leave_a_range_is_forbidden() -> None:
+    counting = ARM.replace("behaviour {", "behaviour { variable n: integer(0..1)").replace(
+        "on cancel to reach goto home", "on cancel to reach do n := n + 1 goto home"
     )
-    node = controller.run(controller.start).end
-    taken: list[str] = []
-    for wanted in ("reach.request", "dusk.response", "open.response"):
-        assert node is not None
-        run = controller.run(next(after for events, _, after in controller.moves(node) if events == (wanted,)))
-        taken += [wanted, *run.events]
-        node = run.end
-    assert taken == ["reach.request", "dusk.response", "open.response", "reach.cancel"]
+    rules = "requirement reach needs !Eye.dark requirement reach needs Arm.n < 2"
+    found = properties(robot(INTERFACE, EYE, counting, rules))
+    assert found.cancels == "failed"
+    assert found.forbidden[0].trace.count("reach.cancel") == 1
+    assert found.forbidden[0].fallen == (0,)
+    told = counting.replace("n := n + 1", "n := 1")
+    assert properties(robot(INTERFACE, EYE, told, rules), limit=1).cancels == "passed"
+
+
+def test_a_search_that_is_given_up_proves_no_cancel() -> None:
+    text = ENDED % "requirement reach needs !Eye.dark"
+    assert properties(text, limit=1).cancels == "not checked"
+    possible = robot(INTERFACE, EYE, ARM, "requirement reach needs !Eye.dark")
+    assert properties(possible, limit=1).cancels == "passed"
 
 
 def test_as_a_layer_the_caller_may_cancel() -> None:

@@ -11,17 +11,19 @@ from robosc.controller_properties import Properties, check_controller
 from robosc.controller_properties.confluence import ConfluenceSearch
 from robosc.controller_properties.controller import Controller, Node
 from robosc.controller_properties.search import search
-from robosc.controller_properties.silent_steps import always_end, never_conflict, stays_nonblocking
+from robosc.controller_properties.silent_steps import always_end, never_conflict, never_forbids, stays_nonblocking
 from robosc.execution.interpreter import InterpretedSystem
-from robosc.model.structure import Deployment
+from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
 from robosc.verification import verify_explicitly
-from support.controller_twin import twin_of
+from support.controller_twin import ASKED, twin_of
 from support.random_controllers import ONE_FIELD, random_controller, random_robot
 from support.random_supervisors import random_supervisor
+from support.random_travels import random_travels
 
 LIMIT = 2_000
 TWIN_LIMIT = 16
+TRAVEL_LIMIT = 60
 DATA = (None, False, True, {"n": 1, "m": 1}, {"n": 1, "m": 6}, {"n": 6, "m": 1}, {"n": 6, "m": 6})
 
 
@@ -29,6 +31,10 @@ def checked(supervisor: Supervisor) -> Properties:
     return check_controller(
         ExecutableSystem(supervisor.model, supervisor.deployment), supervisor.added, is_nonblocking=True
     )
+
+
+def actions_of(supervisor: Supervisor) -> list[str]:
+    return [item.name for item in supervisor.model.communications if item.kind is CommunicationKind.ACTION]
 
 
 def failures(found: Properties) -> tuple[bool, bool, bool]:
@@ -58,12 +64,43 @@ def test_the_executor_shows_what_the_automaton_has(record_property: Callable[[st
         assert failures(properties) == shown, seed
         for name, has_failed in zip(("livelock", "conflict", "blocking"), shown, strict=True):
             shares[name] += has_failed
+        assert {item.action for item in found.forbidden.values()} == twin.forbidden, seed
+        shares["forbidden cancels"] += bool(twin.forbidden)
+        shares["cancels"] += any(supervisor.model.requirements_on(name) for name in actions_of(supervisor))
         shares["compared"] += 1
         shares["without a search"] += "structure" in properties.method
     for name, count in sorted(shares.items()):
         record_property(name, count)
     assert shares["compared"] > 20
     assert min(shares["livelock"], shares["conflict"], shares["blocking"]) >= 2
+
+
+def test_goals_are_cancelled_as_the_executor_does(record_property: Callable[[str, object], None]) -> None:
+    """Check robots whose requirements often turn, and supervisors that forbid cancels, some of them for no reason."""
+    met: Counter[str] = Counter()
+    for seed in range(30):
+        supervisor = random_travels(seed)
+        controller = Controller(supervisor.executable, supervisor.added)
+        found = search(controller, limit=LIMIT, confluence=ConfluenceSearch(controller, LIMIT))
+        if not found.is_complete or found.states > TRAVEL_LIMIT:
+            met["too large"] += 1
+            continue
+        twin = twin_of(supervisor, TRAVEL_LIMIT)
+        assert twin is not None and found.states == len(twin.states), seed
+        shown = (twin.has_livelock, twin.has_conflict, twin.is_blocking)
+        assert (found.livelock is not None, found.conflict is not None, found.blocking is not None) == shown, seed
+        assert {item.action for item in found.forbidden.values()} == twin.forbidden, seed
+        properties = checked(supervisor)
+        assert properties.cancels == ("failed" if twin.forbidden else "passed"), seed
+        met["compared"] += 1
+        met["asked for"] += any(kept is ASKED for _, held in twin.states for _, kept in held)
+        met["forbidden"] += bool(twin.forbidden)
+        met["conflict"] += twin.has_conflict
+        met["possible by structure"] += never_forbids(controller, supervisor.added)
+    for name, count in sorted(met.items()):
+        record_property(name, count)
+    assert min(met["compared"], met["asked for"]) > 10, met
+    assert met["forbidden"] >= 3, met
 
 
 def test_enums_of_one_field_agree(record_property: Callable[[str, object], None]) -> None:

@@ -6,6 +6,7 @@ from robosc.certification import make_supervisor
 from robosc.editing.fixes import fixes
 from robosc.model.check import inspect
 from robosc.source import Bundle, SourceFile
+from support.models import STOPPING
 
 ROBOT = """robot R {
     component C {
@@ -169,3 +170,22 @@ def test_no_assumption_is_written_where_none_is_known_to_help() -> None:
     (found,) = (item for item in made.diagnostics if item.code == "unreachable-goal")
     assert found.location is not None
     assert fixes(found, text.split("\n")[found.location.line - 1], lambda: "}\n") == ()
+
+
+def test_a_cancel_is_led_to_where_the_goal_has_ended() -> None:
+    made = make_supervisor(Bundle(SourceFile("r.rscd", STOPPING)))
+    (found,) = (item for item in made.diagnostics if item.code == "forbidden-cancel")
+    assert found.location is not None
+    lines = STOPPING.split("\n")
+    (fix,) = fixes(found, lines[found.location.line - 1])
+    line = lines[fix.location.line - 1]
+    begin = fix.location.column - 1
+    assert (fix.title, line[begin : begin + fix.location.length]) == ("Write 'goto idle'", "goto braking")
+    lines[fix.location.line - 1] = line[:begin] + fix.text + line[begin + fix.location.length :]
+    assert make_supervisor(Bundle(SourceFile("r.rscd", "\n".join(lines)))).supervisor is not None
+    # A transition that has to be added is for a person to write.
+    text = STOPPING.replace("on cancel to travel goto braking", "")
+    made = make_supervisor(Bundle(SourceFile("r.rscd", text)))
+    (found,) = (item for item in made.diagnostics if item.code == "forbidden-cancel")
+    assert found.location is not None
+    assert fixes(found, text.split("\n")[found.location.line - 1]) == ()

@@ -130,7 +130,11 @@ def compare(robot: Robot | None, seed: int, engine: str, met: Counter[str]) -> N
     for damaged in (Strategy(((),) * len(kept)), Strategy(tuple(map(tuple, kept)))):
         is_missed = unfair_goal(game, deciding(game, executable, damaged)) is not None
         found = check_strategy(executable, added, damaged)
-        assert found.result == ("failed" if is_missed else "passed"), seed
+        # A cancel that silent steps pass over is exact there, and possible everywhere in the game.
+        is_exact = not any(any(item.passing) for item in owed.cancels)
+        expected = "failed" if is_missed else "passed"
+        assert found.result == expected or not (is_exact or found.result == "failed"), seed
+        met["unseen cancels"] += not is_exact
         met["damaged, missed" if is_missed else "damaged, still reached"] += 1
 
 

@@ -135,7 +135,8 @@ def test_a_request_that_synthesis_forbids() -> None:
     more = "incoming message unlock with type: none"
     both = found(robot(text.replace("MORE", more), "requirement unlock needs Door.opened").replace("§", ""))
     assert [item.message for item in both] == [
-        "'lock' can never be requested: synthesis forbids it everywhere, because of what could follow it",
+        "'lock' can never be requested: unlock.request, on the only way back to a marked state, must not happen then: "
+        "'requirement unlock needs Door.opened' forbids it: Door is locked",
         "'unlock' can never be requested: wherever the behaviours allow it, a requirement on it does not hold",
     ]
     assert found(robot(text.replace("MORE", more)).replace("§", "")) == ()
@@ -197,7 +198,8 @@ def test_a_request_in_states_that_synthesis_keeps_from() -> None:
     lock, smash, repair = found(robot(door, "requirement repair needs Door.closed"))
     assert repair.message.endswith("a requirement on it does not hold")
     assert (lock.message, smash.message) == (
-        "'lock' can never be requested: synthesis forbids it everywhere, because of what could follow it",
+        "'lock' can never be requested: repair.request, on the only way back to a marked state, must not happen then: "
+        "'requirement repair needs Door.closed' forbids it: Door is broken",
         "'smash' can never be requested: synthesis keeps the behaviours from the states that allow it, because of what "
         "could follow there",
     )

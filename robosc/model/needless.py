@@ -15,6 +15,7 @@ from robosc.model.structure import (
     Behaviour,
     Communication,
     EnumDefinition,
+    Limit,
     ObjectDefinition,
     ObjectValue,
     Property,
@@ -34,6 +35,7 @@ class PropertyUses:
         communications: Communications of the robot.
         behaviours: Behaviours, which read what is received.
         provides: Data of requests.
+        limits: Bounds of numbers of requests.
         enums: Enums, whose rules read what they are made from.
         objects: Object types by name.
     """
@@ -43,6 +45,7 @@ class PropertyUses:
         communications: Iterable[Communication],
         behaviours: Iterable[Behaviour],
         provides: Iterable[Provide],
+        limits: Iterable[Limit],
         enums: Iterable[EnumDefinition],
         objects: Mapping[str, ObjectDefinition],
     ) -> None:
@@ -60,6 +63,10 @@ class PropertyUses:
                 self._add(transition.event.rpartition(".")[0], (transition.guard, transition.updates))
         for provide in provides:
             self._add(provide.communication, provide.value)
+        for limit in limits:
+            self._names.setdefault(limit.communication, set()).update(
+                name for bound in limit.bounds for name in bound.path
+            )
 
     def of(self, communication: str) -> frozenset[str]:
         """The names of properties that are read or filled in the data of a communication."""

@@ -326,6 +326,7 @@ def test_a_goal_that_will_not_end_is_left_behind_after_its_time() -> None:
         # The loop that it runs in ends it, as `asyncio.run` does: whether it brakes or hangs is not known here.
         (left,) = (task for task in asyncio.all_tasks() if "_execute" in repr(task))
         left.cancel()
+        await stage.turns()
 
     played(scene)
 

@@ -176,7 +176,7 @@ def _frames(run: LoggedRun, model: Model) -> list[Frame]:
                 if entry.event in leads_to:
                     name, location = leads_to[entry.event]
                     places = places if places[name] == location else {**places, name: location}
-                # The end of a goal that took too long, or from before a restart, is no event: the next request shows it.
+                # The end of a goal that took too long, or is from before a restart, is no event: a request shows it.
                 cancelling = frame.cancelling
                 if entry.event in ends:
                     cancelling = tuple(item for item in cancelling if item != ends[entry.event])

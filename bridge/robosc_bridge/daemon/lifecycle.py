@@ -203,6 +203,8 @@ class Lifecycle:
         latched = self._latches.held(is_stopped=self._switch.is_stopped)
         if latched:
             return f"{latched} Resume or reset it first."
+        if self.state is State.STANDBY and self._robot.left_goals:
+            return f"goals of the last run have not ended: {', '.join(self._robot.left_goals)}"
         return "" if self.state is State.RUNNING else self._readiness.missing() or self._dead_thread()
 
     def _dead_thread(self) -> str:

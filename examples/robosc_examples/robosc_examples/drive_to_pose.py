@@ -29,7 +29,8 @@ class DriveToPose(Wheels):
     """One goal of `/navigate_to_pose` at a time.
 
     Without progress for `patience` seconds it waits as long at rest and tries again (a recovery); after
-    `recoveries` of them, or as long without odometry, the goal is aborted.
+    `recoveries` of them, or as long without odometry, the goal is aborted. However a goal ends, it ends when the robot
+    stands: whoever cancels it learns that then, and not when the brakes are put on.
     """
 
     def __init__(self) -> None:
@@ -45,6 +46,8 @@ class DriveToPose(Wheels):
             raise ParameterError("parameter 'frame' is empty; it must name the frame of the odometry")
         self._goal: tuple[object, Pose] | None = None
         self._end: Future | None = None
+        # How the goal ends once the robot stands, and the result's code.
+        self._outcome: tuple[str, int] | None = None
         self._server = ActionServer(
             self,
             NavigateToPose,
@@ -89,12 +92,18 @@ class DriveToPose(Wheels):
         self._started_s = self._progress_s = self.now_s()
         self._shortest_m = math.inf
         self._count, self._wait_until_s = 0, -math.inf
+        self._outcome = None
         code = await self._end
         return NavigateToPose.Result(error_code=code, error_msg=FAILURES[code])
 
     def advance(self, pose: Pose) -> None:
         """Drive on towards the goal."""
         assert self._goal is not None  # noqa: S101  # only called while busy
+        if self._outcome is not None:
+            self.drive(REST)
+            if self.is_still:
+                self._conclude()
+            return
         _, target = self._goal
         distance_m = math.hypot(target.x_m - pose.x_m, target.y_m - pose.y_m)
         self._publish_feedback(pose, distance_m)
@@ -137,20 +146,29 @@ class DriveToPose(Wheels):
         self._goal[0].publish_feedback(feedback)  # type: ignore[attr-defined]
 
     def _check_cancel(self) -> None:
-        if self._goal is not None and self._goal[0].is_cancel_requested:  # type: ignore[attr-defined]
+        is_wanted = self._goal is not None and self._outcome is None
+        if is_wanted and self._goal[0].is_cancel_requested:  # type: ignore[index]
             self._finish("canceled")
 
     def without_odometry(self) -> None:
         """Wait for it, but not for ever."""
         if self.now_s() - self._progress_s > self._patience_s:
-            self._finish("abort", NO_ODOMETRY)
+            if self._outcome is None:
+                self._finish("abort", NO_ODOMETRY)
+            # Nobody measures whether the robot stands.
+            self._conclude()
 
     def _finish(self, how: str, code: int = 0) -> None:
+        """Put on the brakes; the goal ends when the robot stands."""
+        self._outcome, self._progress_s = (how, code), self.now_s()
+        self.drive(REST)
+
+    def _conclude(self) -> None:
         assert self._goal is not None  # noqa: S101  # only called while busy
         assert self._end is not None  # noqa: S101  # made with the goal
-        handle, _ = self._goal
+        assert self._outcome is not None  # noqa: S101  # chosen before
+        (handle, _), (how, code) = self._goal, self._outcome
         self._goal = None
-        self.drive(REST)
         getattr(handle, how)()
         self._end.set_result(code)
 

@@ -10,6 +10,8 @@ from robosc_examples.motion import Pose, Speed, pose_of
 from robosc_examples.program import HelperNode
 
 REST = Speed(0.0, 0.0)
+STILL_M_S, STILL_RAD_S = 0.01, 0.03
+"""Measured speeds up to which the robot stands."""
 
 
 class Wheels(HelperNode):
@@ -19,6 +21,9 @@ class Wheels(HelperNode):
 
     Args:
         name: The node's name.
+
+    Attributes:
+        is_still: True if the robot stood when its odometry came last.
     """
 
     def __init__(self, name: str) -> None:
@@ -29,6 +34,7 @@ class Wheels(HelperNode):
         self._pose: Pose | None = None
         self._seen_s = -math.inf
         self._is_moving = False
+        self.is_still = False
         self._is_reported = False
         self._commands = self.create_publisher(Twist, "/cmd_vel", 10)
         # Takes it from reliable drivers and from others.
@@ -72,6 +78,8 @@ class Wheels(HelperNode):
             )
             return
         self._pose, self._seen_s, self._is_reported = pose, self.now_s(), False
+        linear, angular = message.twist.twist.linear, message.twist.twist.angular
+        self.is_still = math.hypot(linear.x, linear.y) <= STILL_M_S and abs(angular.z) <= STILL_RAD_S
         if self.is_busy:
             self.advance(pose)
 

@@ -63,6 +63,9 @@ class AsyncRobot(Protocol):
         Carry out a goal: its result.
 
         :raises GoalRejected: It is not accepted.
+        A cancel ends nothing before this has returned or raised: until then the action is
+        executing for the model, so a robot that brakes is to be awaited.
+
         :raises asyncio.CancelledError: It was cancelled, as the controller wanted.
         :raises Exception: It was aborted.
         """
@@ -235,6 +238,8 @@ class _Work:
         self._report = report
         self._goals: Dict[int, asyncio.Future[None]] = {}
         self._tasks: Set[asyncio.Future[None]] = set()
+        # Goals that were cancelled: what they do then, such as to brake, is not to be broken off.
+        self._asked: Set[asyncio.Future[None]] = set()
 
     # The protocol `Middleware`.
 
@@ -266,11 +271,13 @@ class _Work:
         """Cancel a goal's task."""
         task = self._goals.get(goal_id)
         if task is not None:
+            self._asked.add(task)
+            task.add_done_callback(self._asked.discard)
             task.cancel()
 
     def leave(self) -> None:
-        """Cancel whatever is still under way."""
-        for task in tuple(self._tasks):
+        """Cancel whatever is still under way and was not cancelled yet."""
+        for task in tuple(self._tasks - self._asked):
             task.cancel()
 
     # Coroutines.

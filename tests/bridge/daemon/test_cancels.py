@@ -7,7 +7,7 @@ from robosc_bridge.daemon.feed import Snapshot
 from robosc_bridge.daemon.metrics import _metrics
 from robosc_bridge.daemon.programs.items import CancelMade, FeedbackGiven, GoalAccepted, GoalEnded, GoalMade
 from robosc_bridge.daemon.programs.items import MessageReceived as Heard
-from robosc_bridge.daemon.states import State
+from robosc_bridge.daemon.states import OperatorCommand, Order, State
 from robosc_bridge.daemon.threads.reports import Device, DeviceDown
 from robosc_bridge.devices.interface import Velocity
 from robosc_bridge.remote.convert import SnapshotEncoder
@@ -137,6 +137,37 @@ def test_a_program_that_goes_ends_its_goal_as_an_error() -> None:
     scene.server.leave()
     assert scene.events()[-3:] == ["travel.error", "travel.reset", "reach.request"]
     assert scene.daemon.state is State.RUNNING
+
+
+def test_no_run_begins_before_the_goals_of_the_last_one_have_ended() -> None:
+    scene = Loading()
+    answers: list[str] = []
+    scene.daemon.post(Order(OperatorCommand.STANDBY, "a test", answers.append))
+    scene.live(1.0)
+    assert scene.daemon.state is State.STANDBY
+    scene.daemon.post(Order(OperatorCommand.START, "a test", answers.append))
+    scene.live(0.5)
+    assert answers == ["", "goals of the last run have not ended: travel"]
+    scene.server.say(FeedbackGiven, scene.goal.number, {"left": 1})
+    assert scene.server.received == []
+    scene.server.say(GoalEnded, scene.goal.number, "cancelled", None)
+    scene.daemon.post(Order(OperatorCommand.START, "a test", answers.append))
+    scene.live(0.5)
+    assert answers[2:] == [""]
+    assert scene.daemon.state is State.RUNNING
+
+
+def test_a_program_that_goes_has_no_goals_of_the_last_run() -> None:
+    scene = Loading()
+    answers: list[str] = []
+    scene.daemon.post(Order(OperatorCommand.STANDBY, "a test", answers.append))
+    scene.live(1.0)
+    scene.server.leave()
+    scene.daemon.post(Order(OperatorCommand.START, "a test", answers.append))
+    scene.live(0.5)
+    # What fails at once, again and again, keeps nothing else from happening.
+    assert answers == ["", ""]
+    assert scene.events().count("travel.error") > 10
 
 
 TURNER = """

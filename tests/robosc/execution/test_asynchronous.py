@@ -247,6 +247,55 @@ def test_stop_ends_the_run_at_rest() -> None:
     assert played(scene).sent[-1] == "/cmd_vel"
 
 
+def test_a_goal_that_brakes_after_its_cancel_is_executing_until_it_stands() -> None:
+    async def brakes(feedback: Feedback) -> None:
+        with contextlib.suppress(asyncio.CancelledError):
+            await asyncio.get_running_loop().create_future()
+        await stage_of[0]._sleep(1.0)
+        raise asyncio.CancelledError
+
+    stage_of: list[Stage] = []
+
+    async def scene(stage: Stage, running: Any) -> None:
+        stage_of.append(stage)
+        stage.work = brakes
+        await stage.pass_(0.25)
+        stage.controller.receive("/bump", None)
+        await stage.pass_(0.5)
+        assert stage.controller.executor.cancelling == ("dock",)
+        assert stage.system.location("dock") == "executing"
+        await stage.pass_(1.0)
+        assert stage.controller.executor.cancelling == ()
+        assert stage.system.location("dock") == "idle"
+
+    played(scene)
+
+
+def test_the_end_of_the_run_does_not_break_off_what_a_cancelled_goal_does() -> None:
+    done: list[str] = []
+
+    async def brakes(feedback: Feedback) -> None:
+        with contextlib.suppress(asyncio.CancelledError):
+            await asyncio.get_running_loop().create_future()
+        await stage_of[0]._sleep(1.0)
+        done.append("stands")
+
+    stage_of: list[Stage] = []
+
+    async def scene(stage: Stage, running: Any) -> None:
+        stage_of.append(stage)
+        stage.work = brakes
+        await stage.pass_(0.25)
+        stage.controller.stop("enough")
+        # The run waits for half a second; the brakes take longer.
+        await stage.pass_(0.75)
+        assert running.done() and done == []
+        await stage.pass_(0.5)
+        assert done == ["stands"]
+
+    played(scene)
+
+
 def test_a_cancel_of_the_run_stops_the_robot() -> None:
     async def scene(stage: Stage, running: Any) -> None:
         await stage.pass_(0.25)  # The goal is under way.
@@ -274,6 +323,10 @@ def test_a_goal_that_will_not_end_is_left_behind_after_its_time() -> None:
         assert not running.done()
         await stage.pass_(0.2)
         assert running.done()
+        # The loop that it runs in ends it, as `asyncio.run` does: whether it brakes or hangs is not known here.
+        (left,) = (task for task in asyncio.all_tasks() if "_execute" in repr(task))
+        left.cancel()
+        await stage.turns()
 
     played(scene)
 

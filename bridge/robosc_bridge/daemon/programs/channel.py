@@ -48,6 +48,7 @@ class _Open:
         number: Number that the executor uses.
         is_goal: True if it is a goal.
         is_cancelled: True if the program was asked to end it.
+        is_left: True if it is a goal of an earlier run: the model knows nothing of it, but it may move the robot.
     """
 
     program: Program
@@ -55,6 +56,7 @@ class _Open:
     number: int
     is_goal: bool
     is_cancelled: bool = False
+    is_left: bool = False
 
 
 class ProgramChannel:
@@ -78,10 +80,16 @@ class ProgramChannel:
     # The model's side.
 
     def forget(self) -> None:
-        """Forget the calls and goals of the last run, when a run ends or a new one begins."""
-        for number in [number for number, item in self._open.items() if item.is_goal]:
-            self._cancel(number)
-        self._open.clear()
+        """Forget the calls of the last run, when a run ends or a new one begins; cancel its goals, and await them."""
+        self._open = {own: item for own, item in self._open.items() if item.is_goal}
+        for own, item in self._open.items():
+            item.is_left = True
+            self._cancel(own)
+
+    @property
+    def left(self) -> tuple[str, ...]:
+        """Actions with a goal of an earlier run that has not ended."""
+        return tuple(item.name for item in self._open.values() if item.is_left)
 
     def send(self, communication: Communication, data: Any) -> None:
         """Send a message of the model to all programs."""
@@ -145,6 +153,8 @@ class ProgramChannel:
         for item in [self._open.pop(own) for own in lost]:
             why = f"{program.name}, which served '{item.name}', is gone"
             _log.warning("%s", why)
+            if item.is_left:
+                continue
             if executor is not None and item.is_goal:
                 executor.on_goal_ended(item.number, "lost")
             elif executor is not None:
@@ -161,6 +171,10 @@ class ProgramChannel:
         """Pass a program's answer to a call or goal on to the executor."""
         asked = self._open.get(item.number)
         is_goal = not isinstance(item, Replied | CallFailed)
+        if asked is not None and asked.is_left and asked.program is item.program and is_goal:
+            if isinstance(item, GoalEnded):
+                del self._open[item.number]
+            return
         if executor is None or asked is None or asked.program is not item.program or asked.is_goal is not is_goal:
             what = "goal" if is_goal else "call"
             self._clients.refuse(item.program, f"{item.number} is not a {what} that this program has been asked for")

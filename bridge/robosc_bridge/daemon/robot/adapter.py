@@ -83,6 +83,11 @@ class RobotAdapter:
         self._rotations.forget()
         self._program_channel.forget()
 
+    @property
+    def left_goals(self) -> tuple[str, ...]:
+        """Actions with a goal of an earlier run that has not ended, and may move the robot."""
+        return self._program_channel.left
+
     # The executor's side.
 
     def prepare(self, communication: str, data: Any) -> Any:
@@ -234,13 +239,16 @@ class RobotAdapter:
         self.deliver_pending(executor)
 
     def deliver_pending(self, executor: Supervised) -> None:
-        """Report the outcomes of its requests to the executor."""
+        """Report the outcomes of its requests to the executor; those of further requests wait for the next time.
+
+        A request that fails at once, again and again, must not keep the loop from all else.
+        """
         self._rotations.poll()
         if not self._motion.is_braking:
             stops, self._stops = self._stops, []
             for number in stops:
                 executor.on_reply(number, service_response(""))
-        while self._pending:
+        for _ in range(len(self._pending)):
             self._pending.popleft()(executor)
             self._rotations.poll()
 

@@ -60,7 +60,7 @@ class DeviceSilentError(DeviceError, TimeoutError):
 
 
 class StoppedError(DeviceError):
-    """Something was not begun, or was undone, as a stop came meanwhile."""
+    """A stop came meanwhile: what was to begin does not."""
 
 
 class WrongDeviceError(DeviceError):

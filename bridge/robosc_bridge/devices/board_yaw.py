@@ -26,7 +26,7 @@ class BoardYaw:
 
     def __init__(self, name: str = "OpenCR") -> None:
         self.judge = yaw_judge(name)
-        # Of the last block, if its yaw counted.
+        # Yaw and uptime of the last block, if its yaw counted.
         self._last: tuple[float, int] | None = None
         # Uptime that does not begin anew.
         self._uptime_ms = 0

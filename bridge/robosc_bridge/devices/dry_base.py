@@ -45,7 +45,7 @@ class DryBase:
 
     @property
     def leftover(self) -> str:
-        """What the real one may still do after `close`."""
+        """Text that says what the real one may still do after `close`."""
         return getattr(self._base, "leftover", "")
 
     def open(self) -> None:

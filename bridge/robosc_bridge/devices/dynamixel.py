@@ -82,7 +82,7 @@ class DynamixelBase:
         host: Parts of its computer that it uses.
 
     Attributes:
-        leftover: What the motors may still do after `close`; empty: nothing.
+        leftover: Text that says what the motors may still do after `close`; empty: nothing.
 
     Raises:
         ValueError: An argument is out of its range.

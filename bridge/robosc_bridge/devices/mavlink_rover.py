@@ -142,7 +142,7 @@ class MavlinkRover:
 
     Attributes:
         limits: Limits of the drive base.
-        leftover: What the rover may still do after `close`; empty: nothing.
+        leftover: Text that says what the rover may still do after `close`; empty: nothing.
     """
 
     def __init__(

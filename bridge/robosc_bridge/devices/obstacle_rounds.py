@@ -32,7 +32,7 @@ class ObstacleRounds:
     def __init__(self) -> None:
         self.invalid = 0
         self._found: dict[_Key, Timestamped[tuple[Sector, ...]]] = {}
-        # What has reported since the last scan.
+        # Sensors that have reported since the last scan.
         self._reported: set[_Key] = set()
         # False until it is known which sensors there are.
         self._is_known = False

@@ -109,7 +109,7 @@ class OpenCrBase:
 
     Attributes:
         limits: Limits of the drive base.
-        leftover: What the motors may still do after `close`; empty: nothing.
+        leftover: Text that says what the motors may still do after `close`; empty: nothing.
     """
 
     def __init__(

@@ -363,7 +363,7 @@ def _sys_status(raw: Any) -> BatteryState:
 
 
 def _battery_status(raw: Any) -> BatteryState:
-    # Of the cells beyond ten, 0 says that there is none.
+    # A cell beyond ten with 0 is none.
     cells_mv = [cell_mv for cell_mv in (*raw.voltages, *raw.voltages_ext) if cell_mv != UNKNOWN]
     voltage_v = sum(cells_mv) / 1000 if any(cells_mv) else None
     return BatteryState(False, voltage_v, _share(raw.battery_remaining), raw.charge_state, raw.id)

@@ -40,7 +40,7 @@ class Sector:
 def _range_m(distance_cm: int, least_cm: int, most_cm: int) -> float:
     if distance_cm == _UNKNOWN_CM or distance_cm > most_cm:
         return math.nan
-    # What is below the shortest distance was seen, and nearer than it can be measured.
+    # A distance below the shortest one was seen, and is nearer than can be measured.
     return distance_cm / 100 if distance_cm >= least_cm else 0.0
 
 

@@ -77,7 +77,7 @@ def test_one_wrong_reading_is_refused_and_two_that_agree_are_another_beginning()
     assert (judge.refused, judge.begun_anew) == (2, 1)
     # The same reading once more confirms nothing.
     assert [judge.judge(*each) for each in ((1.0, 0.6), (1.0, 0.6), (1.0, 0.7))] == [REFUSED, REFUSED, ANEW]
-    # What is impossible on its own is never begun from.
+    # A reading that is impossible on its own is never begun from.
     assert [judge.judge(-1.0, at_s) for at_s in (0.8, 0.9, 1.0)] == [REFUSED] * 3
     assert judge.judge(1.1, 1.1) is SOUND
     judge.forget()

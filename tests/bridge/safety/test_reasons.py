@@ -506,6 +506,28 @@ def test_what_touches_beside_the_way_does_not_stop_it(degree: int, speed_m_s: fl
     assert bench.last.reasons == ()
 
 
+def test_motors_that_still_hold_after_a_fault_are_letting_go() -> None:
+    bench = Bench()
+    bench.drive()
+    assert not bench.layer.is_letting_go
+    fault(bench)
+    bench.wheels_m_s = (0.1, 0.1)
+    bench.cycle()
+    assert bench.layer.is_letting_go
+    bench.cycles(2.0)
+    assert not bench.layer.is_letting_go
+
+
+def test_torque_that_is_to_go_off_anyway_is_not_lost() -> None:
+    bench = Bench()
+    bench.drive()
+    bench.layer.disable()
+    bench.wheels_m_s = (0.1, 0.1)
+    bench.cycle()
+    bench.holds = False
+    assert bench.cycles(1.5).reasons == (Reason.STANDBY,)
+
+
 def test_a_person_learns_of_a_refused_reading_for_a_while() -> None:
     bench = Bench()
     bench.drive()
@@ -515,8 +537,7 @@ def test_a_person_learns_of_a_refused_reading_for_a_while() -> None:
     assert bench.last.velocity == Velocity(0.1)
     bench.cycles(9.8)
     assert bench.last.warnings == (Caution.READING_REFUSED,)
-    bench.cycles(0.4)
-    assert bench.last.warnings == ()
+    assert not bench.cycles(0.4).warnings
     # A drive base that was opened anew counts anew.
     bench.refused = 0
     assert not bench.cycle().warnings

@@ -116,8 +116,8 @@ class ProgramChannel:
             why = f"no program serves '{name}' ('{communication.identifier}')"
             _log.warning("%s", why)
             return why
-        # The model asks anew: it has given up what it asked for before, such as a call without an answer, or a goal that
-        # was not accepted in time, which the program may have begun all the same.
+        # The model asks anew: it has given up what it asked for before, such as a call without an answer. A goal that
+        # was not accepted in time may have been begun all the same.
         for own in [own for own, item in self._open.items() if item.name == name and item.is_goal]:
             self._cancel(own)
         self._open = {own: item for own, item in self._open.items() if item.name != name}

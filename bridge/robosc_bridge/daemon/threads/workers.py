@@ -183,7 +183,7 @@ class DriveWorker:
 
     @property
     def leftover(self) -> str:
-        """What the drive base may still do after it was closed, in one line; empty: nothing."""
+        """Text that says what the drive base may still do after it was closed, in one line; empty: nothing."""
         return getattr(self._base, "leftover", "")
 
     def end(self) -> None:
@@ -297,7 +297,7 @@ class DriveWorker:
             _log.info("%s", error)
             self._has_torque = False
             if not self._is_ending:
-                # What may have begun ends now; at the end, closing does that.
+                # This ends now what may have begun; at the end, closing does that.
                 self._base.set_torque(False)
 
     def newer(self) -> Velocity | None:

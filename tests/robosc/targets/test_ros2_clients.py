@@ -585,8 +585,31 @@ def test_a_call_goes_on_when_another_node_offers_the_same_service() -> None:
     assert world.calls.warnings() == ["2 servers of /s: /another, /server"]
 
 
-def test_a_lost_call_is_found_while_the_executors_time_stands_still() -> None:
+def test_a_call_has_failed_when_its_server_has_left_and_another_one_is_there() -> None:
     world = World()
+    world.shown.append(Process(1))
+    world.calls.call(1, None)
+    world.shown[:] = [Process(2, "/another")]
+    world.pass_time(LOST_S + 2 * LOOK_S)
+    assert world.reported() == [("on_call_failed", 1, "the server of /s is lost")]
+
+
+def test_a_goal_may_have_been_accepted_by_a_server_that_was_found_after_it_was_sent() -> None:
+    world = World()
+    world.shown.append(Process(1))
+    world.goals.send(1, None)
+    other = Process(2, "/another")
+    other.goals.add(world.client.uuids[-1])
+    world.shown.append(other)
+    world.pass_time(1.0)
+    world.client.futures[-1].done(Handle())
+    del world.shown[0]
+    world.pass_time(10.0)
+    assert world.reported() == [("on_goal_accepted", 1)]
+
+
+def test_a_lost_call_is_found_while_the_executors_time_stands_still() -> None:
+    world = World(timeout_s=0.5)
     world.shown.append(Process(1))
     world.calls.call(1, None)
     world.client.is_there = False

@@ -295,7 +295,9 @@ def test_messages_on_one_name_are_told_apart(patient: Porter) -> None:
 
 def test_a_call_that_is_held_back_is_answered_at_once(patient: Porter) -> None:
     before = len(patient.peer.requests["/power"])
-    assert patient.reply(patient.call()) == {"success": False, "message": "not allowed now"}
+    reply = patient.reply(patient.call())
+    assert reply["success"] is False
+    assert reply["message"] in ("not started", "not allowed now")
     patient.blocks("/power", repeat=patient.call)
     assert len(patient.peer.requests["/power"]) == before
 

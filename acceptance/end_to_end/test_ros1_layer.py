@@ -270,12 +270,10 @@ def test_what_is_no_number_is_held_back_also_where_the_model_does_not_look(patie
 
 def test_messages_on_one_name_are_told_apart(patient: Porter) -> None:
     # Walking is forbidden, standing is not; a loud sound is forbidden, a quiet one is not.
-    patient.until(
-        lambda: patient.commands[-1:] != [] and patient.commands[-1]["angular"]["z"] == 0.25,
-        "a halt",
-        lambda: patient.send(0.0, z=0.25),
-    )
-    assert patient.speed == 0.0
+    before = len(patient.commands)
+    patient.blocks("/cmd_vel", repeat=lambda: patient.send(0.0, z=0.25))
+    assert 0.25 not in {command["angular"]["z"] for command in patient.commands[before:]}, "turning is no halt"
+    patient.until(lambda: patient.speed == 0.0 and len(patient.commands) > before, "a halt", lambda: patient.send(0.0))
     before = len(patient.commands)
     patient.blocks("/cmd_vel", repeat=lambda: patient.send(0.1))
     assert {command["linear"]["x"] for command in patient.commands[before:]} <= {0.0}
@@ -297,7 +295,9 @@ def test_messages_on_one_name_are_told_apart(patient: Porter) -> None:
 
 def test_a_call_that_is_held_back_is_answered_at_once(patient: Porter) -> None:
     before = len(patient.peer.requests["/power"])
-    assert patient.reply(patient.call()) == {"success": False, "message": ""}
+    reply = patient.reply(patient.call())
+    assert reply["success"] is False
+    assert reply["message"] in ("not started", "not allowed now")
     patient.blocks("/power", repeat=patient.call)
     assert len(patient.peer.requests["/power"]) == before
 
@@ -323,7 +323,7 @@ def test_a_call_that_is_refused_is_answered_with_the_default(patient: Porter) ->
     number = patient.call()
     patient.until(lambda: len(patient.peer.requests["/power"]) > before, "the call")
     patient.peer.do("refuse", name="/power")
-    assert patient.reply(number) == {"success": False, "message": ""}
+    assert patient.reply(number) == {"success": False, "message": "the call failed or took too long"}
 
 
 def test_a_call_that_nobody_answers_is_answered_when_its_time_is_over(porter: Porter) -> None:
@@ -332,7 +332,7 @@ def test_a_call_that_nobody_answers_is_answered_when_its_time_is_over(porter: Po
     before = len(porter.peer.requests["/power"])
     number = porter.call()
     porter.until(lambda: len(porter.peer.requests["/power"]) > before, "the call")
-    assert porter.reply(number) == {"success": False, "message": ""}
+    assert porter.reply(number) == {"success": False, "message": "the call failed or took too long"}
     porter.answer(success=True)
     porter.until(lambda: porter.state("Power") == "idle", "the error to be seen")
     errors = [entry for entry in porter.end() if entry.get("event") == "power.error"]
@@ -418,7 +418,7 @@ def test_a_goal_without_a_server_ends_as_aborted_and_a_call_with_the_default(pac
         porter.start("_server_wait:=0.0", "_command_timeout:=0.0")
         porter.allow(True)
         assert porter.end_of(porter.goal())[0] == ABORTED
-        assert porter.reply(porter.call()) == {"success": False, "message": ""}
+        assert porter.reply(porter.call()) == {"success": False, "message": "the call failed or took too long"}
 
 
 # The end of the layer.
@@ -449,7 +449,7 @@ node.main()
     wait_until(lambda: porter.speed == 0.0, "the robot to stand still")
     wait_until(lambda: porter.peer.cancels["/count"] > cancels, "the cancel to reach the robot")
     wait_until(lambda: call in porter.peer.replies, "the reply")
-    assert porter.peer.replies[call] == {"call": call, "reply": {"success": False, "message": ""}}
+    assert porter.peer.replies[call] == {"call": call, "reply": {"success": False, "message": "the layer has ended"}}
     wait_until(lambda: porter.peer.sent[goal][-1].get("state") == DONE, "the end of the goal")
     assert porter.peer.sent[goal][-1]["status"] == ABORTED
     porter.answer(success=True)

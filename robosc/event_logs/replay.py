@@ -154,7 +154,7 @@ class Replay:
                 is_known, data = self._provided_value(statement.value)
                 break
         limits = self.limits(request) if is_known else ()
-        # Where the bounds have a number in common, the one that is found so is within all of them.
+        # The number that is found so is within all bounds, if any is.
         for path, low, high in reversed(limits):
             value = part(data, path) or 0
             if not low <= value <= high:

@@ -158,13 +158,9 @@ def is_unseen(text: str, texts: Sequence[str], starts: Sequence[int], index: int
             following, 1
         )
         return following == "if" or "\n" in text[starts[index] : starts[min(last, len(starts) - 1)]]
-    if texts[index - 1] == "limit" and is_unseen(text, texts, starts, index - 1):
-        return True
-    if texts[index] == "limit":
-        return "\n" in text[starts[index] : starts[min(index + 2, len(starts) - 1)]]
     if texts[index - 1 : index + 1] == ["from", "anywhere"]:
         return is_split or "\n" in text[starts[index - 1] : starts[index]]
-    if texts[index - 1] == "not" and texts[index] in FUNCTIONS and is_unseen(text, texts, starts, index - 1):
+    if texts[index - 1] == "not" and texts[index] in (*FUNCTIONS, *ITEMS) and is_unseen(text, texts, starts, index - 1):
         return True
     return is_split and texts[index] in FUNCTIONS and texts[index + 1] == "("
 

@@ -48,7 +48,7 @@ robot Porter {
     }
     component Base {
         incoming message walk with identifier: "/cmd_vel", type: Twist, when: value.linear.x != 0.0 links twist
-        incoming message halt with identifier: "/cmd_vel", type: Twist links twist
+        incoming message halt with identifier: "/cmd_vel", type: Twist, when: default links twist
         incoming message loud with identifier: "volume", type: double, when: value > 1.0
         incoming message quiet with identifier: "volume", type: double
         behaviour {
@@ -84,6 +84,7 @@ robot Porter {
             }
         }
     }
+    limit walk to { linear: { x: -1.0..1.0 } } if Permission.granted
     requirement walk needs Permission.granted
     requirement loud needs Permission.granted
     requirement power needs Permission.granted
@@ -174,13 +175,21 @@ class Porter:
         """Wait until so many requests more were held back."""
         before = len(self.blocked)
         self.until(
-            lambda: len([item for item in self.blocked[before:] if item.data == identifier]) >= count,
+            lambda: self.held_back(before).count(identifier) >= count,
             f"{count} of {identifier} to be held back",
         )
 
+    def held_back(self, before: int = 0) -> list[str]:
+        """Identifiers of what was reported as held back, but for some reports at the begin."""
+        return [json.loads(item.data)["identifier"] for item in self.blocked[before:]]
+
+    def reasons(self) -> set[str]:
+        """The reasons of these reports."""
+        return {json.loads(item.data)["reason"] for item in self.blocked}
+
     def is_blocked(self, identifier: str) -> bool:
         """Return True if something was reported as held back."""
-        return any(item.data == identifier for item in self.blocked)
+        return identifier in self.held_back()
 
     def send(self, speed: float, **others: float) -> None:
         """The existing controller, here in this process, sends a velocity."""

@@ -188,7 +188,7 @@ class Porter:
 
     @property
     def blocked(self) -> list[str]:
-        return [str(message["data"]) for message in self.peer.values("/blocked")]
+        return [str(json.loads(message["data"])["identifier"]) for message in self.peer.values("/blocked")]
 
     def _current(self, component: str) -> Any:
         states = self.peer.values("/state")

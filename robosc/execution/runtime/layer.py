@@ -283,7 +283,8 @@ class Layer(Runner):
         if found is None:
             return _NOT_WITHIN
         message, moved = found
-        # What was moved counts as acting, whatever it is: a release too many does no harm.
+        # A message with a moved number counts as acting, whatever it is: a release too many does
+        # no harm.
         is_default = (
             request.keeps_acting and not moved and self._robot.is_default(request.name, message)
         )

@@ -47,6 +47,7 @@ def test_from_the_start_to_a_fault(clock: ManualClock) -> None:
         "unexpected": "0",
         "faults": "0",
         "dropped": "0",
+        "limited": "0",
         "cancelling": "",
         "last decision (us)": "",
     }

@@ -140,7 +140,7 @@ class HealthMonitor:
             for name, before, after in (
                 (name, getattr(self._before, name), getattr(counters, name))
                 for name in counters._fields
-                # What limits move is how the model wants it.
+                # The model wants numbers to be moved.
                 if name != 'limited'
             )
             if after > before

@@ -7,6 +7,7 @@ from robosc.errors import Diagnostic, InternalError, LanguageError, RelatedPlace
 from robosc.interfaces import Field
 from robosc.interfaces.catalogue import Catalogue
 from robosc.language import Parsed, parse, syntax
+from robosc.model.acceptances import LATER, accept
 from robosc.model.array_lengths import ArrayLengths
 from robosc.model.behaviour import (
     BehaviourBuilder,
@@ -60,15 +61,17 @@ class Checked:
 
     Attributes:
         model: The robot, or None if there are errors or the main file is a library.
-        diagnostics: Every finding, sorted by place.
+        diagnostics: Every finding that the text does not accept, sorted by place.
         places: Places of the parts of the model, or None without a model.
         bindings: Meanings of the names of the text, as far as it was read.
+        accepted: The findings that it accepts.
     """
 
     model: Model | None
     diagnostics: tuple[Diagnostic, ...]
     places: Places | None = None
     bindings: Bindings = field(default_factory=Bindings)
+    accepted: tuple[Diagnostic, ...] = ()
 
     @property
     def has_errors(self) -> bool:
@@ -143,12 +146,17 @@ def inspect(bundle: Bundle) -> Inspected:
 def _checked(checker: "_RobotChecker", tree: syntax.File) -> Checked:
     findings = checker.findings
     model = checker.model()
-    diagnostics = sorted_diagnostics(findings.diagnostics)
+    # Where there are errors, other checks may not have been made.
+    diagnostics, accepted = accept(
+        checker.bundle,
+        sorted_diagnostics(findings.diagnostics),
+        lambda code: code not in LATER and not findings.has_errors,
+    )
     if findings.has_errors or tree.is_library:
-        return Checked(None, diagnostics, bindings=findings.bindings)
+        return Checked(None, diagnostics, bindings=findings.bindings, accepted=accepted)
     if model is None:
         raise InternalError("a model without errors could not be built")
-    return Checked(model, diagnostics, checker.places, findings.bindings)
+    return Checked(model, diagnostics, checker.places, findings.bindings, accepted)
 
 
 class _RobotChecker:
@@ -159,7 +167,7 @@ class _RobotChecker:
         self.findings = findings
         self._types = Types(findings)
         self._unit = make_unit(tree, findings)
-        self._bundle = bundle
+        self.bundle = bundle
         self._libraries = Libraries(bundle, self._unit, findings)
         self.parts = parts_of(self._unit, self._libraries, findings)
         self.places = Places(tree.name.location)
@@ -204,7 +212,7 @@ class _RobotChecker:
             if tree is not None:
                 check_synthesis_variables(tree, behaviour, communications, self._types, self.findings)
                 partial_updates(tree, behaviour, self.findings)
-        interfaces = InterfaceChecker(self._bundle, self._types, self.findings)
+        interfaces = InterfaceChecker(self.bundle, self._types, self.findings)
         fitting = interfaces.check(trees, communications, self._unit)
         self.fields = interfaces.fields
         self._check_data(trees, communications, provides, fitting)

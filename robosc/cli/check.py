@@ -143,7 +143,7 @@ def _synthesized(outcome: "SynthesisOutcome") -> _Synthesized:
 def _report_synthesized(arguments: argparse.Namespace, found: _Synthesized, bundle: Bundle) -> ExitCode:
     """Print the findings and what became of the synthesis as asked, and return the exit status."""
     summary = {"status": found.status, **reasons_json(found)}
-    accepted = found.accepted if arguments.all else ()
+    accepted = (found.accepted or _accepted(arguments, bundle)) if arguments.all else ()
     status = report_check(arguments, found.diagnostics, bundle, summary, accepted)
     if not arguments.json:
         synth.report_reasons(found, bundle)

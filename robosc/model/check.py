@@ -1,5 +1,6 @@
 """From a bundle to the checked model: every name bound, every type known, every rule of part A applied."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -26,7 +27,7 @@ from robosc.model.communications import (
 )
 from robosc.model.constants import Constants
 from robosc.model.expression_checker import ExpressionChecker
-from robosc.model.findings import Bindings, Findings
+from robosc.model.findings import WORD, Bindings, Findings
 from robosc.model.goals import build_goals
 from robosc.model.interfaces import InterfaceChecker
 from robosc.model.missions import build_missions, build_preferences
@@ -122,7 +123,7 @@ def check(bundle: Bundle) -> Checked:
     """Check the main file of a bundle with the libraries that it imports from; never raises for any text."""
     parsed = parse(bundle.main)
     if parsed.tree is None:
-        return Checked(None, parsed.diagnostics)
+        return _broken(parsed, bundle)
     return _checked(_RobotChecker(parsed.tree, bundle, Findings()), parsed.tree)
 
 
@@ -135,12 +136,64 @@ def inspect(bundle: Bundle) -> Inspected:
     if parsed.tree is not None:
         checked = _checked(checker, parsed.tree)
     else:
-        # Suppress follow-on errors: missing syntax causes faults that are none.
         checker.model()
-        checked = Checked(None, parsed.diagnostics, bindings=checker.findings.bindings)
+        checked = _with_sound_parts(parsed, checker)
     return Inspected(
         checked, parsed, checker.parts, checker.scopes, checker.units, checker.communications, checker.fields
     )
+
+
+_FOLLOWING = frozenset(
+    {
+        "empty-model",
+        "enum-default",
+        "links-required",
+        "marked-unreachable",
+        "needless-acceptance",
+        "no-initial-state",
+        "partial-update",
+        "request-leaves-requirement",
+        "result-not-read",
+    }
+)
+"""Codes of what a part may seem to lack because it is not sound, or because another one is not."""
+
+
+def _broken(parsed: Parsed, bundle: Bundle) -> Checked:
+    """Result for a text with errors of its grammar: these, and what is wrong with its sound parts."""
+    if parsed.sound is None:
+        return Checked(None, parsed.diagnostics)
+    checker = _RobotChecker(parsed.sound, bundle, Findings())
+    checker.model()
+    return _with_sound_parts(parsed, checker)
+
+
+def _with_sound_parts(parsed: Parsed, checker: "_RobotChecker") -> Checked:
+    """The same once the sound parts are checked, without the findings that may follow from what is not there."""
+    found = checker.findings.diagnostics
+    broken = {(item.location.file, item.location.line) for item in parsed.diagnostics if item.location is not None}
+    unknown = Counter(_name_of(item, checker.bundle) for item in found if item.code == "unknown-name")
+    words = Counter(WORD.findall(checker.bundle.main.text)) if unknown else Counter[str]()
+    # An unknown name that stands elsewhere in the text, too, may be defined there.
+    defined = {name for name, count in unknown.items() if words[name] != count}
+    own = [
+        item
+        for item in found
+        if item.code not in _FOLLOWING
+        and not (item.code == "unknown-name" and _name_of(item, checker.bundle) in defined)
+        and (item.location is None or (item.location.file, item.location.line) not in broken)
+    ]
+    diagnostics, accepted = accept(
+        checker.bundle, sorted_diagnostics((*parsed.diagnostics, *own)), lambda code: False
+    )
+    return Checked(None, diagnostics, bindings=checker.findings.bindings, accepted=accepted)
+
+
+def _name_of(finding: Diagnostic, bundle: Bundle) -> str:
+    """The text at the place of a finding."""
+    place = finding.location
+    file = None if place is None else bundle.file(place.file)
+    return "" if place is None or file is None else file.line(place.line)[place.column - 1 :][: place.length]
 
 
 def _checked(checker: "_RobotChecker", tree: syntax.File) -> Checked:

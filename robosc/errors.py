@@ -47,6 +47,7 @@ class Diagnostic:
         location: Place in the text, or None where no text is at hand (a missing file).
         fix: One sentence on how to fix it.
         related: Other places that explain the finding.
+        accepted: Why the text accepts the finding; None where it does not.
     """
 
     severity: Severity
@@ -55,10 +56,12 @@ class Diagnostic:
     location: Location | None
     fix: str
     related: tuple[RelatedPlace, ...] = ()
+    accepted: str | None = None
 
     def __str__(self) -> str:
         place = f"{self.location}: " if self.location else ""
-        return visible(f"{place}{self.severity}: {self.message} [{self.code}]")
+        accepted = "" if self.accepted is None else f" (accepted: {self.accepted})"
+        return visible(f"{place}{self.severity}: {self.message} [{self.code}]{accepted}")
 
     def render(self, bundle: Bundle | None = None) -> str:
         """The finding for a terminal: text, source line, caret, how to fix it, related places."""
@@ -77,6 +80,7 @@ class Diagnostic:
             "fix": self.fix,
             **_place_to_json(self.location),
             "related": [{"message": place.message, **_place_to_json(place.location)} for place in self.related],
+            **({} if self.accepted is None else {"accepted": self.accepted}),
         }
 
 

@@ -6,7 +6,7 @@ everywhere.
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
@@ -22,6 +22,7 @@ from robosc.certification.strategies import verify_strategy
 from robosc.certification.troubles import forbidden_cancel_findings, told_troubles, without_consequences
 from robosc.controller_properties import Controller, check_controller, controller_findings
 from robosc.errors import Diagnostic, InternalError, NodeLimitError, sorted_diagnostics
+from robosc.model.acceptances import AFTER_SYNTHESIS, accept
 from robosc.model.check import check
 from robosc.model.layers import layer_findings, layer_warnings, without_controller_findings
 from robosc.model.places import Places
@@ -76,6 +77,7 @@ class SynthesisOutcome:
         statistics: Figures of the synthesis, or None where there was none.
         reason: Reason why there is no supervisor, in one sentence; empty where there is one.
         explanation: Explanation of what is to blame where no supervisor exists, or goals cannot be reached.
+        accepted: The findings that the text accepts; they are none of `diagnostics`.
     """
 
     status: OutcomeStatus
@@ -84,6 +86,7 @@ class SynthesisOutcome:
     statistics: Statistics | None = None
     reason: str = ""
     explanation: "EmptyExplanation | GoalExplanation | None" = None
+    accepted: tuple[Diagnostic, ...] = ()
 
 
 @dataclass(frozen=True, slots=True)
@@ -95,12 +98,14 @@ class SynthesisProblem:
         places: Source locations of its parts.
         system: All that it does.
         diagnostics: Every finding about it.
+        accepted: The findings that the text accepts.
     """
 
     model: Model
     places: Places
     system: ExecutableSystem
     diagnostics: tuple[Diagnostic, ...]
+    accepted: tuple[Diagnostic, ...] = ()
 
 
 def prepare(bundle: Bundle, deployment: Deployment) -> SynthesisProblem | SynthesisOutcome:
@@ -112,7 +117,9 @@ def prepare(bundle: Bundle, deployment: Deployment) -> SynthesisProblem | Synthe
     checked = check(bundle)
     if checked.model is None or checked.places is None:
         reason = "" if checked.has_errors else "a library has no robot to make a supervisor for"
-        return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, checked.diagnostics, reason=reason)
+        return SynthesisOutcome(
+            OutcomeStatus.MODEL_ERRORS, None, checked.diagnostics, reason=reason, accepted=checked.accepted
+        )
     diagnostics = checked.diagnostics
     if deployment is Deployment.LAYER:
         diagnostics = without_controller_findings(diagnostics)
@@ -124,7 +131,7 @@ def prepare(bundle: Bundle, deployment: Deployment) -> SynthesisProblem | Synthe
     system = ExecutableSystem(checked.model, deployment)
     # A model that synthesis cannot handle is refused here.
     _ = system.automata
-    return SynthesisProblem(checked.model, checked.places, system, diagnostics)
+    return SynthesisProblem(checked.model, checked.places, system, diagnostics, checked.accepted)
 
 
 def make_supervisor(
@@ -161,6 +168,27 @@ def make_supervisor(
     problem = prepare(bundle, deployment)
     if isinstance(problem, SynthesisOutcome):
         return problem
+    outcome = _supervised(
+        bundle, problem, deployment, engine, verify_limit, allow_livelock, should_stop, on_progress
+    )
+    is_judged = outcome.status is OutcomeStatus.SUPERVISOR and deployment is Deployment.CONTROLLER
+    diagnostics, accepted = accept(
+        bundle, outcome.diagnostics, lambda code: is_judged and code in AFTER_SYNTHESIS
+    )
+    return replace(outcome, diagnostics=diagnostics, accepted=sorted_diagnostics((*problem.accepted, *accepted)))
+
+
+def _supervised(
+    bundle: Bundle,
+    problem: SynthesisProblem,
+    deployment: Deployment,
+    engine: str | EngineOptions,
+    verify_limit: int,
+    allow_livelock: bool,
+    should_stop: Callable[[], bool],
+    on_progress: Callable[[Progress], None],
+) -> SynthesisOutcome:
+    """Synthesize the supervisor of a model without errors; the arguments are those of `make_supervisor`."""
     model, places, system = problem.model, problem.places, problem.system.automata
 
     def report(progress: SynthesisProgress) -> None:

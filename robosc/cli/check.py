@@ -30,6 +30,9 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     add_model_arguments(parser)
     parser.add_argument("--strict", action="store_true", help="exit with 1 for warnings too")
     parser.add_argument(
+        "--all", action="store_true", help="also print the findings that the model accepts, with the reasons"
+    )
+    parser.add_argument(
         "--synthesize",
         action="store_true",
         help="also synthesize, to find what only synthesis shows: no supervisor at all, events that can never happen, "
@@ -70,12 +73,14 @@ def run_with(
     except LanguageError as error:
         return report_check(arguments, error.diagnostics, None)
     if not arguments.synthesize:
-        return report_check(arguments, check(bundle), bundle)
+        return report_check(arguments, check(bundle), bundle, accepted=_accepted(arguments, bundle))
     arguments.deployment = arguments.deployment or str(Deployment.CONTROLLER)
     try:
         found = _synthesized(make(bundle))
     except UnsupportedModelError as error:
-        found = _Synthesized(check(bundle), "unsupported model", str(error), has_failed=True)
+        found = _Synthesized(
+            check(bundle), "unsupported model", str(error), has_failed=True, accepted=_accepted(arguments, bundle)
+        )
     return _report_synthesized(arguments, found, bundle)
 
 
@@ -98,6 +103,13 @@ def _checked(bundle: Bundle) -> tuple[Diagnostic, ...]:
     return check(bundle).diagnostics
 
 
+def _accepted(arguments: argparse.Namespace, bundle: Bundle) -> tuple[Diagnostic, ...]:
+    """The findings that a model accepts, if they are to be shown."""
+    from robosc.model.check import check
+
+    return check(bundle).accepted if arguments.all else ()
+
+
 @dataclass(frozen=True, slots=True)
 class _Synthesized:
     """Result of checking and synthesis.
@@ -108,6 +120,7 @@ class _Synthesized:
         reason: Reason why there is no supervisor; empty if there is one.
         has_failed: True if a robot without errors has no supervisor.
         explanation: Explanation of what is to blame if no supervisor exists, or goals cannot be reached.
+        accepted: Findings that the model accepts.
     """
 
     diagnostics: tuple[Diagnostic, ...]
@@ -115,19 +128,23 @@ class _Synthesized:
     reason: str
     has_failed: bool
     explanation: "EmptyExplanation | GoalExplanation | None" = None
+    accepted: tuple[Diagnostic, ...] = ()
 
 
 def _synthesized(outcome: "SynthesisOutcome") -> _Synthesized:
     from robosc.certification import OutcomeStatus
 
     has_failed = outcome.status is OutcomeStatus.EMPTY
-    return _Synthesized(outcome.diagnostics, str(outcome.status), outcome.reason, has_failed, outcome.explanation)
+    return _Synthesized(
+        outcome.diagnostics, str(outcome.status), outcome.reason, has_failed, outcome.explanation, outcome.accepted
+    )
 
 
 def _report_synthesized(arguments: argparse.Namespace, found: _Synthesized, bundle: Bundle) -> ExitCode:
     """Print the findings and what became of the synthesis as asked, and return the exit status."""
     summary = {"status": found.status, **reasons_json(found)}
-    status = report_check(arguments, found.diagnostics, bundle, summary)
+    accepted = (found.accepted or _accepted(arguments, bundle)) if arguments.all else ()
+    status = report_check(arguments, found.diagnostics, bundle, summary, accepted)
     if not arguments.json:
         synth.report_reasons(found, bundle)
     return ExitCode.FAILED if found.has_failed else status

@@ -102,14 +102,27 @@ def report_check(
     diagnostics: tuple[Diagnostic, ...],
     bundle: Bundle | None,
     summary: Mapping[str, object] = MappingProxyType({}),
+    accepted: tuple[Diagnostic, ...] = (),
 ) -> ExitCode:
-    """Print the findings, in JSON with what else is reported, and return the exit status."""
+    """Print the findings, in JSON with what else is reported, and return the exit status.
+
+    Args:
+        arguments: Of the command.
+        diagnostics: The findings.
+        bundle: The texts, or None where they could not be read.
+        summary: What else is reported in JSON.
+        accepted: Findings that the text accepts and that are to be shown, which change no status.
+    """
     if arguments.json:
-        print_json({"file": str(arguments.model), **summary, **diagnostics_json(diagnostics)})
-    elif diagnostics:
-        print_diagnostics(diagnostics, bundle)
+        shown = {"accepted": [item.to_json() for item in accepted]} if accepted else {}
+        print_json({"file": str(arguments.model), **summary, **diagnostics_json(diagnostics), **shown})
     else:
-        sys.stdout.write(f"{arguments.model}: {counts_text(diagnostics)}\n")
+        for item in accepted:
+            sys.stderr.write(f"{item.render(bundle)}\n")
+        if diagnostics:
+            print_diagnostics(diagnostics, bundle)
+        else:
+            sys.stdout.write(f"{arguments.model}: {counts_text(diagnostics)}\n")
     return ExitCode.FAILED if has_errors(diagnostics, strict=arguments.strict) else ExitCode.OK
 
 

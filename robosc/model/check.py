@@ -1,5 +1,6 @@
 """From a bundle to the checked model: every name bound, every type known, every rule of part A applied."""
 
+from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
@@ -7,6 +8,7 @@ from robosc.errors import Diagnostic, InternalError, LanguageError, RelatedPlace
 from robosc.interfaces import Field
 from robosc.interfaces.catalogue import Catalogue
 from robosc.language import Parsed, parse, syntax
+from robosc.model.acceptances import LATER, accept
 from robosc.model.array_lengths import ArrayLengths
 from robosc.model.behaviour import (
     BehaviourBuilder,
@@ -25,7 +27,7 @@ from robosc.model.communications import (
 )
 from robosc.model.constants import Constants
 from robosc.model.expression_checker import ExpressionChecker
-from robosc.model.findings import Bindings, Findings
+from robosc.model.findings import WORD, Bindings, Findings
 from robosc.model.goals import build_goals
 from robosc.model.interfaces import InterfaceChecker
 from robosc.model.limits import check_together
@@ -64,15 +66,17 @@ class Checked:
 
     Attributes:
         model: The robot, or None if there are errors or the main file is a library.
-        diagnostics: Every finding, sorted by place.
+        diagnostics: Every finding that the text does not accept, sorted by place.
         places: Places of the parts of the model, or None without a model.
         bindings: Meanings of the names of the text, as far as it was read.
+        accepted: The findings that it accepts.
     """
 
     model: Model | None
     diagnostics: tuple[Diagnostic, ...]
     places: Places | None = None
     bindings: Bindings = field(default_factory=Bindings)
+    accepted: tuple[Diagnostic, ...] = ()
 
     @property
     def has_errors(self) -> bool:
@@ -123,7 +127,7 @@ def check(bundle: Bundle) -> Checked:
     """Check the main file of a bundle with the libraries that it imports from; never raises for any text."""
     parsed = parse(bundle.main)
     if parsed.tree is None:
-        return Checked(None, parsed.diagnostics)
+        return _broken(parsed, bundle)
     return _checked(_RobotChecker(parsed.tree, bundle, Findings()), parsed.tree)
 
 
@@ -136,23 +140,80 @@ def inspect(bundle: Bundle) -> Inspected:
     if parsed.tree is not None:
         checked = _checked(checker, parsed.tree)
     else:
-        # Suppress follow-on errors: missing syntax causes faults that are none.
         checker.model()
-        checked = Checked(None, parsed.diagnostics, bindings=checker.findings.bindings)
+        checked = _with_sound_parts(parsed, checker)
     return Inspected(
         checked, parsed, checker.parts, checker.scopes, checker.units, checker.communications, checker.fields
     )
 
 
+_FOLLOWING = frozenset(
+    {
+        "empty-model",
+        "enum-default",
+        "links-required",
+        "marked-unreachable",
+        "needless-acceptance",
+        "no-initial-state",
+        "partial-update",
+        "request-leaves-requirement",
+        "result-not-read",
+    }
+)
+"""Codes of what a part may seem to lack because it is not sound, or because another one is not."""
+
+
+def _broken(parsed: Parsed, bundle: Bundle) -> Checked:
+    """Result for a text with errors of its grammar: these, and what is wrong with its sound parts."""
+    if parsed.sound is None:
+        return Checked(None, parsed.diagnostics)
+    checker = _RobotChecker(parsed.sound, bundle, Findings())
+    checker.model()
+    return _with_sound_parts(parsed, checker)
+
+
+def _with_sound_parts(parsed: Parsed, checker: "_RobotChecker") -> Checked:
+    """The same once the sound parts are checked, without the findings that may follow from what is not there."""
+    found = checker.findings.diagnostics
+    broken = {(item.location.file, item.location.line) for item in parsed.diagnostics if item.location is not None}
+    unknown = Counter(_name_of(item, checker.bundle) for item in found if item.code == "unknown-name")
+    words = Counter(WORD.findall(checker.bundle.main.text)) if unknown else Counter[str]()
+    # An unknown name that stands elsewhere in the text, too, may be defined there.
+    defined = {name for name, count in unknown.items() if words[name] != count}
+    own = [
+        item
+        for item in found
+        if item.code not in _FOLLOWING
+        and not (item.code == "unknown-name" and _name_of(item, checker.bundle) in defined)
+        and (item.location is None or (item.location.file, item.location.line) not in broken)
+    ]
+    diagnostics, accepted = accept(
+        checker.bundle, sorted_diagnostics((*parsed.diagnostics, *own)), lambda code: False
+    )
+    return Checked(None, diagnostics, bindings=checker.findings.bindings, accepted=accepted)
+
+
+def _name_of(finding: Diagnostic, bundle: Bundle) -> str:
+    """The text at the place of a finding."""
+    place = finding.location
+    file = None if place is None else bundle.file(place.file)
+    return "" if place is None or file is None else file.line(place.line)[place.column - 1 :][: place.length]
+
+
 def _checked(checker: "_RobotChecker", tree: syntax.File) -> Checked:
     findings = checker.findings
     model = checker.model()
-    diagnostics = sorted_diagnostics(findings.diagnostics)
+    # Where there are errors, other checks may not have been made.
+    diagnostics, accepted = accept(
+        checker.bundle,
+        sorted_diagnostics(findings.diagnostics),
+        lambda code: code not in LATER and not findings.has_errors,
+    )
     if findings.has_errors or tree.is_library:
-        return Checked(None, diagnostics, bindings=findings.bindings)
+        return Checked(None, diagnostics, bindings=findings.bindings, accepted=accepted)
     if model is None:
         raise InternalError("a model without errors could not be built")
-    return Checked(model, diagnostics, checker.places, findings.bindings)
+    return Checked(model, diagnostics, checker.places, findings.bindings, accepted)
 
 
 class _RobotChecker:
@@ -163,7 +224,7 @@ class _RobotChecker:
         self.findings = findings
         self._types = Types(findings)
         self._unit = make_unit(tree, findings)
-        self._bundle = bundle
+        self.bundle = bundle
         self._libraries = Libraries(bundle, self._unit, findings)
         self.parts = parts_of(self._unit, self._libraries, findings)
         self.places = Places(tree.name.location)
@@ -214,7 +275,7 @@ class _RobotChecker:
         limits = tuple(restrictions.limits)
         check_together(limits, self.places.limits, marked, self.findings)
         uses = PropertyUses(communications.values(), behaviours.values(), provides, limits, enums, self._types.objects)
-        interfaces = InterfaceChecker(self._bundle, self._types, self.findings, uses)
+        interfaces = InterfaceChecker(self.bundle, self._types, self.findings, uses)
         fitting = interfaces.check(trees, communications, self._unit)
         self.fields = interfaces.fields
         self._check_data(trees, communications, provides, limits, fitting)

@@ -17,7 +17,8 @@ _MAXIMUM_COMPARED = 64
 MAXIMUM_CHOICES = 6
 """Names that are all listed where none is near."""
 
-_WORD = re.compile("[A-Za-z_][A-Za-z_0-9]*+")
+WORD = re.compile("[A-Za-z_][A-Za-z_0-9]*+")
+"""A word of a text that may be a name."""
 
 
 class Bindings:
@@ -65,7 +66,7 @@ class Findings:
         """
         self.diagnostics.extend(diagnostics)
         self._broken_files.add(file.name)
-        self._broken_words.update(_WORD.findall(file.text))
+        self._broken_words.update(WORD.findall(file.text))
 
     def is_broken(self, file: str) -> bool:
         """Return True if a file is a library with errors of its grammar."""

@@ -30,6 +30,13 @@ def build_requirement(
     findings: Findings,
 ) -> Requirement | None:
     """A requirement of the model, or None where it is broken."""
+    if not tree.communications:
+        findings.warning(
+            "empty-requirement",
+            "this requirement restricts nothing: no communication stands in its braces",
+            tree.location,
+            "Name the communications that it is about, or remove it.",
+        )
     names = list(_restricted(tree, communications, findings))
     expression = checker.condition(tree.expression)
     if expression is None or len(names) < len(tree.communications):

@@ -44,7 +44,7 @@ class ControlledSystem(SolvedProblem):
             unused=self._unused(questions.restrictions),
             together=self._together(questions.rivals),
             unreached=tuple(self._unreached(questions.locations)),
-            unprompted=tuple(self._unprompted(questions.prompted, questions.prompts, questions.silent)),
+            unprompted=tuple(self._unprompted(questions)),
         )
 
     def _possible(self, event: str) -> Any:
@@ -153,27 +153,23 @@ class ControlledSystem(SolvedProblem):
 
     # Prompts
 
-    def _unprompted(
-        self, events: Sequence[str], prompts: frozenset[str], silent: Sequence[str]
-    ) -> Iterator[Unprompted]:
+    def _unprompted(self, questions: Questions) -> Iterator[Unprompted]:
         """Those of some events that can happen again and again while no prompt does.
 
         A loop that was reported names the events that are in it. Beyond `MAXIMUM_EFFORT` none is reported any more.
 
-        Args:
-            events: The events, none of them silent.
-            prompts: The prompts.
-            silent: Events that go before all others wherever they change anything.
+        Silent events go before all others wherever they change anything.
         """
-        if not events:
+        if not questions.prompted:
             return
-        executed = self._executed(silent)
-        inside = [steps for steps in self.problem.steps if steps.event.name not in prompts]
+        executed = self._executed(questions.silent)
+        inside = [steps for steps in self.problem.steps if steps.event.name not in questions.prompts]
         runs = self._runs_from(self._start, self.problem.steps, executed)
         reported: set[str] = set()
-        for event in events:
+        for event in questions.prompted:
             steps = self._steps[event]
-            states = self._again(steps, inside, executed) if event not in reported else self._manager.false
+            start = executed[event] & steps.moving() if event in questions.changing else executed[event]
+            states = self._again(steps, inside, executed, start) if event not in reported else self._manager.false
             run = runs.run_to(states) if states != self._manager.false else None
             if run is None:
                 continue
@@ -188,13 +184,13 @@ class ControlledSystem(SolvedProblem):
         stable = ~self.encoding.any_of(first.values())
         return {name: first[name] if name in first else states & stable for name, states in possible.items()}
 
-    def _again(self, steps: Steps, inside: Sequence[Steps], executed: Mapping[str, Any]) -> Any:
-        """Return the states in which an event can happen, and then again and again, by some events alone.
+    def _again(self, steps: Steps, inside: Sequence[Steps], executed: Mapping[str, Any], start: Any) -> Any:
+        """Return the states, of some in which an event can happen, where it can again and again, by some events alone.
 
         Source: E. A. Emerson and C.-L. Lei, "Efficient model checking in fragments of the propositional mu-calculus",
         LICS 1986, pp. 267-278: the largest set from which the event leads to where the set can be reached.
         """
-        found, narrowed = self._manager.true, executed[steps.event.name]
+        found, narrowed = self._manager.true, start
         while narrowed != found:
             found = leading = narrowed
             wider = self._manager.true

@@ -12,12 +12,16 @@
 - `unreachable-state`: a state that its component never reaches, even if its behaviour alone would reach it.
 - `unprompted-request`: a service or action that an executor, which takes resets and silent steps first, can request
   again and again, with only requests, their replies and silent steps in between, and no message of the robot that would
-  prompt it. It is a note, because a patrol is meant to go on for ever. A loop is reported once, for its request that is
-  declared first. It is only for the controller, because in a layer the existing controller makes the requests. In a
+  prompt it; likewise a message whose request changes the state, as where two of them alternate. It is a note, because a
+  patrol is meant to go on for ever. A loop is reported once, for its service or action that is declared first, or its
+  message where it has none. It is only for the controller, because in a layer the existing controller makes the requests. In a
   large system the search is given up.
 - `competing-requests`: two communications of one kind (topics, services and actions have name spaces of their own)
   with one identifier that can be requested in one state, with a shortest run to such a state. It is only for the
   controller, because in a layer the existing controller chooses.
+
+Where goals are given, a strategy chooses what is requested: neither of the last two is reported, nor a cancel that never
+happens.
 """
 
 from collections import defaultdict, deque
@@ -50,20 +54,26 @@ MAXIMUM_NAMES = 5
 
 def questions_about(model: Model, system: System, deployment: Deployment) -> Questions:
     """Return the questions that `findings` needs answered about the controlled system of a model's automata."""
-    is_controller = deployment is Deployment.CONTROLLER
+    # A strategy requests what its goals need, and no more.
+    is_open = deployment is Deployment.CONTROLLER and not model.has_goals
     return Questions(
         events=tuple(event.name for event in system.events),
         restrictions=(
             *_restrictions(model, system),
             *(Restriction(invariants=(place,)) for place in range(len(model.invariants))),
         ),
-        rivals=_rivals(model) if is_controller else (),
+        rivals=_rivals(model) if is_open else (),
         locations=tuple(
             (component.name, state.name)
             for component in model.components
             for state in (component.behaviour.states if component.behaviour else ())
         ),
-        prompted=tuple(item.event(EventKind.REQUEST) for item in _called(model)) if is_controller else (),
+        prompted=tuple(item.event(EventKind.REQUEST) for item in _repeated(model)) if is_open else (),
+        changing=frozenset(
+            item.event(EventKind.REQUEST)
+            for item in model.communications
+            if item.kind is CommunicationKind.INCOMING_MESSAGE
+        ),
         prompts=frozenset(
             event
             for item in model.communications
@@ -81,6 +91,12 @@ def _called(model: Model) -> tuple[Communication, ...]:
     return tuple(
         item for item in model.communications if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
     )
+
+
+def _repeated(model: Model) -> tuple[Communication, ...]:
+    """The services and actions of a model, then its incoming messages."""
+    messages = (item for item in model.communications if item.kind is CommunicationKind.INCOMING_MESSAGE)
+    return (*_called(model), *messages)
 
 
 def _restrictions(model: Model, system: System) -> Iterator[Restriction]:
@@ -125,7 +141,7 @@ def findings(
     return (
         *_never_requested(model, places, never, told or {}),
         *_never_taken(model, places, never),
-        *(_unused(model, places, number) for number in answers.unused),
+        *(_unused(model, places, number) for number in answers.unused if not _is_empty(model, number)),
         *(_competing(model, places, pair) for pair in answers.together),
         *(_unreached(model, places, component, state) for component, state in answers.unreached),
         *(_unprompted(model, places, item) for item in answers.unprompted),
@@ -178,6 +194,12 @@ _NEVER_TAKEN = (
 )
 
 
+_NEVER_CANCELLED = (
+    "Nothing needs fixing if it is to run to its end; else add a requirement that turns false while it runs, since a "
+    "controller cancels only then."
+)
+
+
 def _never_requested(
     model: Model, places: Places, never: Mapping[str, NeverEnabled], told: Mapping[str, tuple[str, str]]
 ) -> Iterator[Diagnostic]:
@@ -185,10 +207,16 @@ def _never_requested(
     reactions = {item.event for component in model.components for item in _transitions(component)}
     for item in model.communications:
         request, cancel = item.event(EventKind.REQUEST), item.event(EventKind.CANCEL)
-        found = [event for event in item.events if event in never and (event != cancel or event in reactions)]
+        # A strategy cancels nothing for its own sake.
+        is_wanted = cancel in reactions and not model.has_goals
+        found = [event for event in item.events if event in never and (event != cancel or is_wanted)]
         for event in found[:1] if request in never else found:
             what = f"'{item.name}' can never be requested" if event == request else f"'{event}' can never happen"
-            why, fix = told.get(event) or _EXPLANATIONS[never[event].cause, never[event].is_reached]
+            why, fix = _EXPLANATIONS[never[event].cause, never[event].is_reached]
+            if event in told:
+                why, fix = told[event]
+            elif event == cancel and never[event].cause is Cause.REQUIREMENT:
+                fix = _NEVER_CANCELLED
             related = _blamed(model, places, item.name, never[event])
             yield _warning("never-enabled", f"{what}: {why}", places.communications[item.name], fix, related)
 
@@ -230,6 +258,11 @@ def _transitions(component: Component) -> tuple[Transition, ...]:
 
 
 # Requirements that never restrict
+
+
+def _is_empty(model: Model, number: int) -> bool:
+    """Return True if a requirement names no communication, which is a finding of its own."""
+    return number < len(model.requirements) and not model.requirements[number].communications
 
 
 def _unused(model: Model, places: Places, number: int) -> Diagnostic:
@@ -279,11 +312,14 @@ def _shown(events: Sequence[str]) -> str:
 
 
 def _unprompted(model: Model, places: Places, found: Unprompted) -> Diagnostic:
-    first, *others = [item.name for item in _called(model) if item.event(EventKind.REQUEST) in found.loop]
+    looping = [item for item in _repeated(model) if item.event(EventKind.REQUEST) in found.loop]
+    first, *others = [item.name for item in looping]
+    is_message = looping[0].kind is CommunicationKind.INCOMING_MESSAGE
     return Diagnostic(
         Severity.NOTE,
         "unprompted-request",
-        f"'{first}' can be requested again and again with no message of the robot in between, {_after(found.trace)}: "
+        f"'{first}' can be {'sent' if is_message else 'requested'} again and again with no message of the robot in "
+        f"between, {_after(found.trace)}: "
         f"{_shown(found.loop)}, and so on",
         places.communications[first],
         "Require an order message before it, or ignore this note if the robot should repeat it.",

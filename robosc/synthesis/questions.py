@@ -65,6 +65,7 @@ class Questions:
         locations: Automata with one of their locations to check: is it ever reached?
         prompted: Events to check: can they happen again and again without a prompt?
         prompts: The events that are prompts.
+        changing: Those of the events to check that only count where they change the state.
         silent: Events that are taken before all others, as an executor does.
     """
 
@@ -74,6 +75,7 @@ class Questions:
     locations: tuple[tuple[str, str], ...] = ()
     prompted: tuple[str, ...] = ()
     prompts: frozenset[str] = frozenset()
+    changing: frozenset[str] = frozenset()
     silent: tuple[str, ...] = ()
 
 

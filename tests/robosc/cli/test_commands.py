@@ -61,7 +61,7 @@ def test_synth_prints_a_summary_and_writes_the_supervisor(capsys: pytest.Capture
     assert main(["synth", NAVIGATION, "-o", str(target)]) == 0
     output = capsys.readouterr().out
     assert "16: 9 controllable, 7 not" in output
-    assert "784 states, 4792 transitions" in output
+    assert "1044 states, 6504 transitions" in output
     assert "navigate.request    Navigator.failures <= 2" in output
     assert "maximally permissive  passed" in output
     supervisor = decode(target.read_bytes())

@@ -45,6 +45,9 @@ _MOOD_REASONS = {
     Mood.ALWAYS: _TOGETHER,
 }
 
+_STATEMENTS = ("requirement", "goal", "assume")
+"""Statements in which `never` and `always` are words of the language."""
+
 
 class RequirementReader(SentenceParts):
     """Reads sentences that are requirements."""
@@ -61,11 +64,12 @@ class RequirementReader(SentenceParts):
         for at in range(len(words)):
             is_sign = self._texts[begin + at] in SEPARATORS
             link = phrase_at(words, at, PHRASES) if words[at] not in own and not is_sign else None
-            is_own = begin and self._texts[begin - 1] == "requirement" and words[:1] in (["never"], ["always"])
+            is_own = words[0] in ("never", "always") and begin and self._texts[begin - 1] in _STATEMENTS
             mood = phrase_at(words, at, MOODS) if at == 0 and not is_own else None
             if link is not None and (mood is None or link[1] > mood[1]):
                 return begin + at, self._written(begin + at, begin + link[1]), REASONS[link[0]]
-            if mood is not None and mood[0] is not Mood.ALWAYS:
+            is_visit = "then" in own
+            if mood is not None and mood[0] is not Mood.ALWAYS and (not is_visit or mood[0] in (Mood.TRY, Mood.FIRST)):
                 return begin + at, self._written(begin + at, begin + mood[1]), _MOOD_REASONS[mood[0]]
         return None
 

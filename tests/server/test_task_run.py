@@ -642,9 +642,9 @@ def test_definitions_of_ros_types_travel_with_a_bundle_and_common_ones_are_there
         pb.SourceFile(name="own_msgs/types.txt", text="msg/Level\n"),
     ]
     for interfaces, searched, expected in (
-        (definitions, ["."], ["unknown-ros-type", "unknown-field", "unknown-field"]),
-        ([], ["."], ["definition-not-found", "unknown-field"]),
-        ([], [], ["unknown-field"]),
+        (definitions, ["."], ["unknown-ros-type", "needless-property", "needless-property"]),
+        ([], ["."], ["definition-not-found", "needless-property"]),
+        ([], [], ["needless-property"]),
     ):
         bundle = pb.Bundle(main=main, interfaces=interfaces, searched=searched)
         (answer,) = answers(TaskKind.CHECK, pb.CheckRequest(bundle=bundle))

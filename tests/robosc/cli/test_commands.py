@@ -61,7 +61,7 @@ def test_synth_prints_a_summary_and_writes_the_supervisor(capsys: pytest.Capture
     assert main(["synth", NAVIGATION, "-o", str(target)]) == 0
     output = capsys.readouterr().out
     assert "16: 9 controllable, 7 not" in output
-    assert "784 states, 4792 transitions" in output
+    assert "1044 states, 6504 transitions" in output
     assert "navigate.request    Navigator.failures <= 2" in output
     assert "maximally permissive  passed" in output
     supervisor = decode(target.read_bytes())
@@ -214,7 +214,9 @@ def test_the_parser_refuses_with_status_2(capsys: pytest.CaptureFixture[str], ar
         ("ros2", 'incoming message a with identifier: "", type: double', "invalid-identifier"),
         ("ros2", "} interface i use BateryState from sensor_msgs component D {", "unknown-ros-type"),
         ("ros1-cpp", "} interface i use BateryState from sensor_msgs component D {", "unknown-ros-type"),
-        ("ros2", "outgoing message a with type: O links i } datatype object O { percentag: double }"
+        ("ros2", "outgoing message a with type: O links i behaviour { variable v: double"
+         " on response from a do v := value.percentag initial marked state s { } } }"
+         " datatype object O { percentag: double }"
          " interface i use BatteryState from sensor_msgs component D {", "unknown-field"),
         ("ros2", "outgoing message a with type: O links i } datatype object O { K: array(double) }"
          " interface i use CameraInfo from sensor_msgs component D {", "ros1-only"),
@@ -257,7 +259,8 @@ def test_definitions_of_one_s_own_refuse_packages_and_no_model(
     path.parent.mkdir()
     path.write_text(
         f"robot R {{ interface i use {interface} datatype object O {{ level: double }}\n"
-        "component C { outgoing message m with type: O links i } }"
+        "component C { outgoing message m with type: O links i behaviour { variable v: double "
+        "on response from m do v := value.level initial marked state s { } } } }"
     )
     given = [str(path), "-I", str(tmp_path / "power_msgs")]
     assert main(["check", *given]) == 0

@@ -47,7 +47,7 @@ def test_a_right_supervisor_passes(capsys: pytest.CaptureFixture[str], right: st
     lines = capsys.readouterr().out.splitlines()
     assert lines[0] == f"{right}: passed: a right supervisor of {NAVIGATION}"
     assert "  maximally permissive  passed" in lines
-    assert "  controlled            784 states, 4792 transitions (controller)" in lines
+    assert "  controlled            1044 states, 6504 transitions (controller)" in lines
     assert main(["verify", right, NAVIGATION, "-q", "--strict", "--deployment", "controller"]) == 0
     assert capsys.readouterr().out == ""
 
@@ -66,7 +66,7 @@ def test_a_wrong_one_fails_with_a_run_into_the_trouble(capsys: pytest.CaptureFix
 def test_json(capsys: pytest.CaptureFixture[str], right: str, wrong: str) -> None:
     status, document = _json(capsys, right, NAVIGATION)
     assert (status, document["status"], document["faults"], document["remarks"]) == (0, "passed", [], [])
-    assert (document["states"], document["transitions"]) == (784, 4792)
+    assert (document["states"], document["transitions"]) == (1044, 6504)
     assert set(document["checks"].values()) == {"passed"}
     status, document = _json(capsys, wrong, NAVIGATION)
     assert (status, document["status"], document["checks"]["safe"]) == (1, "failed", "failed")

@@ -81,6 +81,9 @@ def may_differ(fault: Diagnostic, text: str, twin: textx_parser.Parsed) -> bool:
     ):
         # Reports are complete for a condition behind its `goto`, a ROS type with its package and a `NOT`.
         return stops is not None and stops > here
+    if "does not fit here: " in fault.message:
+        # A sentence of another language is reported at its strange word, which may stand before or behind.
+        return stops is not None
     if fault.fix == "Write '->' instead of '=>'.":
         # Only what follows shows that it ends a condition.
         return stops is not None and stops > here

@@ -33,11 +33,11 @@ def results() -> Iterator[tuple[object, str]]:
     assert supervisor is not None
     graph, empty, wrong = robosc.explore(model), robosc.load(text=EMPTY), robosc.load(text=FORGED)
     yield result.diagnostics, "<1 warning, 2 notes>"
-    yield supervisor, "<supervisor of Navigation: controller, 784 states, conditions added to 1 event>"
+    yield supervisor, "<supervisor of Navigation: controller, 1044 states, conditions added to 1 event>"
     yield result, f"<Synthesis: {supervisor!r}; 1 warning, 2 notes>"
     yield supervisor.conditions, "<conditions of 9 controllable events; something is added to 1>"
     yield supervisor.conditions["navigate.request"], "<navigate.request needs Navigator.failures <= 2>"
-    yield graph, "<Exploration: <graph of Navigation: 784 states, 4792 transitions>; 1 warning, 2 notes>"
+    yield graph, "<Exploration: <graph of Navigation: 1044 states, 6504 transitions>; 1 warning, 2 notes>"
     yield robosc.generate(supervisor, "python"), "<Generation: <1 generated file>; 1 warning, 2 notes>"
     yield robosc.verify(model, "invariant true"), "<Verification: passed: 1 of 1 properties hold>"
     yield robosc.verify(model, "invariant nonsense"), "<Verification: property errors>"
@@ -111,12 +111,12 @@ def test_a_condition_without_a_formula_is_printed_node_by_node(monkeypatch: pyte
 
 def test_a_supervisor_in_figures(supervisor: robosc.Supervisor) -> None:
     summary = supervisor.summary
-    assert (summary.states, summary.transitions) == (supervisor.states, supervisor.transitions) == (784, 4792)
+    assert (summary.states, summary.transitions) == (supervisor.states, supervisor.transitions) == (1044, 6504)
     assert summary.controllable_events == len(supervisor.conditions) == 9
     assert dict(summary.added)["navigate.request"] == "Navigator.failures <= 2"
     assert str(supervisor) == str(summary) == summary.text.rstrip()
     assert repr(CoreSupervisor(supervisor.model, supervisor.deployment, (), supervisor.certificate)) == (
-        "<supervisor of Navigation: controller, 784 states, conditions added to 0 events>"
+        "<supervisor of Navigation: controller, 1044 states, conditions added to 0 events>"
     )
 
 

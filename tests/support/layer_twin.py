@@ -40,6 +40,7 @@ class TwinGoal:
     is_accepted: bool = False
     asked: float | None = None
     is_cancel_sent: bool = False
+    is_old: bool = False
     is_late: bool = False
     turned_first: bool = False
     was_cancelled_by_caller: bool = False
@@ -199,7 +200,8 @@ class LayerTwin:
 
     @property
     def may_request(self) -> bool:
-        return not self.reasons and self.seen.keys() >= self.sensors.keys()
+        are_all_new = not any(goal.is_old for goal in self.goals)
+        return not self.reasons and self.seen.keys() >= self.sensors.keys() and are_all_new
 
     # Data from the caller.
 
@@ -378,6 +380,7 @@ class LayerTwin:
         self.calls.clear()
         for goal in self.goals:
             goal.runs_in_model = False
+            goal.is_old = True
         self.system.restart()
         with self.guard():
             self.settle()

@@ -85,6 +85,7 @@ class Goal:
     :ivar action: Name of the action.
     :ivar is_running: True if the model's action executes it; no longer after its time was over or
         after a restart.
+    :ivar is_left: True if the model started again without it.
     :ivar is_accepted: True if its server accepted it.
     :ivar is_cancelling: True if its cancel was decided.
     :ivar cancelled_by: The one whose cancel is an event of the model when the goal has ended:
@@ -106,6 +107,7 @@ class Goal:
         'is_accepted',
         'is_cancel_sent',
         'is_cancelling',
+        'is_left',
         'is_overdue',
         'is_running',
         'number',
@@ -117,6 +119,7 @@ class Goal:
         self.number = number
         self.action = action
         self.is_running = True
+        self.is_left = False
         self.is_accepted = False
         self.is_cancelling = False
         self.cancelled_by = ''
@@ -226,3 +229,8 @@ class Goals:
         """Let the model start again without its goals; their end is still awaited."""
         for goal in self._goals.values():
             goal.is_running = False
+            goal.is_left = True
+
+    def left(self) -> Tuple[str, ...]:
+        """Return the actions with a goal from before the model started again, in source order."""
+        return tuple([goal.action for goal in self._goals.values() if goal.is_left])

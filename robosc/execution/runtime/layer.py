@@ -38,6 +38,7 @@ _NOT_ALLOWED = 'not allowed now'
 _NOT_FINITE = 'a NaN or an infinity'
 _NOT_KNOWN = 'no message of the model'
 _STILL_RUNNING = 'its last goal may still be under way'
+_OLD_GOALS = 'goals from before the restart have not ended'
 _AT_REST = {
     Status.NEW: 'not started',
     Status.WAITING: 'waiting for sensors',
@@ -291,7 +292,10 @@ class Layer(Runner):
     def _refusal(self, message: Any) -> Optional[str]:
         """Return the reason why no request, or none with this message, is let through now."""
         if not self._may_request:
-            return _AT_REST[self.status]
+            status = self.status
+            if status is Status.WAITING and self._goals.left():
+                return _OLD_GOALS
+            return _AT_REST[status]
         return None if is_finite(message) else _NOT_FINITE
 
     def _take(self, request: Request, message: Any) -> None:

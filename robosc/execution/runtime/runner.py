@@ -48,7 +48,10 @@ class Status(str, Enum):
     NEW = 'new'
     """Not started."""
     WAITING = 'waiting'
-    """No requests before the first message of every sensor with a maximum age."""
+    """
+    No requests before the first message of every sensor with a maximum age, and before the goals
+    from before a restart have ended: the initial state knows nothing of them.
+    """
     RUNNING = 'running'
     STOPPING = 'stopping'
     """At rest, but some cancelled goals have not ended yet."""
@@ -179,6 +182,11 @@ class Runner:
     def missing_sensors(self) -> Tuple[str, ...]:
         """Return identifiers of the sensors with a maximum age that have not come yet."""
         return self._sensors.unseen()
+
+    @property
+    def old_goals(self) -> Tuple[str, ...]:
+        """Return the actions with a goal from before a restart that has not ended."""
+        return self._goals.left()
 
     @property
     def counters(self) -> Counters:
@@ -331,7 +339,8 @@ class Runner:
         """
         Begin again in the initial state, also after a fault.
 
-        Goals and calls under way belong to the old run.
+        Goals and calls under way belong to the old run. Nothing is requested before these goals
+        have ended.
         """
         self._now_s = self._recorder.began_s = self._clock.monotonic()
         if not self._safe_stop.reasons or self._safe_stop.unsent:
@@ -425,7 +434,9 @@ class Runner:
             self._end_batch()
 
     def _take_end(self, goal_id: int, outcome: str, data: Any) -> None:
-        if self._replies.goal_ended(goal_id, outcome, data):
+        is_event = self._replies.goal_ended(goal_id, outcome, data)
+        self._update_may_request()
+        if is_event:
             self._end_batch()
 
     def _finish(self) -> None:
@@ -433,7 +444,10 @@ class Runner:
 
     def _update_may_request(self) -> None:
         self._may_request = (
-            self._is_started and not self._safe_stop.reasons and self._sensors.are_all_seen()
+            self._is_started
+            and not self._safe_stop.reasons
+            and self._sensors.are_all_seen()
+            and not self._goals.left()
         )
 
     # Safe stop.

@@ -398,6 +398,8 @@ def test_goals_of_the_old_run_are_aborted_at_a_restart_but_must_end() -> None:
     b.executor.stop("broken", is_fault=True)
     assert b.during(b.executor.restart) == end("aborted")
     assert b.goal("drive", "h", GOAL) == REJECTED
+    assert b.goal("wave", "w", GOAL) == [("reject", "wave", "w"), ("blocked", "/wave")]
+    assert b.entries("blocked")[-1]["why"] == "goals from before the restart have not ended"
     assert b.end(1, "cancelled") == []
     assert b.goal("drive", "h", GOAL)[0] == ("goal", "drive", 2, GOAL)
 

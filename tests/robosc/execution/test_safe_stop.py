@@ -218,6 +218,30 @@ def test_a_requirement_that_turns_after_the_stop_makes_no_cancel_of_the_models()
     assert b.events[-2:] == ["go.error", "go.reset"]
 
 
+def test_nothing_is_requested_after_a_restart_before_the_goals_of_the_last_run_have_ended() -> None:
+    b = going()
+    b.executor.on_goal_accepted(1)
+    b.executor.stop("SIGINT")
+    b.executor.restart()
+    b.middleware.sent.clear()
+    # The initial state knows nothing of the goal, which may keep the robot moving.
+    assert b.system.enabled("move.request") and b.system.enabled("go.request")
+    assert b.tick(20) == []
+    assert (b.status(), b.executor.old_goals) == (Status.WAITING, ("go",))
+    b.executor.on_goal_ended(1, "cancelled")
+    assert (b.status(), b.executor.old_goals) == (Status.RUNNING, ())
+    assert b.events[1:] == []
+    assert b.tick() == [("goal", "go", 2, None)]
+
+
+def test_a_goal_that_took_too_long_keeps_nothing_else_from_being_requested() -> None:
+    b = bench(ROBOT, policy="priority", priority=("go",), action_timeout_s=1.0)
+    b.tick()
+    b.executor.on_goal_accepted(1)
+    b.clock.advance(1.0)
+    assert b.tick() == [("cancel", "go", 1), MOVE]
+
+
 def test_a_goal_that_does_not_end_after_a_stop_is_reported() -> None:
     b = going()
     b.executor.on_goal_accepted(1)

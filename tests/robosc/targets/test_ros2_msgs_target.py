@@ -65,13 +65,15 @@ def test_a_node_publishes_its_state_in_the_form_that_is_asked_for(
         "communications": {"calibrate": "idle"},
         "transitions": [3, 1],
     }
-    executor = SimpleNamespace(status=SimpleNamespace(value="stopped"), reasons=("scan is stale",), progress=None)
+    executor = SimpleNamespace(
+        status=SimpleNamespace(value="stopped"), reasons=("scan is stale",), progress=None, cancelling=("navigate",)
+    )
     with imported(generate(example_supervisor(MAZE), "ros2"), tmp_path, f"{PACKAGE}.state_publisher") as generated:
         generated.StatePublisher(node, "/r", form).publish(
-            executor, look, lambda given, progress: f"text of {len(given)}, {progress}"
+            executor, look, lambda given, progress, cancelling: f"text of {len(given)}, {progress}, {cancelling}"
         )
     assert [item.data for item in node.published.get("/r/state", [])] == (
-        [] if form == "typed" else ["text of 3, None"]
+        [] if form == "typed" else ["text of 3, None, ('navigate',)"]
     )
     typed = node.published.get("~/state", [])
     assert len(typed) == (form != "json")
@@ -81,6 +83,7 @@ def test_a_node_publishes_its_state_in_the_form_that_is_asked_for(
         assert (component.name, component.state) == ("Wheels", "driving")
         assert [(item.name, item.value) for item in component.variables] == [("speed", "0.5")]
         assert [(item.name, item.value) for item in message.communications] == [("calibrate", "idle")]
+        assert message.cancelling == ["navigate"]
         assert (message.transitions, message.header.stamp) == ([3, 1], "now")
 
 

@@ -253,7 +253,9 @@ def test_a_wrong_parameter_is_one_clear_error(changes: dict[str, Any], complaint
 def test_the_ends_of_a_range_are_valid_and_what_lies_beyond_is_not() -> None:
     description = describe(example_supervisor(FOLLOWER))
     ranged = [item for item in declarations(("/cmd_vel",)) if item.bounds is not None]
-    assert {item.name for item in ranged} == {"period", "service_timeout", "action_timeout", "server_wait"}
+    assert {item.name for item in ranged} == {
+        *("period", "service_timeout", "action_timeout", "cancel_timeout", "server_wait")
+    }
     for item in ranged:
         assert item.bounds is not None
         low, high = item.bounds
@@ -273,6 +275,7 @@ def test_parameters_become_settings() -> None:
             max_age=["/scan=0.5"],
             service_timeout=3,
             action_timeout=2.5,
+            cancel_timeout=1,
             server_wait=0,
             resample_scans=True,
             topic_prefix="/a/b/",
@@ -284,6 +287,7 @@ def test_parameters_become_settings() -> None:
     assert checked.settings.release_identifiers == ()
     assert checked.settings.max_age_s == {"/scan": 0.5}
     assert (checked.settings.service_timeout_s, checked.settings.action_timeout_s) == (3.0, 2.5)
+    assert checked.settings.cancel_timeout_s == 1.0
     assert (checked.server_wait_s, checked.resample_scans) == (0.0, True)
     assert checked.topic_prefix == "/a/b"
 

@@ -47,6 +47,7 @@ def test_from_the_start_to_a_fault(clock: ManualClock) -> None:
         "unexpected": "0",
         "faults": "0",
         "dropped": "0",
+        "cancelling": "",
         "last decision (us)": "",
     }
     monitor.decided(0.0000123)
@@ -84,6 +85,46 @@ def test_a_sensor_that_was_not_seen_or_is_stale(clock: ManualClock) -> None:
     assert monitor.report()[:2] == (Level.ERROR, "stopped: scan on /scan is stale")
     executor.receive("/scan", {"ranges": [2.0] * 360})
     assert monitor.report()[:2] == (Level.OK, "running")
+
+
+def test_a_cancelled_goal_that_does_not_end_is_an_error_until_it_does(clock: ManualClock) -> None:
+    middleware: Any = Silent()
+    system = InterpretedSystem(example_supervisor("navigation/navigation"))
+    executor = Executor(system, middleware, Settings(cancel_timeout_s=2.0), clock)
+    monitor = HealthMonitor(executor)
+    executor.start()
+    executor.tick()
+    executor.on_reply(1, {"success": True})
+    executor.receive("/person/distance", 3.0)
+    executor.tick()
+    executor.receive("/person/distance", 0.5)
+    assert monitor.report()[:2] == (Level.OK, "running, cancelling navigate")
+    assert monitor.report().values["cancelling"] == "navigate"
+    clock.advance(2.0)
+    executor.watch()
+    overdue = "the goal of navigate has not ended although its cancel was asked for"
+    assert monitor.report()[:2] == (Level.ERROR, overdue)
+    executor.stop("SIGTERM")
+    assert monitor.report()[:2] == (Level.ERROR, f"stopped: SIGTERM; {overdue}")
+    executor.restart()
+    assert monitor.report()[:2] == (Level.ERROR, overdue)
+    executor.on_goal_ended(1, "cancelled")
+    assert monitor.report()[:2] == (Level.OK, "running")
+
+
+def test_goals_from_before_a_restart_are_waited_for(clock: ManualClock) -> None:
+    middleware: Any = Silent()
+    system = InterpretedSystem(example_supervisor("navigation/navigation"))
+    executor = Executor(system, middleware, None, clock)
+    monitor = HealthMonitor(executor)
+    executor.start()
+    executor.tick()
+    executor.on_reply(1, {"success": True})
+    executor.receive("/person/distance", 3.0)
+    executor.tick()
+    executor.stop("SIGTERM")
+    executor.restart()
+    assert monitor.report()[:2] == (Level.WARN, "waiting for the end of goals from before the restart: navigate")
 
 
 def test_an_assumption_that_is_owed_for_too_long_is_a_warning_until_it_is_met(clock: ManualClock) -> None:

@@ -64,6 +64,7 @@ class HealthMonitor:
         counters, status = executor.counters, executor.status
         values = {'status': status.value, 'reason': '; '.join(executor.reasons)}
         values.update((name, str(number)) for name, number in counters._asdict().items())
+        values['cancelling'] = ', '.join(executor.cancelling)
         values['last decision (us)'] = (
             '' if self._decision_us is None else f'{self._decision_us:.1f}'
         )
@@ -80,11 +81,20 @@ class HealthMonitor:
         self, status: Status, counters: Counters, progress: Progress | None
     ) -> tuple[Level, str]:
         reasons = self._executor.reasons
+        overdue = [
+            f'the goal of {action} has not ended although its cancel was asked for'
+            for action in self._executor.overdue_cancels
+        ]
         if reasons:
-            return Level.ERROR, 'stopped: ' + '; '.join(reasons)
+            return Level.ERROR, '; '.join(['stopped: ' + '; '.join(reasons), *overdue])
+        if overdue:
+            return Level.ERROR, '; '.join(overdue)
         if status is Status.NEW:
             names = ', '.join(self.missing_servers)
             return Level.WARN, f'waiting for servers: {names}' if names else 'not started'
+        if status is Status.WAITING and self._executor.old_goals:
+            names = ', '.join(self._executor.old_goals)
+            return Level.WARN, f'waiting for the end of goals from before the restart: {names}'
         if status is Status.WAITING:
             return Level.WARN, 'waiting for the first message of every sensor with a maximum age'
         new = [
@@ -100,4 +110,5 @@ class HealthMonitor:
             warnings.append('since the last report: ' + ', '.join(new))
         if warnings:
             return Level.WARN, '; '.join(warnings)
-        return Level.OK, 'running'
+        cancelling = ', '.join(self._executor.cancelling)
+        return Level.OK, f'running, cancelling {cancelling}' if cancelling else 'running'

@@ -36,6 +36,7 @@ CONTROLLER, LAYER = 'controller', 'layer'
 _SETTING_NAMES = {
     'period': 'period_s',
     'max_age': 'max_age_s',
+    'cancel_timeout': 'cancel_timeout_s',
     'command_timeout': 'command_timeout_s',
     'assumption_timeout': 'assumption_timeout_s',
 }
@@ -208,6 +209,13 @@ def declarations(
             _SECONDS,
         ),
         Parameter(
+            'cancel_timeout',
+            5.0,
+            'Seconds after a cancel was asked for until it is reported, in the event log and as '
+            'an error on /diagnostics, that its goal has not ended; 0 for never.',
+            _SECONDS,
+        ),
+        Parameter(
             'server_wait',
             5.0,
             f'Seconds that the start waits for the servers of all services and actions; the '
@@ -262,6 +270,7 @@ def validate(given: Mapping[str, Any], description: Description) -> Parameters:
         max_age_s=_ages(given),
         service_timeout_s=_seconds(given, 'service_timeout') or None,
         action_timeout_s=_seconds(given, 'action_timeout') or None,
+        cancel_timeout_s=_seconds(given, 'cancel_timeout'),
         on_unknown=given['on_unknown'],
     )
     try:

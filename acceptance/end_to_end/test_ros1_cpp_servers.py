@@ -1,5 +1,6 @@
 """Services and actions of a generated ROS 1 node in C++: every way in which they end, with real servers on rospy."""
 
+import json
 import signal
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -190,10 +191,9 @@ def test_goals_end_in_every_way(ready: Carrier) -> None:
     wait_until(lambda: len(peer.of("goal", "/move_base")) >= 3, "another goal")
     peer.order("accept", "/move_base")
     # An obstacle is in the way: the goal is cancelled.
-    ready.until("carry.cancel", repeat=lambda: ready.scan(0.2))
-    wait_until(lambda: bool(peer.of("cancel", "/move_base")), "the cancel")
+    wait_until(lambda: bool(peer.of("cancel", "/move_base")), "the cancel", repeat=lambda: ready.scan(0.2))
     peer.order("canceled", "/move_base")
-    ready.until("scan.response", 1)
+    ready.until("carry.cancel")
     goals = len(peer.of("goal", "/move_base"))
     ready.until("scan.response", len(ready.events("scan.response")) + 1, repeat=lambda: ready.scan(5.0))
     wait_until(lambda: len(peer.of("goal", "/move_base")) > goals, "a goal with a clear way")
@@ -239,10 +239,55 @@ def test_a_cancel_that_is_ignored_is_a_fault(carrier: Carrier) -> None:
     carrier.peer.order("accept", "/move_base")
     carrier.peer.order("feedback", "/move_base", data={})
     carrier.until("carry.feedback")
-    carrier.until("carry.cancel", repeat=lambda: carrier.scan(0.2))
+    wait_until(lambda: not carrier.node.is_running, "the fault", repeat=lambda: carrier.scan(0.2))
     assert carrier.node.wait() == 1
     assert carrier.node.stderr.splitlines()[-1] == "carrier_controller: the cancel of a running goal was refused"
     assert carrier.peer.of("cancel", "/move_base")
+
+
+@pytest.mark.parametrize(
+    ("end", "event"), [("canceled", "carry.cancel"), ("succeed", "carry.response"), ("abort", "carry.error")]
+)
+def test_a_cancelled_goal_is_executed_until_its_server_ends_it(carrier: Carrier, end: str, event: str) -> None:
+    """It brakes for longer than the parameter allows, and then ends in one way or another."""
+    peer = carrier.peer
+    peer.order("service", "/calibrate", "std_srvs/Trigger")
+    peer.order("action", "/move_base", "move_base_msgs/MoveBase")
+    peer.order("subscribe", "/creep", "geometry_msgs/TwistStamped")
+    peer.order("subscribe", "/diagnostics", "diagnostic_msgs/DiagnosticArray")
+    peer.order("subscribe", "/state", "std_msgs/String")
+    carrier.start("cancel_timeout:=0.5", "publish_state:=true")
+    carrier.calibrate()
+    carrier.drive()
+    peer.order("accept", "/move_base")
+    # Nothing but the goal is in the way of `creep` now.
+    wait_until(lambda: bool(peer.of("cancel", "/move_base")), "the cancel", repeat=lambda: carrier.say("stay"))
+    creeps = len(peer.messages("/creep"))
+
+    def is_error() -> bool:
+        last = [status for message in peer.messages("/diagnostics")[-1:] for status in message["status"]]
+        return any(status["level"] == 2 and "carry" in status["message"] for status in last)
+
+    wait_until(is_error, "an error in the diagnostics")
+    peer.order("feedback", "/move_base", data={})
+    carrier.until("carry.feedback")
+    assert json.loads(peer.messages("/state")[-1]["data"])["cancelling"] == ["carry"]
+    noted = [entry for entry in carrier.entries if entry["kind"] in ("cancelling", "cancel_overdue")]
+    assert [(entry["kind"], entry["action"]) for entry in noted] == [
+        ("cancelling", "carry"),
+        ("cancel_overdue", "carry"),
+    ]
+    assert noted[0]["why"] == "requirement 1 no longer holds"
+    assert noted[1]["asked_s"] >= 0.5
+    assert len(peer.messages("/creep")) == creeps
+    peer.order(end, "/move_base", data={})
+    carrier.until(event)
+    wait_until(lambda: not is_error(), "diagnostics without an error")
+    assert json.loads(peer.messages("/state")[-1]["data"])["cancelling"] == []
+    if end != "succeed":
+        wait_until(lambda: len(peer.messages("/creep")) > creeps, "a command that had to wait")
+    others = {"carry.cancel", "carry.response", "carry.error"} - {event}
+    assert not [name for name in others if carrier.events(name)]
 
 
 def test_a_goal_that_nothing_is_heard_of_is_an_error(carrier: Carrier) -> None:

@@ -175,6 +175,19 @@ def test_random_robots_in_c(tmp_path_factory: pytest.TempPathFactory, seed: int)
     compare(target, scenario, observe(supervisor, scenario))
 
 
+@needs_gcc
+def test_goals_that_are_being_cancelled_in_c(tmp_path: Path) -> None:
+    found: Counter[str] = Counter()
+    for seed in range(8):
+        supervisor = random_travels(seed)
+        for number in range(4):
+            scenario = random_scenario(supervisor, 8 * number + seed, 150)
+            expected = observe(supervisor, scenario)
+            compare(c99_target(supervisor, tmp_path / str(seed)), scenario, expected)
+            found += _ends(expected)
+    assert all(found[end] for end in ENDS_OF_CANCELLED), found
+
+
 def _strategic(first: int) -> Iterator[tuple[Supervisor, Scenario]]:
     """Yield the porter and random robots whose strategies choose requests, with a run of each under its strategy."""
     porter = porter_supervisor()

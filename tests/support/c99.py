@@ -38,6 +38,8 @@ WARNINGS = "-std=c99 -Wall -Wextra -Wpedantic -Werror -Wconversion".split()
 SANITIZERS = "-g -fsanitize=address,undefined -fno-sanitize-recover=all".split()
 _STATUSES = (Status.NEW, Status.WAITING, Status.RUNNING, Status.STOPPING, Status.STOPPED)
 _FAILURES = {"publish": 1, "default": 2, "call": 4, "goal": 8, "cancel": 16, "fits": 32}
+OUTCOMES = ("rejected", "aborted", "cancelled", "lost")
+"""Outcomes of a goal that did not succeed, in the order of generated C."""
 _MASK = 2**64 - 1
 
 
@@ -127,9 +129,19 @@ class Reference:
         identifiers = list(self.layout.received_topics)
         ages = {name: dice.choice([1.5, 4.0]) for name in identifiers if dice.random() < 0.15 and not self.is_calm}
         released = tuple(topic for topic in self.topics if self.is_calm or dice.random() < 0.6)
-        service, action = dice.choice([1.0, 10.0]), dice.choice([None, 2.0])
-        seed = dice.randrange(2**64)
-        return Settings(0.125, policy, priority, seed, every, released, ages, service, action, on_unknown)
+        return Settings(
+            period_s=0.125,
+            policy=policy,
+            priority=priority,
+            seed=dice.randrange(2**64),
+            every=every,
+            release_identifiers=released,
+            max_age_s=ages,
+            service_timeout_s=dice.choice([1.0, 10.0]),
+            action_timeout_s=dice.choice([None, None, 2.0]),
+            cancel_timeout_s=dice.choice([0.0, 0.5, 1.0]),
+            on_unknown=on_unknown,
+        )
 
     def _new(self, settings: Settings) -> Executor:
         executor = Executor(self.system, self, settings, self.clock, self)
@@ -217,6 +229,8 @@ class Reference:
             self.lines.append(f"log {kind} {number}")
         elif kind == "release":
             self.lines.append(f"log release {self.topics.index(entry['identifier'])}")
+        elif kind in ("cancelling", "cancel_overdue"):
+            self.lines.append(" ".join(["log", kind, str(self.numbers[entry["action"]]), *_reason(entry)]))
         else:
             self.lines.append(f"log {kind}")
 
@@ -257,8 +271,15 @@ class Reference:
             self.clock.now_s = now_s
         status = _STATUSES.index(executor.status)
         self.clock.now_s = before
-        words += ["enabled", enabled, "status", str(status), "fault", str(int(executor.is_faulty))]
+        words += ["enabled", enabled, *self._cancelling()]
+        words += ["status", str(status), "fault", str(int(executor.is_faulty))]
         return " ".join([*words, "counters", f"{self.unknown} {counters.unexpected} {counters.faults}"])
+
+    def _cancelling(self) -> list[str]:
+        """Return for each action whether its goal is to be cancelled: 1; 2 if that takes too long."""
+        names = [item.name for item in self.layout.of_kind(CommunicationKind.ACTION)]
+        cancelling, overdue = self.executor.cancelling, self.executor.overdue_cancels
+        return [str((name in cancelling) + (name in overdue)) for name in names]
 
     def _value(self, type_: Type, value: Any) -> str:
         match type_:
@@ -363,8 +384,9 @@ class Reference:
                 self.executor.on_goal_accepted(number)
                 self._note_command(["a", now, number])
             case 2:
-                self.executor.on_goal_ended(number, self.dice.choice(["rejected", "aborted", "cancelled", "lost"]))
-                self._note_command(["e", now, number])
+                outcome = self.dice.choice([*OUTCOMES, "cancelled"])
+                self.executor.on_goal_ended(number, outcome)
+                self._note_command(["e", now, number, OUTCOMES.index(outcome)])
             case _:
                 ended = self.dice.random() < 0.7
                 self.executor.on_cancel_refused(number, ended)
@@ -401,6 +423,13 @@ class Reference:
         raise AssertionError(type_)
 
 
+def _reason(entry: dict[str, Any]) -> list[str]:
+    """Return why a goal is to be cancelled, as the program prints it."""
+    words = entry.get("why", "").replace(",", "").split()
+    numbers = [word for word in words if word.isdigit()]
+    return ["requirement", *numbers] if numbers else words[-1:]
+
+
 def settings_words(layout: Layout, settings: Settings) -> list[object]:
     """The command that makes generated code begin with settings, which are spelled out."""
     numbers = {name: number for number, name in enumerate(layout.communications)}
@@ -410,6 +439,7 @@ def settings_words(layout: Layout, settings: Settings) -> list[object]:
     words += [settings.seed, int(settings.every == "event")]
     words += [("default", "keep", "fault").index(settings.on_unknown)]
     words += [microseconds(settings.service_timeout_s), microseconds(settings.action_timeout_s)]
+    words.append(microseconds(settings.cancel_timeout_s))
     if layout.supervisor.strategy is not None:
         words.append(microseconds(settings.assumption_timeout_s))
     for item in layout.model.communications:

@@ -13,6 +13,7 @@ from robosc.execution.runtime.layer import (
     _NOT_ALLOWED,
     _NOT_FINITE,
     _NOT_KNOWN,
+    _OLD_GOALS,
     _STILL_RUNNING,
     Layer,
 )
@@ -24,7 +25,7 @@ from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
 from robosc.targets.code.c.layer import request_parameters
 from robosc.targets.code.c.layout import Layout
-from support.c99 import Reference, _hex, built, compare, data_words, microseconds
+from support.c99 import OUTCOMES, Reference, _hex, built, compare, data_words, microseconds
 from support.c99_layer_main import CALLBACKS, TOKENS, layer_program
 from support.c99_main import batch_types, events_back
 
@@ -35,6 +36,7 @@ REFUSALS = (
     _STILL_RUNNING,
     _AT_REST[Status.NEW],
     _AT_REST[Status.WAITING],
+    _OLD_GOALS,
     _AT_REST[Status.STOPPED],
     _A_FAULT,
 )
@@ -50,7 +52,7 @@ def layer_settings_words(layout: Layout, settings: Settings) -> list[object]:
     """The command that makes a new layer with some settings."""
     words: list[object] = ["n", ("default", "keep", "fault").index(settings.on_unknown)]
     words += [microseconds(settings.service_timeout_s), microseconds(settings.action_timeout_s)]
-    words.append(microseconds(settings.command_timeout_s))
+    words += [microseconds(settings.cancel_timeout_s), microseconds(settings.command_timeout_s)]
     for item in layout.model.communications:
         is_sensor = item.kind is CommunicationKind.OUTGOING_MESSAGE
         age = settings.max_age_s.get(item.identifier, item.max_age) if is_sensor else None
@@ -91,7 +93,8 @@ class LayerReference(Reference):
             release_identifiers=tuple(topic for topic in self.topics if self.is_calm or dice.random() < 0.6),
             max_age_s=ages,
             service_timeout_s=dice.choice([1.0, 10.0]),
-            action_timeout_s=dice.choice([None, 2.0]),
+            action_timeout_s=dice.choice([None, None, 2.0]),
+            cancel_timeout_s=dice.choice([0.0, 0.5, 1.0]),
             on_unknown=on_unknown,
             command_timeout_s=dice.choice([0.0, 0.5, 1.0]),
         )
@@ -353,10 +356,9 @@ class LayerReference(Reference):
                 self.executor.on_goal_accepted(number)
                 self._note_command(["a", now, number])
             case 2 | 3:
-                own = self.executor._callers.goal(number)
-                is_cancelled = own is not None and own.is_cancelled and self.dice.random() < 0.8
-                outcome = self.dice.choice(["rejected", "aborted", "cancelled", "lost"])
-                self.end(number, "cancelled" if is_cancelled else outcome)
+                own = self.executor._goals.find(number)
+                is_cancelled = own is not None and own.is_cancelling and self.dice.random() < 0.6
+                self.end(number, "cancelled" if is_cancelled else self.dice.choice(OUTCOMES))
             case _:
                 ended = self.dice.random() < 0.7
                 self.executor.on_cancel_refused(number, ended)
@@ -367,7 +369,7 @@ class LayerReference(Reference):
         data = {"code": 1} if self.dice.random() < 0.5 else None
         token = -1 if data is None else self.remember(data)
         self.executor.on_goal_ended(number, outcome, data)
-        self._note_command(["e", microseconds(self.clock.now_s), number, int(outcome == "cancelled"), token])
+        self._note_command(["e", microseconds(self.clock.now_s), number, OUTCOMES.index(outcome), token])
 
 
 compare_layer = partial(compare, reference_of=LayerReference)

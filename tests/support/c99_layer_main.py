@@ -76,6 +76,7 @@ static void do_new(void)
     settings.on_unknown = (@p@_on_unknown_t)read_integer();
     settings.service_timeout_us = read_time();
     settings.action_timeout_us = read_time();
+    settings.cancel_timeout_us = read_time();
     settings.command_timeout_us = read_time();
 """
     + BEGIN
@@ -98,8 +99,8 @@ static void do_new(void)
         case 'a': @p@_goal_accepted(&r, now_us, read_id()); break;
         case 'e': {
             const uint32_t id = read_id();
-            const bool is_cancelled = read_integer() != 0;
-            @p@_goal_ended(&r, now_us, id, is_cancelled, read_message());
+            const @p@_outcome_t outcome = (@p@_outcome_t)read_integer();
+            @p@_goal_ended(&r, now_us, id, outcome, read_message());
             break;
         }
 """

@@ -78,12 +78,40 @@ static void print_text(const char *text)
 static @p@_t r;
 """
 
-LOG = """static void do_log(void *context, @p@_log_t kind, int what)
+LOG = """#if @P@_ACTION_COUNT > 0
+static void print_reason(int action)
+{
+    const @p@_cancelling_t found = @p@_cancelling(&r, (@p@_communication_t)action);
+    switch (found.why) {
+    case @P@_CANCEL_REQUIREMENT: printf(" requirement"); break;
+    case @P@_CANCEL_TIMEOUT: printf(" timeout"); break;
+    case @P@_CANCEL_STOP: printf(" stop"); break;
+    case @P@_CANCEL_NONE: printf(" nothing"); break;
+    default: printf(" caller"); break;
+    }
+    for (int place = 0; place < @P@_REQUIREMENT_COUNT; place++) {
+        if (found.turned[place]) {
+            printf(" %d", place + 1);
+        }
+    }
+}
+#else
+static void print_reason(int action) { (void)action; }
+#endif
+
+static void do_log(void *context, @p@_log_t kind, int what)
 {
     static const char *const kinds[]
-        = {"event", "unexpected", "unknown", "release", "fault", "stop", "resume", "restart", @more@};
+        = {"event", "unexpected", "unknown", "release", "fault", "stop", "resume", "cancelling", "cancel_overdue",
+           "restart", @more@};
     (void)context;
-    if (kind == @P@_LOG_FAULT || kind == @P@_LOG_STOP || kind == @P@_LOG_RESTART || kind == @P@_LOG_RESUME) {
+    if (kind == @P@_LOG_CANCELLING || kind == @P@_LOG_CANCEL_OVERDUE) {
+        printf("log %s %d", kinds[kind], what);
+        if (kind == @P@_LOG_CANCELLING) {
+            print_reason(what);
+        }
+        printf("\\n");
+    } else if (kind == @P@_LOG_FAULT || kind == @P@_LOG_STOP || kind == @P@_LOG_RESTART || kind == @P@_LOG_RESUME) {
         printf("log %s\\n", kinds[kind]);
     } else {
         printf("log %s %d\\n", kinds[kind], what);
@@ -214,6 +242,7 @@ static void do_new(void)
     settings.on_unknown = (@p@_on_unknown_t)read_integer();
     settings.service_timeout_us = read_time();
     settings.action_timeout_us = read_time();
+    settings.cancel_timeout_us = read_time();
 @assumption_timeout@
 """
     + BEGIN
@@ -229,7 +258,11 @@ static void do_new(void)
 #endif
 #if @P@_ACTION_COUNT > 0
         case 'a': @p@_goal_accepted(&r, now_us, read_id()); break;
-        case 'e': @p@_goal_ended(&r, now_us, read_id()); break;
+        case 'e': {
+            const uint32_t id = read_id();
+            @p@_goal_ended(&r, now_us, id, (@p@_outcome_t)read_integer());
+            break;
+        }
 """
     + END
 )
@@ -376,6 +409,9 @@ class _Program:
         lines += [
             f'    printf("%d", (int)@p@_enabled(&r, {layout.events[event]}));' for event in layout.executable.issued
         ]
+        for item in layout.of_kind(CommunicationKind.ACTION):
+            found = f"@p@_cancelling(&r, {layout.communications[item.name]})"
+            lines.append(f'    printf(" %d", ({found}.why != @P@_CANCEL_NONE) + {found}.is_overdue);')
         if layout.supervisor.strategy is not None:
             lines += _PRINT_PROGRESS.splitlines()
         lines.append(

@@ -102,9 +102,11 @@ def replayed(supervisor: Supervisor, entries: Iterable[Entry], settings: Setting
     for entry in entries:
         if entry["kind"] == "stop":
             executor.stop(entry["what"])
-        if entry["kind"] != "event" or entry["controllable"]:
+        if entry["kind"] != "event":
             continue
         name, _, kind = entry["event"].rpartition(".")
+        if entry["controllable"] and kind != EventKind.CANCEL:
+            continue
         item, data = model.communication(name), _with_numbers(entry["data"])
         number = reference.middleware.calls.get(name, 0)
         if item.kind is CommunicationKind.OUTGOING_MESSAGE:
@@ -118,7 +120,7 @@ def replayed(supervisor: Supervisor, entries: Iterable[Entry], settings: Setting
             _answer(executor, kind, number, data)
         else:
             executor.on_goal_accepted(number)
-            outcome = "succeeded" if kind == EventKind.RESPONSE else "aborted"
+            outcome = {EventKind.RESPONSE: "succeeded", EventKind.CANCEL: "cancelled"}.get(EventKind(kind), "aborted")
             executor.on_goal_ended(number, outcome, data if outcome == "succeeded" else None)
     return reference
 
@@ -160,5 +162,5 @@ def comparable(entries: Iterable[Mapping[str, Any]]) -> list[tuple[Any, ...]]:
         elif entry["kind"] in ("unknown", "unexpected"):
             found.append((entry["kind"], entry.get("event")))
         else:
-            found.append((entry["kind"], entry.get("what"), entry.get("identifier")))
+            found.append((entry["kind"], *(entry.get(key) for key in ("what", "identifier", "action", "why"))))
     return found

@@ -258,4 +258,4 @@ def _environment(module: str) -> jinja2.Environment:
         "literal": string_literal,
         "safe_comment": safe,
     }
-    return templates.environment(module, "robosc.targets.cpp", filters=filters)
+    return templates.environment(module, "robosc.targets.cpp", "robosc.targets.ros", filters=filters)

@@ -205,7 +205,8 @@ class _Recorder:
         how = self._dice.choice(_OUTCOMES)
         if how != "succeeded":
             self._executor.on_goal_ended(self._world.open[name].pop(), how, None)
-            return [f"{prefix}_goal_ended(run.robot(), run.now(), {ended});"]
+            outcome = f"{self._layout.upper}_OUTCOME_{how.upper()}"
+            return [f"{prefix}_goal_ended(run.robot(), run.now(), {ended}, {outcome});"]
         lines, data = self._answered(event, ended)
         self._executor.on_goal_ended(self._world.open[name].pop(), how, data)
         return lines

@@ -17,7 +17,7 @@ from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets.code.c.layer import request_parameters
 from robosc.targets.code.c.layout import event_data, make_layout
-from support.c99 import SANITIZERS, compiled, data_words, microseconds, settings_words
+from support.c99 import OUTCOMES, SANITIZERS, compiled, data_words, microseconds, settings_words
 from support.c99_layer import REFUSALS, caller_place, compiled_layer, layer_settings_words
 from support.c99_layer_main import TOKENS
 from support.c99_main import batch_types, events_back
@@ -40,7 +40,7 @@ class C99Target:
 
     name = "c99"
     # Its callback for a log gives kind and event, or the topic of a release.
-    sight = Sight(log_keys=frozenset({"kind", "event", "identifier", "aim", "assumption"}))
+    sight = Sight(log_keys=frozenset({"kind", "event", "identifier", "action", "why", "aim", "assumption"}))
     _commands: Mapping[str, str] = {"tick": "t", "wait": "w", "restart": "R"}
 
     def __init__(self, supervisor: Supervisor, folder: Path, *options: str) -> None:
@@ -92,10 +92,12 @@ class C99Target:
                 return self._order(["f", now, ids.end(name)])
             case "accept":
                 return self._order(["a", now, ids.last(name)])
+            case "refuse":
+                return self._order(["c", now, ids.last(name), int(action.how == "ended")])
             case "end" if action.how == "succeeded":
                 return self._back(f"{name}.response", ids.end(name), action.data)
             case "end":
-                return self._order(["e", now, ids.end(name), *self._ended(action)])
+                return self._order(["e", now, ids.end(name), OUTCOMES.index(action.how), *self._ended()])
         raise ValueError(action.do)
 
     def _back(self, event: str, number: int, data: Any) -> Observation:
@@ -108,8 +110,8 @@ class C99Target:
         """Return the words that hand the program the message itself, which a controller does not need."""
         return []
 
-    def _ended(self, action: Action) -> list[object]:
-        """Return the words for how a goal ended without success, which a controller does not need."""
+    def _ended(self) -> list[object]:
+        """Return the words for the result of a goal without success, which a controller does not need."""
         return []
 
     def _order(self, words: list[object]) -> Observation:
@@ -129,7 +131,7 @@ class C99Target:
         self._errors.seek(0)
         raise AssertionError(f"c99: the program ended: {self._errors.read()[-3000:]}")
 
-    def _entry(self, kind: str, number: str = "-1") -> Entry:
+    def _entry(self, kind: str, number: str = "-1", *more: str) -> Entry:
         if kind == "release":
             return {"kind": kind, "identifier": self._topics[int(number)]}
         description = self._layout.description
@@ -137,6 +139,9 @@ class C99Target:
             return {"kind": kind, "aim": None if int(number) < 0 else description.aims[int(number)].name}
         if kind in ("owed", "met"):
             return {"kind": kind, "assumption": description.assumptions[int(number)].name}
+        if kind in ("cancelling", "cancel_overdue"):
+            named = {"kind": kind, "action": self._communications[int(number)]}
+            return {**named, "why": _why(*more)} if more else named
         if int(number) < 0:
             return {"kind": kind}
         return {"kind": kind, "event": self._events[int(number)]}
@@ -169,6 +174,8 @@ class C99Target:
         }
         assert next(left) == "enabled"
         flags = next(left) if self._layout.executable.issued else ""
+        actions = [item.name for item in self._layout.of_kind(CommunicationKind.ACTION)]
+        cancelled = {name: int(next(left)) for name in actions}
         progress = None
         if self._layout.supervisor.strategy is not None:
             assert next(left) == "progress"
@@ -183,6 +190,7 @@ class C99Target:
             ),
             locations=locations,
             status=(_STATUSES[int(named["status"])].value, named["fault"] == "1"),
+            cancelling=tuple(tuple(name for name in actions if cancelled[name] >= least) for least in (1, 2)),
             progress=progress,
         )
 
@@ -247,7 +255,9 @@ class C99Layer(C99Target):
             if item.kind is CommunicationKind.INCOMING_MESSAGE
         }
         # It publishes on a topic, whichever of the messages there it recognized.
-        self.sight = replace(self.sight, log_keys=frozenset({"kind", "event", "why"}), topics=topics, is_exact=True)
+        self.sight = replace(
+            self.sight, log_keys=frozenset({"kind", "event", "action", "why"}), topics=topics, is_exact=True
+        )
         self._callers = Callers()
         self._messages: list[Any] = []
 
@@ -282,13 +292,13 @@ class C99Layer(C99Target):
         self._messages.append(data)
         return [(len(self._messages) - 1) % TOKENS]
 
-    def _ended(self, action: Action) -> list[object]:
-        return [int(action.how == "cancelled"), -1]
+    def _ended(self) -> list[object]:
+        return [-1]
 
-    def _entry(self, kind: str, number: str = "-1") -> Entry:
+    def _entry(self, kind: str, number: str = "-1", *more: str) -> Entry:
         if kind == "blocked":
             return {"kind": kind, "why": REFUSALS[int(number)]}
-        return super()._entry(kind, number)
+        return super()._entry(kind, number, *more)
 
     def _issued(self, kind: str, words: list[str]) -> list[Issued]:
         if kind == "blocked":
@@ -348,3 +358,11 @@ def _value(type_: Type, word: str) -> Any:
             return values[int(word)]
         case _:
             return int(word)
+
+
+def _why(reason: str, *numbers: str) -> str:
+    """Return why a goal is to be cancelled, as the log of the executor in Python tells it."""
+    if reason != "requirement":
+        return {"caller": "the caller"}.get(reason, reason)
+    one = f"requirement {numbers[0]} no longer holds"
+    return one if len(numbers) == 1 else f"requirements {', '.join(numbers)} no longer hold"

@@ -194,7 +194,8 @@ def test_the_state_reports_where_services_and_actions_are(courier: Supervisor, c
     done = run(courier_node, lines, "period:=0.005", "publish_state:=true")
     assert done.returncode == 0, done.stderr
     states = [states_of(data) for _, name, data in sent(done.stdout) if name == "/state"]
-    assert all(list(state) == ["current", "communications", "transitions", "definition"] for state in states)
+    keys = ["current", "communications", "transitions", "cancelling", "definition"]
+    assert all(list(state) == keys for state in states)
     found = [state["communications"] for state in states]
     called = [item for item in courier.model.communications if item.kind in PLANT_LOCATIONS]
     assert all(list(places) == [item.name for item in called] for places in found)
@@ -226,6 +227,42 @@ def test_a_lost_goal_is_cancelled_when_its_server_is_seen_again(courier_node: Pa
     events = [entry["event"] for entry in entries_of(tmp_path) if entry["kind"] == "event"]
     assert events.count("count.error") == 2
     assert events.count("count.cancel") == 0
+
+
+@pytest.mark.parametrize(
+    ("end", "event"),
+    [("5", "count.cancel"), ("4 0 1 1 2 3", "count.response"), ("6", "count.error"), (None, None)],
+)
+def test_a_cancelled_goal_is_executed_until_its_server_ends_it(
+    courier_node: Path, tmp_path: Path, end: str | None, event: str | None
+) -> None:
+    """It brakes for longer than the parameter allows, and then ends in one way or another, or never."""
+    braking = ["message /allowed 0", "wait cancel /count", "refuse /count 0", *A_WHILE]
+    # It could count again, but for the goal.
+    braking += ["message /allowed 1", "feedback /count 3 5", "message /order/count", *STATES]
+    # The cancel is allowed only where the requirement does not hold.
+    ending = [] if end is None else ["message /allowed 0", f"result /count {end}", *STATES]
+    lines = [*DRIVING, "accept /count", *braking, *ending, END]
+    done = run(courier_node, lines, *WATCHED, "cancel_timeout:=0.5", f"log_folder:={tmp_path}")
+    assert done.returncode == 0, done.stderr
+    entries = entries_of(tmp_path)
+    names = [(entry["kind"], entry["event"] if entry["kind"] == "event" else entry.get("action")) for entry in entries]
+    begin = names.index(("cancelling", "count"))
+    assert entries[begin]["why"] == "requirement 1 no longer holds"
+    overdue = names.index(("cancel_overdue", "count"))
+    assert 0.5 <= entries[overdue]["asked_s"] < 60.0
+    fed = names.index(("event", "count.feedback"))
+    assert begin < overdue < fed
+    ends = [
+        name for kind, name in names if kind == "event" and name in ("count.cancel", "count.response", "count.error")
+    ]
+    assert ends == ([] if event is None else [event])
+    assert names.count(("event", "count.request")) == 1
+    states = [states_of(data) for _, name, data in sent(done.stdout) if name == "/state"]
+    found = [cancelling for cancelling, _ in groupby(state["cancelling"] for state in states)]
+    assert found == ([[], ["count"]] if event is None else [[], ["count"], []])
+    reports = [data for _, name, data in sent(done.stdout, but="") if name == "/diagnostics"]
+    assert any("the goal of count has not ended although its cancel was asked for" in data for data in reports)
 
 
 @pytest.mark.parametrize(("code", "status"), [(1, 1), (2, 0)])

@@ -21,7 +21,7 @@ static void print_log(void *context, {prefix}_log_t kind, int what)
         const char *name = {prefix}_event_name(what);
         printf("event %s\\n", name != NULL ? name : "?");
     }}
-}}
+{cancelling}}}
 
 int main(void)
 {{
@@ -72,6 +72,15 @@ static bool print_{kind}(void *context, uint32_t id, const {prefix}_request_t *r
 }}
 """
 
+_CANCELLING = """\
+    if (kind == {upper}_LOG_CANCELLING) {{
+        printf("cancelling %s\\n", {prefix}_communication_name(what));
+    }}
+    if (kind == {upper}_LOG_CANCEL_OVERDUE) {{
+        printf("%s has not ended in time after its cancel\\n", {prefix}_communication_name(what));
+    }}
+"""
+
 CANCEL = """\
 static bool print_cancel(void *context, {prefix}_communication_t action, uint32_t id)
 {{
@@ -114,6 +123,7 @@ def main_text(
         settings: Assignments to the callbacks.
         period: Statements of one period.
     """
+    has_goals = bool(layout.of_kind(CommunicationKind.ACTION))
     text = _MAIN.format(
         prefix=layout.prefix,
         upper=layout.upper,
@@ -122,5 +132,6 @@ def main_text(
         callbacks="\n".join(item.format(prefix=layout.prefix) for item in callbacks),
         settings="".join(f"\n    callbacks.{item};" for item in settings).lstrip("\n"),
         period=period,
+        cancelling=_CANCELLING.format(prefix=layout.prefix, upper=layout.upper) if has_goals else "",
     )
     return f"{head(layout.supervisor)}\n{text}"

@@ -35,7 +35,7 @@ The supervisor of {name} and its executor as portable C99: no allocation, no rec
 4. On a signal `{prefix}_stop`; after a fault or a stop `{prefix}_restart`.
 
 All of it from one thread, with the time in microseconds since any moment. A callback must not call the executor.
-
+{goals}
 ```c
 {functions}
 ```
@@ -51,6 +51,14 @@ of enums (`{upper}_VALUE_...`), and the variables as they are. `{prefix}_enabled
 - Received data is typed: what does not fit is for the caller to give as unknown.
 """
 
+
+_GOALS = """
+A cancel is an event of the model when it has happened, not when `cancel_goal` is called. Until then the goal is
+executing, whatever its server does meanwhile. Its end goes to `..._succeeded_...`, or to `{prefix}_goal_ended`, which
+takes how it ended (`{upper}_OUTCOME_...`): say CANCELLED only when what it moved is at rest. `{prefix}_cancelling`
+returns whether the goal of an action is being cancelled, why, and since when. One that has not ended within
+`cancel_timeout_us` is reported to `log`, and goes on executing.
+"""
 
 _LAYER_README = """\
 # {name} in C: supervision layer
@@ -71,7 +79,7 @@ now, else held back. `{prefix}.h` documents the functions, `main.c` shows them a
 5. On a signal `{prefix}_stop`; after a fault or a stop `{prefix}_restart`.
 
 All of it from one thread, with the time in microseconds since any moment. A callback must not call the layer.
-
+{goals}
 ```c
 {functions}
 ```
@@ -103,11 +111,13 @@ def readme_file(unit: Unit) -> str:
             functions.append(reply_head(layout, item.event(EventKind.FEEDBACK)))
         if item.kind in (CommunicationKind.ACTION, CommunicationKind.SERVICE):
             functions.append(reply_head(layout, item.event(EventKind.RESPONSE)))
+    has_goals = bool(layout.of_kind(CommunicationKind.ACTION))
     return (_LAYER_README if layout.is_layer else _README).format(
         name=layout.model.name,
         prefix=layout.prefix,
         build=_BUILD.format(prefix=layout.prefix),
         requirements=requirements_chapter(layout.model),
         upper=layout.upper,
+        goals=_GOALS.format(prefix=layout.prefix, upper=layout.upper) if has_goals else "",
         functions="\n".join(f"{function};" for function in functions) or "/* Nothing comes. */",
     )

@@ -439,7 +439,12 @@ private:
                     unseen.emplace_back(item.identifier);
                 }
             }
-            middleware_.info("waiting for the first message of " + joined(unseen));
+            if (!unseen.empty()) {
+                middleware_.info("waiting for the first message of " + joined(unseen));
+            }
+            if (!cancelled(Stage::OLD).empty()) {
+                middleware_.info("waiting for the end of the last goal of " + joined(cancelled(Stage::OLD)));
+            }
         } else if (status == ROBOT_STATUS_RUNNING && reported_status_ <= ROBOT_STATUS_WAITING) {
             middleware_.info("running");
         }
@@ -516,6 +521,7 @@ private:
             {"unexpected", std::to_string(robot_.counters.unexpected)},
             {"faults", std::to_string(robot_.counters.faults)},
             {"dropped", std::to_string(dropped)},
+            {"cancelling", joined(cancelled(Stage::ASKED))},
             {"last decision (us)", decision_us_ < 0.0 ? "" : number_text(decision_us_)},
         };
         std::string news;
@@ -538,18 +544,27 @@ private:
         }
 #endif
         result.level = Level::WARN;
-        if (!reasons_.empty()) {
+        std::string faults = reasons_.empty() ? "" : "stopped: " + reasons_text();
+        for (const std::string& action : cancelled(Stage::OVERDUE)) {
+            faults += (faults.empty() ? "" : "; ") + ("the goal of " + action)
+                + " has not ended although its cancel was asked for";
+        }
+        const Texts old_goals = cancelled(Stage::OLD);
+        if (!faults.empty()) {
             result.level = Level::FAULTY;
-            result.message = "stopped: " + reasons_text();
+            result.message = faults;
         } else if (status == ROBOT_STATUS_NEW) {
             result.message = missing_.empty() ? "not started" : "waiting for servers: " + joined(missing_);
+        } else if (status == ROBOT_STATUS_WAITING && !old_goals.empty()) {
+            result.message = "waiting for the end of goals from before the restart: " + joined(old_goals);
         } else if (status == ROBOT_STATUS_WAITING) {
             result.message = "waiting for the first message of every sensor with a maximum age";
         } else if (!news.empty()) {
             result.message = news;
         } else {
+            const Texts cancelling = cancelled(Stage::ASKED);
             result.level = Level::OK;
-            result.message = "running";
+            result.message = cancelling.empty() ? "running" : "running, cancelling " + joined(cancelling);
         }
         return result;
     }
@@ -564,6 +579,7 @@ private:
         }
         model::visit_state(robot_.state, report);
         model::visit_communications(robot_.state, report);
+        report.cancelling = cancelled(Stage::ASKED);
         report.transitions = std::exchange(transitions_, {});
 #if ROBOT_HAS_STRATEGY
         report.progress = progress_json();
@@ -834,6 +850,19 @@ private:
             reasons_.clear();
             write("restart", "what", "");
             return;
+#if ROBOT_ACTION_COUNT > 0
+        case ROBOT_LOG_CANCELLING:
+            put_json(rest, cancel_text(what));
+            write_cancel("cancelling", what, "why", rest);
+            return;
+        case ROBOT_LOG_CANCEL_OVERDUE:
+            write_cancel("cancel_overdue", what, "asked_s", number_text(asked_s(what)));
+            return;
+#else
+        case ROBOT_LOG_CANCELLING:
+        case ROBOT_LOG_CANCEL_OVERDUE:
+            return;
+#endif
 #if ROBOT_HAS_STRATEGY
         case ROBOT_LOG_REACHED:
             write_item("reached", "aim", what);
@@ -851,6 +880,68 @@ private:
         }
     }
 
+    /* Stages of the cancel of a goal that has not ended. */
+    enum class Stage { ASKED, OVERDUE, OLD };
+
+    /* The actions whose goal is to be cancelled and has reached a stage. */
+    Texts cancelled([[maybe_unused]] Stage stage) const
+    {
+        Texts found;
+#if ROBOT_ACTION_COUNT > 0
+        for (int action = 0; action < ROBOT_COMMUNICATION_COUNT; action++) {
+            const robot_cancelling_t cancel = cancelling(action);
+            if (stage == Stage::ASKED         ? cancel.why != ROBOT_CANCEL_NONE
+                    : stage == Stage::OVERDUE ? cancel.is_overdue
+                                              : cancel.is_old) {
+                found.emplace_back(robot_communication_name(action));
+            }
+        }
+#endif
+        return found;
+    }
+
+#if ROBOT_ACTION_COUNT > 0
+    robot_cancelling_t cancelling(int action) const
+    {
+        return robot_cancelling(&robot_, static_cast<robot_communication_t>(action));
+    }
+
+    /* Seconds since the cancel of an action's goal was decided. */
+    double asked_s(int action) const
+    {
+        return static_cast<double>((robot_.now_us - cancelling(action).asked_us + 500) / 1000) / 1000.0;
+    }
+
+    /* Why an action's goal is to be cancelled. */
+    std::string cancel_text(int action) const
+    {
+        const robot_cancelling_t found = cancelling(action);
+        if (found.why == ROBOT_CANCEL_TIMEOUT) {
+            return "timeout";
+        }
+        if (found.why == ROBOT_CANCEL_STOP) {
+            return "stop";
+        }
+        std::string numbers;
+        for (int place = 0; place < ROBOT_REQUIREMENT_COUNT; place++) {
+            if (found.turned[place]) {
+                numbers += (numbers.empty() ? "" : ", ") + std::to_string(place + 1);
+            }
+        }
+        const bool is_one = numbers.find(',') == std::string::npos;
+        return is_one ? "requirement " + numbers + " no longer holds" : "requirements " + numbers + " no longer hold";
+    }
+
+    void write_cancel(const char* kind, int action, const char* key, const std::string& json)
+    {
+        if (log_.is_active()) {
+            std::string line = head(kind) + ",\"action\":";
+            put_json(line, robot_communication_name(action));
+            log_.write(line + ",\"" + key + "\":" + json + "}");
+        }
+    }
+
+#endif
 #if ROBOT_HAS_STRATEGY
     /* Write what has happened to an aim or an assumption; -1: there is none. */
     void write_item(const char* kind, const char* key, int number)

@@ -290,6 +290,7 @@ inline Parameters validated(const Given& given, const std::vector<Nameable>& req
         = static_cast<robot_on_unknown_t>(detail::choice(given, "on_unknown", {"default", "keep", "fault"}));
     settings.service_timeout_us = detail::timeout(given, "service_timeout");
     settings.action_timeout_us = detail::timeout(given, "action_timeout");
+    settings.cancel_timeout_us = detail::microseconds(detail::seconds_or_zero(given, "cancel_timeout"));
 #if ROBOT_HAS_STRATEGY
     settings.assumption_timeout_us = detail::microseconds(detail::seconds_or_zero(given, "assumption_timeout"));
 #endif

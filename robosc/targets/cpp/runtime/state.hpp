@@ -45,6 +45,8 @@ struct StateReport {
     std::vector<ComponentState> components;
     /* Location of each service and action. */
     std::vector<NamedValue> communications;
+    /* Actions whose goal is to be cancelled and has not ended. */
+    std::vector<std::string> cancelling;
     /* Numbers of the transitions taken since the last report. */
     std::vector<int> transitions;
     /* Progress of the strategy as JSON; empty: there is none. */
@@ -136,6 +138,13 @@ inline std::string state_json(const StateReport& report)
         text += between + std::to_string(number);
         between = ", ";
     }
+    text += "], \"cancelling\": [";
+    between = "";
+    for (const std::string& name : report.cancelling) {
+        text += between;
+        put_json(text, name);
+        between = ", ";
+    }
     text += "], ";
     if (!report.progress.empty()) {
         text += "\"progress\": " + report.progress + ", ";
@@ -164,6 +173,7 @@ void fill_state(Message& message, const StateReport& report)
         fill_values(message.components[k].variables, report.components[k].variables);
     }
     fill_values(message.communications, report.communications);
+    message.cancelling = report.cancelling;
     message.transitions.assign(report.transitions.begin(), report.transitions.end());
 }
 

@@ -49,7 +49,7 @@ public:
     void send(std::uint32_t id, const Goal& goal)
     {
         if (!is_ready()) {
-            end(id);
+            end(id, ROBOT_OUTCOME_LOST);
             return;
         }
         Handle handle = client_->sendGoal(
@@ -150,7 +150,7 @@ private:
     {
         abandoned_.emplace(id, goals_.at(id).handle);
         goals_.erase(id);
-        end(id);
+        end(id, ROBOT_OUTCOME_LOST);
     }
 
     void changed(std::uint32_t id, Handle handle)
@@ -187,12 +187,19 @@ private:
     void finish(std::uint32_t id, Handle& handle)
     {
         const auto result = handle.getResult();
-        if (handle.getTerminalState() == actionlib::TerminalState::SUCCEEDED && result) {
+        const actionlib::TerminalState state = handle.getTerminalState();
+        if (state == actionlib::TerminalState::SUCCEEDED && result) {
             shared_->report([take = result_, id, result](robot_t* robot, std::uint64_t now, Notes& notes) {
                 take(robot, now, id, *result, notes);
             });
+        } else if (state == actionlib::TerminalState::PREEMPTED || state == actionlib::TerminalState::RECALLED) {
+            end(id, ROBOT_OUTCOME_CANCELLED);
+        } else if (state == actionlib::TerminalState::REJECTED) {
+            end(id, ROBOT_OUTCOME_REJECTED);
+        } else if (state == actionlib::TerminalState::LOST) {
+            end(id, ROBOT_OUTCOME_LOST);
         } else {
-            end(id);
+            end(id, ROBOT_OUTCOME_ABORTED);
         }
     }
 
@@ -220,9 +227,11 @@ private:
             [id](robot_t* robot, std::uint64_t now, Notes&) { robot_cancel_refused(robot, now, id, false); });
     }
 
-    void end(std::uint32_t id)
+    void end(std::uint32_t id, robot_outcome_t outcome)
     {
-        shared_->report([id](robot_t* robot, std::uint64_t now, Notes&) { robot_goal_ended(robot, now, id); });
+        shared_->report([id, outcome](robot_t* robot, std::uint64_t now, Notes&) {
+            robot_goal_ended(robot, now, id, outcome);
+        });
     }
 
     std::shared_ptr<Shared> shared_;

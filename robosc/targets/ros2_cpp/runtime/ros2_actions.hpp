@@ -48,7 +48,7 @@ public:
     void send(std::uint32_t id, const Goal& goal)
     {
         if (!is_ready()) {
-            end(id);
+            end(id, ROBOT_OUTCOME_LOST);
             return;
         }
         typename Client::SendGoalOptions options;
@@ -79,7 +79,7 @@ public:
                 if (goal.handle) {
                     abandoned_[id] = Abandoned{goal.handle, false};
                 }
-                end(id);
+                end(id, ROBOT_OUTCOME_LOST);
             }
         }
         look_for_server();
@@ -95,7 +95,7 @@ public:
         }
         for (const std::uint32_t id : std::exchange(gone_, {})) {
             goals_.erase(id);
-            end(id);
+            end(id, ROBOT_OUTCOME_LOST);
         }
     }
 
@@ -165,7 +165,7 @@ private:
         if (!handle) {
             if (found != goals_.end()) {
                 goals_.erase(found);
-                end(id);
+                end(id, ROBOT_OUTCOME_REJECTED);
             }
         } else if (found == goals_.end()) {
             /* Its server counted as lost: nobody would ever stop this one. */
@@ -196,7 +196,8 @@ private:
                 take(robot, now, id, *data, notes);
             });
         } else {
-            end(id);
+            const bool is_cancelled = result.code == rclcpp_action::ResultCode::CANCELED;
+            end(id, is_cancelled ? ROBOT_OUTCOME_CANCELLED : ROBOT_OUTCOME_ABORTED);
         }
     }
 
@@ -223,9 +224,11 @@ private:
         });
     }
 
-    void end(std::uint32_t id)
+    void end(std::uint32_t id, robot_outcome_t outcome)
     {
-        reports_.add([id](robot_t* robot, std::uint64_t now, Notes&) { robot_goal_ended(robot, now, id); });
+        reports_.add([id, outcome](robot_t* robot, std::uint64_t now, Notes&) {
+            robot_goal_ended(robot, now, id, outcome);
+        });
     }
 
     NodeTime& time_;

@@ -17,7 +17,7 @@ from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from support.c99 import GCC, SANITIZERS, WARNINGS, lonely_end, replay
-from support.c99_layer import LayerReference, compare_layer, compiled_layer
+from support.c99_layer import REFUSALS, LayerReference, compare_layer, compiled_layer
 from support.c99_main import events_back
 from support.effort import examples
 from support.execution import supervisor_of
@@ -135,11 +135,11 @@ def test_an_example_behaves_as_the_reference(name: str, tmp_path: Path) -> None:
 @needs_gcc
 def test_requests_of_every_kind_behave_as_the_reference(everything: Path) -> None:
     seen = _kinds(compare_layer(layer_of(EVERYTHING), everything, Random(7), 50, 150))
-    for what in "release stop resume restart fault unknown unexpected event blocked".split():
+    for what in "release stop resume restart fault unknown unexpected event cancelling cancel_overdue blocked".split():
         assert seen[f"log {what}"] > 5, seen
     for what in "publish default call goal cancel pass blocked answer no_answer accept reject feedback end".split():
         assert seen[what] > 5, seen
-    for reason in range(8):
+    for reason in range(len(REFUSALS)):
         assert seen[f"log blocked {reason}"] > 2, (reason, seen)
     for end in range(3):
         assert seen[f"end {end}"] > 5, (end, seen)
@@ -276,10 +276,10 @@ def test_a_goal_ends_for_its_caller_when_it_turns_against_its_requirements(tmp_p
     world.accept(1)
     world.accept(2)
     world.reference.end(1, "aborted")
-    # `one` has failed, so `two` is cancelled: aborted for its caller at once, and open until its server ends it.
+    # `one` has failed, so `two` is cancelled: aborted for its caller as soon as its server ends it.
     world.goal("two", 9)
     world.reference.end(2, "cancelled")
-    assert world.lines()[4:] == ["cancel 1 2", "end 0 7 1 -1", "end 1 8 1 -1", "reject 1 9", f"blocked {_TWO} 3"]
+    assert world.lines()[4:] == ["cancel 1 2", "end 0 7 1 -1", "reject 1 9", f"blocked {_TWO} 3", "end 1 8 1 -1"]
     world.check(tmp_path)
 
 
@@ -337,7 +337,7 @@ def test_what_a_request_makes_false_does_not_release_its_own_earlier_message(tmp
 
 
 @needs_gcc
-def test_a_cancel_is_forwarded_whatever_goes_wrong_and_before_the_robot_rests(tmp_path: Path) -> None:
+def test_a_cancel_is_forwarded_and_what_goes_wrong_at_its_end_stops_the_robot(tmp_path: Path) -> None:
     text = """
         robot Endless {
         interface dock use Dock from some_msgs
@@ -357,8 +357,14 @@ def test_a_cancel_is_forwarded_whatever_goes_wrong_and_before_the_robot_rests(tm
     world.goal("one", 7)
     world.accept(1)
     world.cancel("one", 7)
+    assert not world.executor.is_faulty
+    world.reference.end(1, "cancelled")
     assert world.executor.is_faulty
-    assert world.lines()[2:] == ["cancel 0 1", "default 0"]
+    assert [line.split()[:4] for line in world.lines()[2:]] == [
+        ["cancel", "0", "1"],
+        ["end", "0", "7", "2"],
+        ["default", "0"],
+    ]
     world.check(tmp_path)
 
 

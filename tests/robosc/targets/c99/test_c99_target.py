@@ -28,7 +28,7 @@ from robosc.supervisor import Supervisor
 from robosc.targets import GenerateOptions, generate
 from robosc.targets.code.c.naming import member_name, prefix_for
 from robosc.targets.code.c.text import safe, string_literal
-from support.c99 import GCC, SANITIZERS, WARNINGS, Reference, compare, compiled, lonely_end, replay
+from support.c99 import GCC, OUTCOMES, SANITIZERS, WARNINGS, Reference, compare, compiled, lonely_end, replay
 from support.c99_main import events_back
 from support.execution import supervisor_of, unsupervised
 from support.generated import example_supervisor
@@ -155,7 +155,7 @@ robot Everything {
 def test_requests_of_every_kind_behave_as_the_reference(tmp_path: Path) -> None:
     supervisor = unsupervised(EVERYTHING)
     seen = Counter(_kinds(compare(supervisor, compiled(supervisor, tmp_path), Random(7), 60, 150)))
-    for what in "release stop resume restart fault unknown unexpected event".split():
+    for what in "release stop resume restart fault unknown unexpected event cancelling cancel_overdue".split():
         assert seen[f"log {what}"] > 5, seen
     for what in ("publish", "default", "call", "goal", "cancel"):
         assert seen[what] > 5, seen
@@ -203,9 +203,14 @@ def test_goals_that_time_out_together_are_not_ended_twice(tmp_path: Path) -> Non
     executor.watch()
     reference.command("w")
     assert sum(line.startswith("goal") for line in reference.lines) == 2
+    for number, name in list(reference.goals.items()):
+        assert reference.lines.count(f"log event {reference.events[f'{name}.error']}") == 1
+        executor.on_goal_ended(number, "cancelled")
+        reference.command("e", number, OUTCOMES.index("cancelled"))
     assert executor.counters.unexpected == 0
-    cancelled = f"log event {reference.events['two.cancel']}"
-    assert cancelled in reference.lines
+    # What ended the first one has turned against the other.
+    assert f"log cancelling {reference.numbers['two']} requirement 1" in reference.lines
+    assert f"log cancelling {reference.numbers['one']} timeout" in reference.lines
     replay(compiled(supervisor, tmp_path), reference.commands, reference.lines)
 
 
@@ -229,15 +234,117 @@ def test_the_end_of_a_goal_is_taken_whatever_else_is_over(outcome: str, tmp_path
     if outcome == "succeeded":
         reference.command("b", events_back(reference.layout).index("one.response"), number)
     else:
-        reference.command("e", number)
+        reference.command("e", number, OUTCOMES.index(outcome))
     assert executor.is_faulty
     reference.let_fail()
     executor.restart()
     reference.command("R")
+    # Nothing is requested before the other goal has ended, of which the model knows nothing now.
+    executor.tick()
+    reference.command("t")
+    (other,) = (number for number, name in reference.goals.items() if name == "two")
+    executor.on_goal_ended(other, "cancelled")
+    reference.command("e", other, OUTCOMES.index("cancelled"))
     for _ in range(4):
         executor.tick()
         reference.command("t")
     assert [name for number_, name in sorted(reference.goals.items())].count("one") == 2
+    replay(compiled(supervisor, tmp_path), reference.commands, reference.lines)
+
+
+CARRIER = """
+robot Carrier {
+    interface go use Go from some_msgs
+    component Base {
+        action drive with request: none, response: none, feedback: none links go
+        behaviour {
+            initial marked state still { on request to drive goto driving }
+            marked state driving {
+                on response from drive goto still
+                on error from drive goto lost
+                on cancel to drive goto still
+            }
+            marked state lost { }
+        }
+    }
+    component Arm {
+        incoming message lift with type: none
+        outgoing message person with type: none
+        behaviour {
+            initial marked state clear {
+                on response from person goto blocked
+                on request to lift
+            }
+            marked state blocked { on request to lift }
+        }
+    }
+    requirement drive needs Arm.clear
+    requirement lift needs Base.still and Arm.blocked
+}
+"""
+
+
+@needs_gcc
+@pytest.mark.parametrize("is_accepted", [True, False], ids=["accepted", "not-accepted"])
+@pytest.mark.parametrize(
+    ("outcome", "event"),
+    [
+        ("cancelled", "drive.cancel"),
+        ("succeeded", "drive.response"),
+        *((outcome, "drive.error") for outcome in ("rejected", "aborted", "lost")),
+        (None, None),
+    ],
+)
+def test_a_cancelled_goal_is_executed_until_its_end_is_known(
+    outcome: str | None, event: str | None, is_accepted: bool, tmp_path: Path
+) -> None:
+    """A goal of a server that brakes, succeeds or fails in spite of the cancel, or never answers."""
+    supervisor = unsupervised(CARRIER)
+    reference = Reference(supervisor, Random(1), Settings(cancel_timeout_s=2.0))
+    executor = reference.executor
+
+    def ticks(seconds: float) -> None:
+        reference.clock.advance(seconds)
+        executor.tick()
+        reference.command("t")
+
+    def lines(*beginnings: str) -> list[str]:
+        return [line for line in reference.lines if line.startswith(beginnings)]
+
+    executor.start()
+    reference.command("s")
+    ticks(0.0)
+    if is_accepted:
+        executor.on_goal_accepted(1)
+        reference.command("a", 1)
+    executor.receive("person", None)
+    reference.command("m", 0)
+    drive = reference.numbers["drive"]
+    assert lines("log cancelling") == [f"log cancelling {drive} requirement 1"]
+    assert len(lines("cancel")) == is_accepted
+    if not is_accepted:
+        executor.on_goal_accepted(1)
+        reference.command("a", 1)
+        assert len(lines("cancel")) == 1
+    for _ in range(3):
+        ticks(1.0)
+        executor.on_feedback(1, None)
+        reference.command("b", events_back(reference.layout).index("drive.feedback"), 1)
+    # The wheels may turn.
+    assert not lines("publish")
+    assert lines("log cancel_overdue") == [f"log cancel_overdue {drive}"]
+    assert executor.overdue_cancels == ("drive",)
+    if outcome is not None:
+        executor.on_goal_ended(1, outcome)
+        words = ("b", events_back(reference.layout).index("drive.response"), 1)
+        reference.command(*(words if outcome == "succeeded" else ("e", 1, OUTCOMES.index(outcome))))
+        ticks(1.0)
+        assert bool(lines("publish")) is (outcome in ("cancelled", "succeeded"))
+    ends = [f"drive.{kind}" for kind in ("response", "error", "cancel")]
+    happened = [end for end in ends if f"log event {reference.events[end]}" in reference.lines]
+    assert happened == ([] if event is None else [event])
+    assert executor.cancelling == (() if event else ("drive",))
+    assert executor.counters.unexpected == 0
     replay(compiled(supervisor, tmp_path), reference.commands, reference.lines)
 
 

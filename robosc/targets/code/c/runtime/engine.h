@@ -20,7 +20,7 @@ typedef enum {
 #endif
 typedef enum {
     ROBOT_STATUS_NEW,      /* not started */
-    ROBOT_STATUS_WAITING,  /* for the first message of every sensor with a maximum age */
+    ROBOT_STATUS_WAITING,  /* for the first message of every sensor with a maximum age, or the end of old goals */
     ROBOT_STATUS_RUNNING,
     ROBOT_STATUS_STOPPING, /* at rest; the ends of cancelled goals are awaited */
     ROBOT_STATUS_STOPPED
@@ -45,6 +45,8 @@ typedef enum {
     ROBOT_LOG_FAULT,      /* the robot_fault_t */
     ROBOT_LOG_STOP,       /* the communication that is stale, or -1: `robot_stop` */
     ROBOT_LOG_RESUME,     /* the communication that is fresh again */
+    ROBOT_LOG_CANCELLING, /* the action whose goal is to be cancelled; `robot_cancelling` says why */
+    ROBOT_LOG_CANCEL_OVERDUE, /* the action whose goal has not ended within `cancel_timeout_us` since then */
 #if ROBOT_IS_LAYER
     ROBOT_LOG_RESTART,    /* -1 */
     ROBOT_LOG_BLOCKED     /* something of the caller was held back: the robot_refusal_t */
@@ -60,6 +62,27 @@ typedef enum {
 #endif
 #endif
 } robot_log_t;
+#if ROBOT_ACTION_COUNT > 0
+
+/* Outcome of a goal that did not succeed. */
+typedef enum {
+    ROBOT_OUTCOME_REJECTED,  /* refused by its server */
+    ROBOT_OUTCOME_ABORTED,   /* given up by its server */
+    ROBOT_OUTCOME_CANCELLED, /* by whomever; what it moved is at rest */
+    ROBOT_OUTCOME_LOST       /* its server is gone */
+} robot_outcome_t;
+
+/* Reason why a goal is to be cancelled. */
+typedef enum {
+    ROBOT_CANCEL_NONE,        /* it is not */
+    ROBOT_CANCEL_REQUIREMENT, /* a requirement that held since its request no longer holds */
+#if ROBOT_IS_LAYER
+    ROBOT_CANCEL_CALLER,      /* its caller cancels it */
+#endif
+    ROBOT_CANCEL_TIMEOUT,     /* it has not ended within `action_timeout_us` */
+    ROBOT_CANCEL_STOP         /* the robot comes to rest */
+} robot_cancel_t;
+#endif
 #if ROBOT_IS_LAYER
 
 /* Reason why something that the caller sent was held back. */
@@ -70,6 +93,7 @@ typedef enum {
     ROBOT_REFUSAL_STILL_RUNNING, /* the last goal of the action may still be under way */
     ROBOT_REFUSAL_NOT_STARTED,
     ROBOT_REFUSAL_WAITING,       /* for the first message of a sensor with a maximum age */
+    ROBOT_REFUSAL_OLD_GOALS,     /* from before a restart, which have not ended */
     ROBOT_REFUSAL_STOPPED,
     ROBOT_REFUSAL_FAULT          /* something failed while it was let through; the robot is stopped now */
 } robot_refusal_t;
@@ -102,6 +126,7 @@ typedef struct {
     robot_on_unknown_t on_unknown;
     uint64_t service_timeout_us;                          /* UINT64_MAX: none */
     uint64_t action_timeout_us;                           /* UINT64_MAX: none */
+    uint64_t cancel_timeout_us;                           /* 0: never; a cancel that takes longer is reported */
 #if ROBOT_IS_LAYER
     uint64_t command_timeout_us;                          /* 0: never; what acts is released if nothing came */
 #endif
@@ -210,12 +235,22 @@ typedef struct {
 #endif
 } robot_call_t;
 
+#if ROBOT_ACTION_COUNT > 0
+/* Cancel of a goal whose end is not known. */
+typedef struct {
+    robot_cancel_t why;
+    bool turned[ROBOT_REQUIREMENT_COUNT + 1]; /* the requirements that no longer hold, in source order */
+    bool is_overdue;                          /* it has been reported that the goal did not end in time */
+    bool is_old;                              /* it is of before a restart: nothing is requested until it has ended */
+    uint64_t asked_us;                        /* time since which it is to be cancelled */
+} robot_cancelling_t;
+
 typedef struct {
     bool is_open;
     bool is_running;
     bool is_accepted;
-    bool is_cancel_wanted;
     bool is_cancel_sent;
+    robot_cancelling_t cancelling;
     uint32_t id;
     uint64_t deadline_us;
 #if ROBOT_IS_LAYER
@@ -225,6 +260,7 @@ typedef struct {
 #endif
     bool held[ROBOT_REQUIREMENT_COUNT + 1];
 } robot_goal_t;
+#endif
 
 typedef struct {
     uint64_t seen_us;
@@ -287,7 +323,9 @@ typedef struct {
     robot_acting_t acting[ROBOT_TOPIC_COUNT + 1];
     bool is_restless[ROBOT_TOPIC_COUNT + 1];
     robot_call_t calls[ROBOT_SERVICE_COUNT + 1];
-    robot_goal_t goals[ROBOT_ACTION_COUNT + 1];
+#if ROBOT_ACTION_COUNT > 0
+    robot_goal_t goals[ROBOT_ACTION_COUNT];
+#endif
     robot_sensor_t sensors[ROBOT_SENSOR_COUNT + 1];
 } robot_t;
 
@@ -318,7 +356,7 @@ void robot_watch(robot_t *r, uint64_t now_us);
 /* Come to rest until `robot_restart`; is_fault says whether the program found a fault. */
 void robot_stop(robot_t *r, uint64_t now_us, bool is_fault);
 
-/* Begin again in the initial state, whatever happened. */
+/* Begin again in the initial state, whatever happened. Nothing is requested before the goals under way have ended. */
 void robot_restart(robot_t *r, uint64_t now_us);
 
 robot_status_t robot_status(const robot_t *r, uint64_t now_us);
@@ -364,14 +402,16 @@ void robot_call_failed(robot_t *r, uint64_t now_us, uint32_t id);
 void robot_goal_accepted(robot_t *r, uint64_t now_us, uint32_t id);
 
 #if ROBOT_IS_LAYER
-/* A goal ended without success: it was rejected, aborted or cancelled, or its server is lost.
-   `is_cancelled`: its server says that it was cancelled. `message`: its result for the caller, or NULL. */
-void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id, bool is_cancelled, const void *message);
+/* A goal ended without success. `message`: its result for the caller, or NULL. */
+void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id, robot_outcome_t outcome, const void *message);
 #else
-/* A goal ended without a result: rejected, aborted, cancelled, or its server is lost. */
-void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id);
+/* A goal ended without success. One that is being cancelled is executed until its end is reported. */
+void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id, robot_outcome_t outcome);
 #endif
 
 /* A cancel was refused: whether because the goal had ended already. */
 void robot_cancel_refused(robot_t *r, uint64_t now_us, uint32_t id, bool has_ended);
+
+/* Cancel of the goal of an action that is under way, if there is one and it is to be cancelled. */
+robot_cancelling_t robot_cancelling(const robot_t *r, robot_communication_t action);
 #endif

@@ -11,6 +11,17 @@ static bool is_any_goal_open(const robot_t *r)
     return false;
 }
 
+/* Return true if a goal from before a restart has not ended. */
+static bool is_any_goal_old(const robot_t *r)
+{
+    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
+        if (r->goals[action].is_open && r->goals[action].cancelling.is_old) {
+            return true;
+        }
+    }
+    return false;
+}
+
 /* Begin a goal with a new id and the requirements that hold now. */
 static robot_goal_t *open_goal(robot_t *r, int action)
 {
@@ -18,20 +29,44 @@ static robot_goal_t *open_goal(robot_t *r, int action)
     goal->is_open = true;
     goal->is_running = true;
     goal->is_accepted = false;
-    goal->is_cancel_wanted = false;
     goal->is_cancel_sent = false;
+    memset(&goal->cancelling, 0, sizeof goal->cancelling);
     goal->id = r->next_goal_id++;
     goal->deadline_us = later(r->now_us, r->settings.action_timeout_us);
     get_requirements(&r->state, action, goal->held);
     return goal;
 }
 
-/* Ask for the cancel of a goal, once; before its acceptance it is only remembered. */
+/* Return the time at which the cancel of a goal is overdue. */
+static uint64_t overdue_from(const robot_t *r, int action)
+{
+    const robot_goal_t *goal = &r->goals[action];
+    const bool is_awaited = goal->is_open && goal->cancelling.why != ROBOT_CANCEL_NONE && !goal->cancelling.is_overdue;
+    return is_awaited && r->settings.cancel_timeout_us > 0
+               ? later(goal->cancelling.asked_us, r->settings.cancel_timeout_us)
+               : FOREVER;
+}
+
+/* Note that a goal is to be cancelled, once. For the model it is executed until its end is known. */
+static void begin_cancel(robot_t *r, int action, robot_cancel_t why)
+{
+    robot_goal_t *goal = &r->goals[action];
+    if (goal->is_open && goal->cancelling.why == ROBOT_CANCEL_NONE) {
+        goal->cancelling.why = why;
+        goal->cancelling.asked_us = r->now_us;
+        if (overdue_from(r, action) < r->deadline_us) {
+            r->deadline_us = overdue_from(r, action);
+        }
+        note(r, ROBOT_LOG_CANCELLING, (int)ACTIONS[action].communication);
+    }
+}
+
+/* Ask the server to cancel a goal that is to be cancelled, once; before its acceptance that waits. */
 static bool request_cancel(robot_t *r, int action)
 {
     robot_goal_t *goal = &r->goals[action];
-    goal->is_cancel_wanted = true;
-    if (goal->is_accepted && !goal->is_cancel_sent) {
+    const bool is_wanted = goal->is_open && goal->cancelling.why != ROBOT_CANCEL_NONE;
+    if (is_wanted && goal->is_accepted && !goal->is_cancel_sent) {
         if (!r->callbacks.cancel_goal(r->callbacks.context, ACTIONS[action].communication, goal->id)) {
             return fault(r, ROBOT_FAULT_CALLBACK);
         }
@@ -54,23 +89,39 @@ static void observe_goals(robot_t *r)
     }
 }
 
-/* A goal to be cancelled now: a requirement that held since its request no longer does, and cancel is allowed. */
-static int goal_to_cancel(const robot_t *r)
+/* Cancel the goals that turn against their requirements: one that held since the request no longer does. It is asked
+   whether or not the supervisor allows the event now: the goal's error can always follow. */
+static bool cancel_turned(robot_t *r)
 {
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        const robot_goal_t *goal = &r->goals[action];
-        if (goal->is_open && goal->is_running) {
+        robot_goal_t *goal = &r->goals[action];
+        if (goal->is_open && goal->is_running && goal->cancelling.why == ROBOT_CANCEL_NONE) {
             bool holds[ROBOT_REQUIREMENT_COUNT + 1] = {false};
             bool has_turned = false;
             get_requirements(&r->state, action, holds);
             for (int place = 0; place < ACTIONS[action].requirements; place++) {
-                has_turned = has_turned || (goal->held[place] && !holds[place]);
+                goal->cancelling.turned[place] = goal->held[place] && !holds[place];
+                has_turned = has_turned || goal->cancelling.turned[place];
             }
-            if (has_turned && is_allowed(&r->state, ACTIONS[action].cancel)) {
-                return action;
+            if (has_turned) {
+                begin_cancel(r, action, ROBOT_CANCEL_REQUIREMENT);
+                if (!request_cancel(r, action)) {
+                    return false;
+                }
             }
         }
     }
-    return -1;
+    return true;
+}
+
+/* Report each goal that has not ended in time since it is to be cancelled, once. It goes on being executed. */
+static void report_overdue(robot_t *r)
+{
+    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
+        if (r->now_us >= overdue_from(r, action)) {
+            r->goals[action].cancelling.is_overdue = true;
+            note(r, ROBOT_LOG_CANCEL_OVERDUE, (int)ACTIONS[action].communication);
+        }
+    }
 }
 #endif

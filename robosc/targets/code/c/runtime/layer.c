@@ -19,7 +19,15 @@ static int refusal(const robot_t *r, const robot_sent_t *sent_by_caller)
     if (is_at_rest(r)) {
         return (int)ROBOT_REFUSAL_STOPPED;
     }
-    return r->is_started ? (int)ROBOT_REFUSAL_WAITING : (int)ROBOT_REFUSAL_NOT_STARTED;
+    if (!r->is_started) {
+        return (int)ROBOT_REFUSAL_NOT_STARTED;
+    }
+#if ROBOT_ACTION_COUNT > 0
+    if (is_any_goal_old(r)) {
+        return (int)ROBOT_REFUSAL_OLD_GOALS;
+    }
+#endif
+    return (int)ROBOT_REFUSAL_WAITING;
 }
 
 /* The request happens, if it is allowed, with all that follows from it, before its message goes out. */
@@ -191,15 +199,10 @@ static void cancel_for_caller(robot_t *r, uint64_t now_us, int action, uint32_t 
     look_at_clock(r, now_us);
     if (!goal->is_awaited || goal->caller_id != caller_id) {
         unexpected(r, ROBOT_NO_EVENT);
-    } else if (!goal->is_cancelled_by_caller) {
-        bool is_well = true;
+    } else {
         goal->is_cancelled_by_caller = true;
-        goal->is_running = false;
-        happened(r, ACTIONS[action].cancel, take_event(&r->state, ACTIONS[action].cancel));
-        is_well = end_batch(r);
-        /* The cancel is forwarded, whatever went wrong. */
-        is_well = request_cancel(r, action) && is_well;
-        guard(r, is_well);
+        begin_cancel(r, action, ROBOT_CANCEL_CALLER);
+        guard(r, request_cancel(r, action));
     }
     finish(r);
 }

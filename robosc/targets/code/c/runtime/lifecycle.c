@@ -10,6 +10,7 @@ static bool begin(robot_t *r)
 #if ROBOT_ACTION_COUNT > 0
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
         r->goals[action].is_running = false;
+        r->goals[action].cancelling.is_old = true;
     }
 #endif
 #if ROBOT_SENSOR_COUNT > 0
@@ -56,6 +57,7 @@ void robot_default_settings(robot_settings_t *settings)
     settings->on_unknown = ROBOT_ON_UNKNOWN_DEFAULT;
     settings->service_timeout_us = UINT64_C(10000000);
     settings->action_timeout_us = FOREVER;
+    settings->cancel_timeout_us = UINT64_C(5000000);
 #if ROBOT_IS_LAYER
     settings->command_timeout_us = UINT64_C(1000000);
 #endif
@@ -270,3 +272,17 @@ robot_fault_t robot_fault(const robot_t *r)
 {
     return r->fault;
 }
+#if ROBOT_ACTION_COUNT > 0
+
+robot_cancelling_t robot_cancelling(const robot_t *r, robot_communication_t action)
+{
+    robot_cancelling_t found;
+    memset(&found, 0, sizeof found);
+    for (int place = 0; place < ROBOT_ACTION_COUNT; place++) {
+        if (ACTIONS[place].communication == action && r->goals[place].is_open) {
+            found = r->goals[place].cancelling;
+        }
+    }
+    return found;
+}
+#endif

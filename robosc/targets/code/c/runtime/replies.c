@@ -102,6 +102,7 @@ static bool has_goal(robot_t *r, int action, uint32_t id)
 static void close_goal(robot_t *r, int action)
 {
     r->goals[action].is_open = false;
+    update_may_request(r);
 #if !ROBOT_IS_LAYER
     r->is_enabled_known = false;
 #endif
@@ -114,19 +115,33 @@ void robot_goal_accepted(robot_t *r, uint64_t now_us, uint32_t id)
     action = find_goal(r, id);
     if (action >= 0) {
         r->goals[action].is_accepted = true;
-        if (r->goals[action].is_cancel_wanted) {
-            guard(r, request_cancel(r, action));
-        }
+        guard(r, request_cancel(r, action));
     }
 #if ROBOT_IS_LAYER
     finish(r);
 #endif
 }
 
+/* Take the event of a goal that did not succeed. It is `cancel` if the model's own cancel ended it and the supervisor
+   allows that now, else `error`: somebody else cancelled it, or the robot came to rest. */
+static bool take_end(robot_t *r, int action, robot_outcome_t outcome)
+{
+    const robot_goal_t *goal = &r->goals[action];
+    bool is_own = goal->cancelling.why == ROBOT_CANCEL_REQUIREMENT;
 #if ROBOT_IS_LAYER
-void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id, bool is_cancelled, const void *message)
+    is_own = is_own || goal->is_cancelled_by_caller;
+#endif
+    if (outcome == ROBOT_OUTCOME_CANCELLED && is_own && is_allowed(&r->state, ACTIONS[action].cancel)) {
+        return take(r, ACTIONS[action].cancel);
+    }
+    happened(r, ACTIONS[action].error, take_event(&r->state, ACTIONS[action].error));
+    return true;
+}
+
+#if ROBOT_IS_LAYER
+void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id, robot_outcome_t outcome, const void *message)
 #else
-void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id)
+void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id, robot_outcome_t outcome)
 #endif
 {
     int action = -1;
@@ -138,15 +153,15 @@ void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id)
 #endif
         close_goal(r, action);
         if (r->goals[action].is_running) {
-            happened(r, ACTIONS[action].error, take_event(&r->state, ACTIONS[action].error));
 #if ROBOT_IS_LAYER
-            is_well = end_batch(r);
+            is_well = take_end(r, action, outcome) && end_batch(r);
 #else
-            guard(r, end_batch(r));
+            guard(r, take_end(r, action, outcome) && end_batch(r));
 #endif
         }
 #if ROBOT_IS_LAYER
-        end_for_caller(r, action, is_cancelled ? ROBOT_END_CANCELLED : ROBOT_END_ABORTED, message);
+        end_for_caller(r, action, outcome == ROBOT_OUTCOME_CANCELLED ? ROBOT_END_CANCELLED : ROBOT_END_ABORTED,
+                       message);
         guard(r, is_well);
 #endif
     }

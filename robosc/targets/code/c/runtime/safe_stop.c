@@ -14,7 +14,7 @@ static unsigned retry(robot_t *r)
 #endif
 #if ROBOT_ACTION_COUNT > 0
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        if (r->goals[action].is_open && r->goals[action].is_cancel_wanted && !request_cancel(r, action)) {
+        if (!request_cancel(r, action)) {
             failures++;
         }
     }
@@ -44,7 +44,7 @@ static void come_to_rest(robot_t *r)
 #endif
 #if ROBOT_ACTION_COUNT > 0
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        r->goals[action].is_cancel_wanted = true;
+        begin_cancel(r, action, ROBOT_CANCEL_STOP);
     }
 #endif
     failures = retry(r);

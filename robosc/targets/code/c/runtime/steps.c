@@ -1,18 +1,14 @@
 /* Silent steps. */
 
-/* Take one silent step, cancels first, then resets, then taus; `has_stepped` says whether there was one. */
+/* Take one silent step, resets first, then taus; `has_stepped` says whether there was one. Goals that turn against
+   their requirements are cancelled before it. */
 static bool silent_step(robot_t *r, bool *has_stepped)
 {
     (void)r;
     *has_stepped = true;
 #if ROBOT_ACTION_COUNT > 0
-    const int action = goal_to_cancel(r);
-    if (action >= 0) {
-        if (!take(r, ACTIONS[action].cancel)) {
-            return false;
-        }
-        r->goals[action].is_running = false;
-        return request_cancel(r, action);
+    if (!cancel_turned(r)) {
+        return false;
     }
 #endif
 #if ROBOT_SILENT_COUNT > 0

@@ -3,6 +3,9 @@
 static void update_may_request(robot_t *r)
 {
     r->may_request = r->is_started && !is_at_rest(r);
+#if ROBOT_ACTION_COUNT > 0
+    r->may_request = r->may_request && !is_any_goal_old(r);
+#endif
 #if ROBOT_SENSOR_COUNT > 0
     for (int sensor = 0; sensor < ROBOT_SENSOR_COUNT; sensor++) {
         if (r->settings.max_age_us[SENSORS[sensor]] > 0 && !r->sensors[sensor].was_seen) {
@@ -26,6 +29,9 @@ static uint64_t next_deadline(const robot_t *r)
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
         if (r->goals[action].is_open && r->goals[action].is_running && r->goals[action].deadline_us < next) {
             next = r->goals[action].deadline_us;
+        }
+        if (overdue_from(r, action) < next) {
+            next = overdue_from(r, action);
         }
     }
 #endif
@@ -89,15 +95,19 @@ static bool expire(robot_t *r)
         is_expired[action] = goal->is_open && goal->is_running && r->now_us >= goal->deadline_us;
     }
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        /* The end of another goal may have led to a cancellation of this one. */
-        if (is_expired[action] && r->goals[action].is_running) {
+        if (is_expired[action]) {
             r->goals[action].is_running = false;
             happened(r, ACTIONS[action].error, take_event(&r->state, ACTIONS[action].error));
-            if (!settle(r, -1, &has_changed) || !request_cancel(r, action)) {
+            if (!settle(r, -1, &has_changed)) {
+                return false;
+            }
+            begin_cancel(r, action, ROBOT_CANCEL_TIMEOUT);
+            if (!request_cancel(r, action)) {
                 return false;
             }
         }
     }
+    report_overdue(r);
 #endif
     (void)r;
     return true;

@@ -19,7 +19,12 @@ from robosc.certification.certify import certify
 from robosc.certification.goals import GoalExplanation, goal_explanation
 from robosc.certification.progress import Progress
 from robosc.certification.strategies import verify_strategy
-from robosc.certification.troubles import forbidden_cancel_findings, told_troubles, without_consequences
+from robosc.certification.troubles import (
+    Synthesized,
+    forbidden_cancel_findings,
+    told_troubles,
+    without_consequences,
+)
 from robosc.controller_properties import Controller, check_controller, controller_findings
 from robosc.errors import Diagnostic, InternalError, NodeLimitError, sorted_diagnostics
 from robosc.model.acceptances import AFTER_SYNTHESIS, accept
@@ -235,16 +240,15 @@ def _supervised(
         should_stop=should_stop,
     )
     words = explanations.ModelWords(model, places, system, deployment)
-    told = told_troubles(words, result.answers, engine=engine, should_stop=should_stop)
+    made = Synthesized(words, result.statistics, engine, should_stop)
+    told = told_troubles(made, result.answers)
     answers = without_consequences(model, result.answers, {item.event for item in properties.forbidden})
     diagnostics = sorted_diagnostics(
         (
             *problem.diagnostics,
             *findings(model, places, answers, told),
             *controller_findings(model, system, places, properties, allow_livelock=allow_livelock),
-            *forbidden_cancel_findings(
-                words, properties, engine=engine, only_shown=only_shown, should_stop=should_stop
-            ),
+            *forbidden_cancel_findings(made, properties, only_shown=only_shown),
         )
     )
     if properties.livelock is not None and not allow_livelock:

@@ -5,12 +5,12 @@ Each says what would follow, and how to mend the model, as far as a mend was tri
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 from robosc import explanation as explanations
 from robosc.automata.compile import State
 from robosc.automata.state import Subject, subjects
-from robosc.certification.mending import working_mend
+from robosc.certification.mending import Mend, working_mend
 from robosc.controller_properties import ForbiddenCancel, Properties
 from robosc.controller_properties.findings import MAXIMUM_EVENTS
 from robosc.errors import Diagnostic, NodeLimitError, RelatedPlace, Severity
@@ -18,7 +18,7 @@ from robosc.explanation import ModelWords, Trouble
 from robosc.model.places import Places
 from robosc.model.structure import EventKind, Model
 from robosc.source import Location
-from robosc.synthesis import Answers, Cause, EngineOptions
+from robosc.synthesis import Answers, Cause, EngineOptions, Statistics
 
 CODE = "forbidden-cancel"
 """Code of the finding about a cancel that must be possible."""
@@ -26,21 +26,51 @@ CODE = "forbidden-cancel"
 MAXIMUM_EVENTS_TOLD = 5
 """Events that can never happen of which it is worked out what would follow them."""
 
+MAXIMUM_NODES = 50_000
+"""Nodes of a synthesis beyond which none of these searches, each of which takes some more of them, is begun."""
 
-def told_troubles(
-    words: ModelWords,
-    answers: Answers,
-    *,
-    engine: str | EngineOptions,
-    should_stop: Callable[[], bool],
-) -> dict[str, tuple[str, str]]:
+
+@dataclass(frozen=True, slots=True)
+class Synthesized:
+    """A synthesis whose result is told.
+
+    Attributes:
+        words: The automata of the model, with the words for them.
+        statistics: Figures of the synthesis.
+        engine: Engine for decision diagrams.
+        should_stop: Function called before each step; once true, the work ends.
+    """
+
+    words: ModelWords
+    statistics: Statistics
+    engine: str | EngineOptions
+    should_stop: Callable[[], bool]
+
+    def troubles(self, asked: Sequence[tuple[str, State | None]]) -> tuple[Trouble | None, ...]:
+        """Return for each event the trouble that it leads to in a state, as far as that is found out."""
+        with suppress(NodeLimitError):
+            if asked and self._is_small:
+                return explanations.troubles_after(self.words, asked, engine=self.engine, should_stop=self.should_stop)
+        return (None,) * len(asked)
+
+    def mend(self, event: str, stands: Sequence[tuple[str, str]], wanted: str) -> Mend | None:
+        """Return a mend for what an event leads to with which synthesis allows what is wanted, or None."""
+        if not self._is_small:
+            return None
+        model, deployment = self.words.model, self.words.deployment
+        return working_mend(model, event, stands, wanted, deployment, engine=self.engine, should_stop=self.should_stop)
+
+    @property
+    def _is_small(self) -> bool:
+        return self.statistics.peak_nodes <= MAXIMUM_NODES
+
+
+def told_troubles(made: Synthesized, answers: Answers) -> dict[str, tuple[str, str]]:
     """Return reason and remedy for the requests that can never happen because of what could follow them.
 
     Args:
-        words: The automata of the model, with the words for them.
+        made: The synthesis.
         answers: Answers about the controlled system.
-        engine: Engine for decision diagrams.
-        should_stop: Function called before each step; once true, the work ends.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
@@ -50,41 +80,20 @@ def told_troubles(
         for item in answers.never
         if item.cause is Cause.SUPERVISOR and item.is_reached and item.event.endswith(f".{EventKind.REQUEST}")
     ][:MAXIMUM_EVENTS_TOLD]
-    found = _troubles(words, [(event, None) for event in asked], engine, should_stop)
+    found = made.troubles([(event, None) for event in asked])
     told: dict[str, tuple[str, str]] = {}
     for event, trouble in zip(asked, found, strict=True):
         if trouble is not None:
-            told[event] = trouble.words, _way_back(words, event, trouble, engine, should_stop)
+            told[event] = trouble.words, _way_back(made, event, trouble)
     return told
 
 
-def _troubles(
-    words: ModelWords,
-    asked: Sequence[tuple[str, State | None]],
-    engine: str | EngineOptions,
-    should_stop: Callable[[], bool],
-) -> tuple[Trouble | None, ...]:
-    with suppress(NodeLimitError):
-        if asked:
-            return explanations.troubles_after(words, asked, engine=engine, should_stop=should_stop)
-    return (None,) * len(asked)
-
-
-def _way_back(
-    words: ModelWords, request: str, trouble: Trouble, engine: str | EngineOptions, should_stop: Callable[[], bool]
-) -> str:
+def _way_back(made: Synthesized, request: str, trouble: Trouble) -> str:
     """Return how to mend a model in which something is stuck after a request."""
+    words = made.words
     stands = [] if trouble.state is None else list(_stands(words, trouble.state, trouble.stuck))
     if stands and trouble.events and _is_of_call(words.model, trouble.events[-1]):
-        mend = working_mend(
-            words.model,
-            trouble.events[-1],
-            stands,
-            request,
-            words.deployment,
-            engine=engine,
-            should_stop=should_stop,
-        )
+        mend = made.mend(trouble.events[-1], stands, request)
         if mend is not None:
             return f"{mend}."
     name = request.rpartition(".")[0]
@@ -112,26 +121,18 @@ def _stands(words: ModelWords, state: State, components: Iterable[str]) -> Itera
             yield name, str(values[Subject(name)])
 
 
-def forbidden_cancel_findings(
-    words: ModelWords,
-    properties: Properties,
-    *,
-    engine: str | EngineOptions,
-    only_shown: bool,
-    should_stop: Callable[[], bool],
-) -> tuple[Diagnostic, ...]:
+def forbidden_cancel_findings(made: Synthesized, properties: Properties, *, only_shown: bool) -> tuple[Diagnostic, ...]:
     """Return the findings about cancels that the executor asks for and that the supervisor forbids.
 
     Args:
-        words: The automata of the model, with the words for them.
+        made: The synthesis.
         properties: Results of the check of the controller.
-        engine: Engine for decision diagrams.
         only_shown: True if they are warnings, because the supervisor is not to be executed.
-        should_stop: Function called before each step; once true, the work ends.
 
     Raises:
         SynthesisCancelled: `should_stop` became true.
     """
+    words = made.words
     model, places = words.model, words.places
     if properties.cancels == "not checked":
         return (
@@ -144,7 +145,7 @@ def forbidden_cancel_findings(
                 "Let no requirement, range or missing way back to a marked state forbid what follows a cancel.",
             ),
         )
-    found = _troubles(words, [(item.event, item.state) for item in properties.forbidden], engine, should_stop)
+    found = made.troubles([(item.event, item.state) for item in properties.forbidden])
     return tuple(
         Diagnostic(
             Severity.WARNING if only_shown else Severity.ERROR,
@@ -152,7 +153,7 @@ def forbidden_cancel_findings(
             f"'{item.action}' cannot be cancelled {_after(item.trace)}, though {_fallen(item)}: "
             + ("synthesis forbids it" if trouble is None else f"after {item.event}, {trouble.words}"),
             _place(model, places, item, words),
-            _mended(words, item, engine, should_stop),
+            _mended(made, item),
             tuple(_related(model, places, item)),
         )
         for item, trouble in zip(properties.forbidden, found, strict=True)
@@ -216,19 +217,17 @@ def _place(model: Model, places: Places, item: ForbiddenCancel, words: ModelWord
     return places.communications[item.action]
 
 
-def _mended(
-    words: ModelWords, item: ForbiddenCancel, engine: str | EngineOptions, should_stop: Callable[[], bool]
-) -> str:
+def _mended(made: Synthesized, item: ForbiddenCancel) -> str:
     """Return how to mend a model in which a cancel is forbidden."""
-    model = words.model
+    model = made.words.model
     heard = {f"{item.action}.{kind}" for kind in EventKind}
     following = [
         component.name
         for component in model.components
         if component.behaviour and any(transition.event in heard for transition in component.behaviour.transitions)
     ]
-    stands = list(_stands(words, item.state, following))
-    mend = working_mend(model, item.event, stands, item.event, words.deployment, engine=engine, should_stop=should_stop)
+    stands = list(_stands(made.words, item.state, following))
+    mend = made.mend(item.event, stands, item.event)
     why = f"'{item.event}' comes when the goal has ended, and nothing follows it"
     if mend is not None:
         return f"{mend}: {why}."

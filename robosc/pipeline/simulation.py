@@ -357,8 +357,8 @@ class ModelWalker(Walker):
             return
         possible = self._run.possible
         if self.follows_strategy:
-            possible = tuple(event for event in possible if not self._run.is_controllable(event))
-            possible += self._system.possible_cancels()
+            # A controllable event that is no request is the end of a goal: silent steps are none in a stable state.
+            possible = tuple(event for event in possible if not _is_request(event))
             if self._run.chosen is not None:
                 # The world and the controller are as likely to have their turn.
                 possible += (self._run.chosen,) * max(1, len(possible))

@@ -62,7 +62,6 @@ class _Watched:
         conditions: Its requirements.
 
     Attributes:
-        cancel: Its cancel event.
         names: Names by which strategies know what is kept of its requirements.
         asked: Name by which they know that its cancel was asked for.
     """
@@ -70,7 +69,6 @@ class _Watched:
     def __init__(self, name: str, conditions: Sequence[Function]) -> None:
         self._plant = f"action {name}"
         self._conditions = conditions
-        self.cancel = f"{name}.cancel"
         self.names = [f"requirement {number} of {name} was met" for number, _ in enumerate(conditions, start=1)]
         self.asked = f"the cancel of {name} was asked for"
 
@@ -152,10 +150,6 @@ class GoalsOfSystem:
         kept |= {name: item.after(before.kept[name], state) for name, item in self._kept.items()}
         places = zip(self._missions, before.missions, strict=True)
         self._account = Account(kept, tuple(item.after(place, state) for item, place in places), before.mode)
-
-    def asked_cancels(self) -> Iterator[str]:
-        """Yield the cancels that an executor has asked for by the last stable state that was taken in."""
-        return (item.cancel for item in self._watched if self._account.kept[item.asked])
 
     def are_met(self, state: State) -> tuple[bool, ...]:
         """Return for each goal, visit and assumption True if it is met in a stable state that was taken in."""

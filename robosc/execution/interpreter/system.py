@@ -258,12 +258,6 @@ class InterpretedSystem:
         """Return True if an executor would take no silent step now: no reset and no tau."""
         return self.enabled_silent() is None
 
-    def possible_cancels(self) -> tuple[str, ...]:
-        """Return the cancels that an executor has asked for and that may happen; known only with a strategy."""
-        if self._goals is None:
-            return ()
-        return tuple(event for event in self._goals.asked_cancels() if self.enabled(event))
-
     def reached(self) -> tuple[bool, ...]:
         """Return for each goal True if it counts as come true in this stable state; nothing without a strategy."""
         return () if self._goals is None else self._goals.are_true(self._state)

@@ -73,6 +73,14 @@ def test_no_option_overrides_it_but_it_may_be_looked_at() -> None:
     assert "travel.cancel can follow, and Drive stays in braking" in found(layer, "never-enabled").message
 
 
+def test_of_a_large_model_no_mend_is_tried(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("robosc.certification.troubles.MAXIMUM_NODES", 0)
+    item = found(make_supervisor(bundle_of(STOPPING)), "forbidden-cancel")
+    assert item.severity is Severity.ERROR
+    assert item.message.endswith("though a requirement on it does not hold any more: synthesis forbids it")
+    assert "run 'robosc explain-synthesis --event travel.cancel'" in item.fix
+
+
 def test_a_driver_that_overlooks_the_end_is_told_what_to_write() -> None:
     text = STOPPING.replace("on cancel to travel goto braking", "")
     item = found(make_supervisor(bundle_of(text)), "forbidden-cancel")

@@ -221,23 +221,29 @@ def test_another_policy_may_be_used_all_the_same() -> None:
     assert Bench(InterpretedSystem(supervisor), policy="fair").executor.settings.policy == "fair"
 
 
-def test_a_cancel_may_come_once_a_requirement_has_held_while_its_goal_runs_and_holds_no_more() -> None:
+def test_a_strategy_remembers_what_has_held_while_a_goal_runs_and_that_its_cancel_was_asked_for() -> None:
     # The base leaves its start by the request itself: that requirement never holds while the goal runs.
     text = WALKER.replace("    goal", "    requirement move needs Base.start\n    goal")
-    system = InterpretedSystem(strategic(model_of(text)))
+    supervisor = strategic(model_of(text))
+    system = InterpretedSystem(supervisor)
+    places = supervisor.executable.obligations.places[:3]
+    assert [place.name for place in places] == [
+        "requirement 1 of move was met",
+        "requirement 2 of move was met",
+        "the cancel of move was asked for",
+    ]
 
-    def possible_after(*events: str) -> list[tuple[str, ...]]:
+    def remembered_after(*events: str) -> list[tuple[bool, ...]]:
         found = []
         for event in events:
             assert system.step(event) == ()
             assert system.is_stable() is (event != "move.error")
             system.observe()
-            found.append(system.possible_cancels())
+            found.append(system.remembered()[1][:3])
         return found
 
     system.observe()
-    # Once it was asked for, the supervisor allows it as long as any requirement does not hold.
-    cancel = ("move.cancel",)
-    assert possible_after("move.request", "near.response", "far.response") == [(), cancel, cancel]
-    assert possible_after("move.cancel", "move.request", "near.response") == [(), (), cancel]
-    assert possible_after("move.error", "move.reset") == [(), ()]
+    nothing, held, asked = (False, False, False), (True, False, False), (False, False, True)
+    assert remembered_after("move.request", "near.response", "far.response") == [held, asked, asked]
+    assert remembered_after("move.cancel", "move.request", "near.response") == [nothing, held, asked]
+    assert remembered_after("move.error", "move.reset") == [nothing, nothing]

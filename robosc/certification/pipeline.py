@@ -174,12 +174,18 @@ def make_supervisor(
     if isinstance(problem, SynthesisOutcome):
         return problem
     outcome = _supervised(
-        bundle, problem, deployment, engine, verify_limit, allow_livelock, should_stop, on_progress
+        bundle,
+        problem,
+        deployment,
+        engine,
+        verify_limit,
+        should_stop,
+        on_progress,
+        allow_livelock=allow_livelock,
+        only_shown=only_shown,
     )
     is_judged = outcome.status is OutcomeStatus.SUPERVISOR and deployment is Deployment.CONTROLLER
-    diagnostics, accepted = accept(
-        bundle, outcome.diagnostics, lambda code: is_judged and code in AFTER_SYNTHESIS
-    )
+    diagnostics, accepted = accept(bundle, outcome.diagnostics, lambda code: is_judged and code in AFTER_SYNTHESIS)
     return replace(outcome, diagnostics=diagnostics, accepted=sorted_diagnostics((*problem.accepted, *accepted)))
 
 
@@ -189,9 +195,11 @@ def _supervised(
     deployment: Deployment,
     engine: str | EngineOptions,
     verify_limit: int,
-    allow_livelock: bool,
     should_stop: Callable[[], bool],
     on_progress: Callable[[Progress], None],
+    *,
+    allow_livelock: bool,
+    only_shown: bool,
 ) -> SynthesisOutcome:
     """Synthesize the supervisor of a model without errors; the arguments are those of `make_supervisor`."""
     model, places, system = problem.model, problem.places, problem.system.automata

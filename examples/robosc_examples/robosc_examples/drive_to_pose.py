@@ -146,8 +146,9 @@ class DriveToPose(Wheels):
         self._goal[0].publish_feedback(feedback)  # type: ignore[attr-defined]
 
     def _check_cancel(self) -> None:
-        is_wanted = self._goal is not None and self._outcome is None
-        if is_wanted and self._goal[0].is_cancel_requested:  # type: ignore[index]
+        if self._goal is None or self._outcome is not None:
+            return
+        if self._goal[0].is_cancel_requested:  # type: ignore[attr-defined]
             self._finish("canceled")
 
     def without_odometry(self) -> None:

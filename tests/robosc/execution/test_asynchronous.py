@@ -265,7 +265,7 @@ def test_a_goal_that_brakes_after_its_cancel_is_executing_until_it_stands() -> N
         assert stage.controller.executor.cancelling == ("dock",)
         assert stage.system.location("dock") == "executing"
         await stage.pass_(1.0)
-        assert stage.controller.executor.cancelling == ()
+        assert not stage.controller.executor.cancelling
         assert stage.system.location("dock") == "idle"
 
     played(scene)

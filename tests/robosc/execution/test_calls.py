@@ -224,7 +224,7 @@ def test_a_requirement_that_turns_cancels_the_goal() -> None:
     assert b.entries("event")[-1]["controllable"] is True
     assert b.state("Driver") == "home"
     assert b.system.location("drive") == "idle"
-    assert b.executor.cancelling == ()
+    assert not b.executor.cancelling
     assert b.executor.counters.unexpected == 0
 
 

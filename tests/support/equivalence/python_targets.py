@@ -83,7 +83,7 @@ def observation(seen: Mapping[str, Any]) -> Observation:
         locations=seen["locations"],
         status=tuple(seen["status"]),
         counters=tuple(seen["counters"]),
-        cancelling=tuple(map(tuple, seen["cancelling"])),
+        cancelling=(tuple(seen["cancelling"][0]), tuple(seen["cancelling"][1])),
         progress=seen["progress"],
     )
 

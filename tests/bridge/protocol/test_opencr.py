@@ -8,6 +8,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from robosc_bridge.protocol import opencr
 from robosc_bridge.protocol.opencr import BLOCK_ADDRESS, BLOCK_LENGTH, Block, decode_block, encode_command
 
 FLOATS = st.floats(width=32)
@@ -67,3 +68,35 @@ def test_every_register_is_where_the_firmware_has_it(values: dict[int, Any]) -> 
 )
 def test_a_command_is_written_as_worked(words: tuple[int, int], data: str) -> None:
     assert encode_command(*words).hex(" ") == data
+
+
+def _stuffed_in_place(data: bytes) -> bytes:
+    """Return what is left of an answer's data: the byte behind a header within is copied over all that follows."""
+    begin = data.find(b"\xff\xff\xfd")
+    return data if begin < 0 else data[: begin + 3] + b"\xfd" * (len(data) - begin - 3)
+
+
+@pytest.mark.parametrize("begin", range(opencr.BLOCK_LENGTH - 2))
+def test_what_a_board_has_spoilt_is_found_where_it_begins(begin: int) -> None:
+    data = bytearray(opencr.BLOCK_LENGTH)
+    data[begin : begin + 3] = b"\xff\xff\xfd"
+    found = opencr.spoilt_from(_stuffed_in_place(bytes(data)))
+    # So few bytes may be right.
+    assert found == (begin + 2 if opencr.BLOCK_LENGTH - begin - 2 >= 8 else None)
+    if found is not None:
+        assert "overwritten the end of its answer" in opencr.impossibility(_stuffed_in_place(bytes(data)))
+    # A board that stuffs as it should has the same bytes without harm.
+    assert opencr.spoilt_from(bytes(data)) is None
+
+
+@pytest.mark.parametrize("data", [bytes(172), b"\xfd" * 172, b"\xff\xfd" * 86, bytes(160) + b"\xfd" * 12])
+def test_bytes_without_a_header_before_them_are_not_spoilt(data: bytes) -> None:
+    assert opencr.spoilt_from(data) is None
+
+
+@pytest.mark.parametrize("address", [26, 27, 28, 29, 148, 149])
+def test_a_truth_value_is_one_of_two(address: int) -> None:
+    for value, problem in ((0, ""), (1, ""), (2, "a truth value is 2"), (253, "a truth value is 253")):
+        data = bytearray(opencr.BLOCK_LENGTH)
+        data[address - opencr.BLOCK_ADDRESS] = value
+        assert opencr.impossibility(bytes(data)) == problem

@@ -50,7 +50,7 @@ class Asked:
         return SimpleNamespace(goal_id=name, goal_info=SimpleNamespace(goal_id=name))
 
     def get_pending_request(self, number: int) -> Any:
-        """What rclpy calls when an answer has come."""
+        """The future of a request; rclpy asks for it whenever an answer has come."""
         return self._requests[number]
 
     def remove_pending_request(self, future: Any) -> None:

@@ -38,7 +38,7 @@ class World(ABC):
         supervisor: The driver's.
 
     Attributes:
-        reports: What the clients report.
+        reports: Reports of the clients.
     """
 
     calls: Any
@@ -94,11 +94,11 @@ class World(ABC):
 
     @abstractmethod
     def accept(self) -> None:
-        """Every server accepts the goal."""
+        """Have every server accept the goal."""
 
     @abstractmethod
     def feedback(self) -> None:
-        """It gives feedback."""
+        """Give feedback."""
 
     @abstractmethod
     def end(self, how: str) -> None:
@@ -130,10 +130,10 @@ class _Seam:
         return False
 
     def publish(self, communication: str, message: Any) -> None:
-        """Nobody listens."""
+        """Send nothing: nobody listens."""
 
     def publish_default(self, identifier: str) -> None:
-        """Nobody listens."""
+        """Send nothing: nobody listens."""
 
     def call(self, communication: str, request_id: int, message: Any) -> None:
         self._world.calls.call(request_id, message)
@@ -150,7 +150,7 @@ class Race(NamedTuple):
 
     Attributes:
         name: Its name.
-        happens: What happens in a world.
+        happens: Function that makes it happen in a world.
         told: The events that the model is told, in order; resets are left out.
         servers: Number of servers that get the goal.
         unexpected: Number of things that come and are for nothing.
@@ -241,7 +241,7 @@ def _time_goes_back(world: World) -> None:
     world.press("wanted", False)
     world.pass_time(1.5)
     world.pass_time(-500.0)
-    # As much time has passed as passed forward.
+    # Time that went back has not passed.
     world.pass_time(0.4)
     world.reply()
     world.read()

@@ -149,7 +149,7 @@ class Ros1(World):
                 return {"success": True, "message": ""}
 
             def close(connection) -> None:  # noqa: N805
-                """It has nothing to close."""
+                """Close nothing."""
 
         return Connection()
 

@@ -654,7 +654,7 @@ def test_a_goal_that_ended_and_has_no_result_is_over(status: int, outcome: str) 
     assert world.goals.warnings() == []
 
 
-# What a stop leaves.
+# Goals that a stop leaves.
 
 
 def test_a_goal_that_was_not_answered_may_begin_and_one_whose_cancel_was_not_may_run_on() -> None:
@@ -669,7 +669,7 @@ def test_a_goal_that_was_not_answered_may_begin_and_one_whose_cancel_was_not_may
     assert server.cancelled == world.client.uuids
     handle = Handle()
     world.client.futures[-1].done(handle)
-    # Nobody wants its cancel so far.
+    # A cancel of it is not wanted so far.
     assert world.goals.unsettled == []
     world.goals.cancel(1)
     assert world.goals.unsettled == ["a goal of /a may be running: its server has not answered its cancel"]

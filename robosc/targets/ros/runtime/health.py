@@ -74,7 +74,7 @@ class HealthMonitor:
 
     :param executor: The executor.
     :ivar missing_servers: Servers that the start waits for.
-    :ivar troubles: What keeps the node's surroundings from being of use to it, in words.
+    :ivar troubles: Reasons why its surroundings are of no use to the node, in words.
     """
 
     def __init__(self, executor: Runner) -> None:

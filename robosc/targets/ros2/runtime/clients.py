@@ -169,7 +169,7 @@ class _Goal:
     """
     A goal whose end is not known.
 
-    :ivar uuid: What it is called on ROS.
+    :ivar uuid: Its name on ROS.
     :ivar servers: Endpoints of the servers that it was sent to; empty if none are shown.
     :ivar handle: Handle by which rclpy refers to it, once it was accepted.
     :ivar is_asked: True if its cancel was asked for and not answered.
@@ -307,7 +307,7 @@ class ActionGoals:
         if len(self._servers.seen()) < 2 or not self._goals:
             self._inquiry.end()
             return
-        # There is at most one goal of an action at a time.
+        # An action has at most one goal at a time.
         for goal_id, goal in list(self._goals.items())[:1]:
             if self._inquiry.is_unknown(goal.uuid) and now_s >= goal.heard_s + MEMORY_S:
                 self._inquiry.end()
@@ -322,7 +322,7 @@ class ActionGoals:
             goal.ended_s = now_s
         elif now_s >= goal.ended_s + RESULT_S:
             self._no_result = f'the server of {self.name} gave no result of a goal that ended'
-            # What is not known of a success makes it a failure.
+            # A success without its result is a failure.
             self._end(goal_id, 'lost' if outcome == 'succeeded' else outcome)
 
     def warnings(self) -> list[str]:

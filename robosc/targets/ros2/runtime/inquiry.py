@@ -172,7 +172,7 @@ class Inquiry:
         self._living.ask(request)
 
     def end(self) -> None:
-        """Nothing is asked any more."""
+        """Ask nothing any more."""
         self._goal = self._denied_s = None
         self._living.forget()
         self._ignorant.forget()

@@ -27,7 +27,7 @@ def topic_misfits(
 
     :param name: The topic's name on ROS.
     :param type_name: Type that this node uses, `geometry_msgs/msg/Twist`.
-    :param peers: What the middleware shows of the other ends.
+    :param peers: The other ends, as the middleware shows them.
     :param sends: True if this node sends there and the others receive.
     :param quality: This node's quality of service there.
     """

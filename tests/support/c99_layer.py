@@ -158,7 +158,7 @@ class LayerReference(Reference):
         """Remember."""
         self._send("pass", list(self.layout.received_topics).index(identifier), self.number(message))
 
-    def blocked(self, identifier: str) -> None:
+    def blocked(self, identifier: str, why: str) -> None:
         """Remember."""
         self._send("blocked", _hex(identifier), self.refusal)
 
@@ -166,7 +166,7 @@ class LayerReference(Reference):
         """Remember."""
         self._send("answer", self.numbers[communication], call_id, self.number(data))
 
-    def answer_default(self, communication: str, call_id: Any) -> None:
+    def answer_default(self, communication: str, call_id: Any, why: str) -> None:
         """Remember."""
         self._send("no_answer", self.numbers[communication], call_id)
 
@@ -174,7 +174,7 @@ class LayerReference(Reference):
         """Remember."""
         self._send("accept", self.numbers[communication], goal_id)
 
-    def reject_goal(self, communication: str, goal_id: Any) -> None:
+    def reject_goal(self, communication: str, goal_id: Any, why: str) -> None:
         """Remember."""
         self._send("reject", self.numbers[communication], goal_id)
 
@@ -182,7 +182,7 @@ class LayerReference(Reference):
         """Remember."""
         self._send("feedback", self.numbers[communication], goal_id, self.number(data))
 
-    def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any) -> None:
+    def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any, why: str) -> None:
         """Remember."""
         number = -1 if data is None and outcome != "succeeded" else self.number(data)
         self._send("end", self.numbers[communication], goal_id, _ENDS.index(outcome), number)

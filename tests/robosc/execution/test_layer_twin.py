@@ -22,6 +22,7 @@ from support.generated import load_system
 from support.layer_twin import LayerTwin, TwinCall, TwinGoal
 from support.layers import LayerBench
 from support.random_layers import random_layer
+from support.random_limits import limited_robot, with_defaults
 
 STEPS = 60
 OUTCOMES = ("succeeded", "rejected", "aborted", "cancelled", "lost")
@@ -62,6 +63,8 @@ class Pair:
     def __init__(self, seed: int, load: Callable[[Supervisor], Any] = Watched) -> None:
         dice = self.dice = Random(seed)
         supervisor = random_layer(dice)
+        if seed % 3 == 0:
+            supervisor = limited_robot(with_defaults(supervisor, dice), dice)
         model = supervisor.model
         self.topics = [item for item in model.communications if item.kind is CommunicationKind.OUTGOING_MESSAGE]
         self.requested = [item for item in model.communications if item.kind is not CommunicationKind.OUTGOING_MESSAGE]

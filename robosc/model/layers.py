@@ -29,20 +29,25 @@ def sharing_requests(model: Model) -> tuple[tuple[Communication, ...], ...]:
     return tuple(map(tuple, shared.values()))
 
 
+def confusable(model: Model) -> tuple[tuple[Communication, Communication], ...]:
+    """Pairs of requests on one identifier that a layer could not distinguish."""
+    return tuple(
+        (item, sharing[-1]) for sharing in sharing_requests(model) for item in sharing[:-1] if not item.has_condition
+    )
+
+
 def layer_findings(model: Model, places: Places) -> tuple[Diagnostic, ...]:
     """Errors about requests on one identifier that a layer could not distinguish."""
     return tuple(
         Diagnostic(
             Severity.ERROR,
             "ambiguous-layer-topic",
-            f"{_WORDS.get(item.kind, 'a goal of')} '{item.identifier}' may be '{item.name}' or '{sharing[-1].name}'",
+            f"{_WORDS.get(item.kind, 'a goal of')} '{item.identifier}' may be '{item.name}' or '{other.name}'",
             places.communications[item.name],
             f"Say when it is '{item.name}': write 'when: CONDITION' over 'value' in its list.",
-            (RelatedPlace(f"'{sharing[-1].name}' is here", places.communications[sharing[-1].name]),),
+            (RelatedPlace(f"'{other.name}' is here", places.communications[other.name]),),
         )
-        for sharing in sharing_requests(model)
-        for item in sharing[:-1]
-        if not item.has_condition
+        for item, other in confusable(model)
     )
 
 

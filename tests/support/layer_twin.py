@@ -12,7 +12,7 @@ from typing import Any
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.expressions import Expression
 from robosc.expressions.evaluate import evaluate
-from robosc.model.structure import CommunicationKind
+from robosc.model.structure import Bound, CommunicationKind
 from robosc.supervisor import Supervisor
 
 MessageReceived = tuple[Any, ...]
@@ -62,7 +62,11 @@ class Acting:
     """The last message on a release identifier, not the default one, with all that held in each stable state since."""
 
     name: str
+    message: Any
     history: list[Holds] = field(default_factory=list)
+
+
+_NONE = object()
 
 
 def turned(history: list[Holds]) -> bool:
@@ -160,7 +164,7 @@ class LayerTwin:
             goal.history.append(self.system.requirements(goal.action))
         for identifier, acting in list(self.acting.items()):
             if acting.name != issuing:
-                acting.history.append(self.holds(acting.name))
+                acting.history.append(self.holds(acting.name, acting.message))
                 if turned(acting.history):
                     self.zero(identifier)
 
@@ -172,8 +176,9 @@ class LayerTwin:
         description = self.system.description
         return next((event for event in (*description.resets, *description.taus) if self.system.enabled(event)), None)
 
-    def holds(self, name: str) -> Holds:
-        return (self.system.enabled(f"{name}.request"), *self.system.conjuncts(name))
+    def holds(self, name: str, message: Any) -> Holds:
+        is_within = self.limited(name, message) == message
+        return (self.system.enabled(f"{name}.request"), *self.system.conjuncts(name), is_within)
 
     def zero(self, identifier: str) -> None:
         self.acting.pop(identifier, None)
@@ -208,7 +213,8 @@ class LayerTwin:
     def request(self, identifier: str, message: Any) -> None:
         self.arrived[identifier] = self.now
         for item in self.model.communications:
-            if item.identifier == identifier and is_true(item.when, message):
+            is_it = is_zero(message) if item.is_when_default else is_true(item.when, message)
+            if item.identifier == identifier and is_it:
                 break
         else:
             item = None
@@ -216,14 +222,40 @@ class LayerTwin:
         if item is None or not self.allows(item.name, message):
             self.reported.append(blocked)
             return
+        found = self.limited(item.name, message)
+        if found is _NONE:
+            self.reported.append(blocked)
+            return
+        is_moved, message = found != message, found
         with self.guard():
             self.take(f"{item.name}.request")
             self.settle(item.name)
             if identifier in self.settings["release_identifiers"]:
                 self.acting.pop(identifier, None)
-                if not is_zero(message):
-                    self.acting[identifier] = Acting(item.name, [self.holds(item.name)])
+                if is_moved or not is_zero(message):
+                    self.acting[identifier] = Acting(item.name, message, [self.holds(item.name, message)])
             self.reported.append(("publish", item.name, message))
+
+    def limited(self, name: str, message: Any) -> Any:
+        """The message, each number the nearest that all limits allow; `_NONE` if they allow none."""
+        state = self.system.state()
+        bounds: dict[str, list[Bound]] = {}
+        for limit in self.model.limits_for(name):
+            applies = limit.condition is None or evaluate(
+                limit.condition, lambda c, v: state[c]["variables"][v], lambda c: str(state[c]["state"])
+            )
+            for bound in limit.bounds if applies is not False else ():
+                bounds.setdefault(bound.path[0], []).append(bound)
+        for part, found in bounds.items():
+            value = (message or {}).get(part) or 0
+            places = [value, *(end for bound in found for end in (bound.low, bound.high))]
+            allowed = [place for place in places if all(bound.low <= place <= bound.high for bound in found)]
+            if not allowed:
+                return _NONE
+            nearest = min((abs(place - value), place) for place in allowed)[1]
+            if nearest != value:
+                message = {**(message or {}), part: nearest}
+        return message
 
     def allows(self, name: str, message: Any) -> bool:
         is_open = any(goal.action == name for goal in self.goals)

@@ -359,7 +359,7 @@ class _Careless(BothSides):
         if identifier == "/line/correction":
             self._twin.ask_for(message)
 
-    def blocked(self, identifier: str) -> None:
+    def blocked(self, identifier: str, why: str) -> None:
         self._twin.held_back += 1
 
 

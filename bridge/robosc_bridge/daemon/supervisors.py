@@ -222,7 +222,7 @@ def _require_deployment(supervisor: Supervisor, deployment: Deployment, place: s
     if deployment is Deployment.LAYER:
         for item, other in confusable(model):
             raise NoSupervisorError(
-                f"{place}: made for the deployment controller; as a layer it could not determine whether a message on "
+                f"{place}: made for the deployment controller; as a layer it could not determine whether a request on "
                 f"'{item.identifier}' is '{item.name}' or '{other.name}'"
             )
 

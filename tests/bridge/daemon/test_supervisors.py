@@ -160,7 +160,7 @@ def test_a_layer_that_could_not_tell_messages_apart_is_refused_whatever_it_was_m
     model = written(signed.file.parent, text)
     signed.file.write_bytes(encode(supervisor_of(model)))
     as_layer = replace(signed.source(), deployment=Deployment.LAYER)
-    problem = "it could not determine whether a message on '/drive' is"
+    problem = "it could not determine whether a request on '/drive' is"
     assert problem in refusal(as_layer)
     assert obtain(signed.source())
     model.unlink()

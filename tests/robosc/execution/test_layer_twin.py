@@ -22,6 +22,7 @@ from support.generated import load_system
 from support.layer_twin import LayerTwin, TwinCall, TwinGoal
 from support.layers import LayerBench
 from support.random_layers import random_layer
+from support.random_limits import limited_robot, with_defaults
 from support.random_travels import random_travels
 
 STEPS = 60
@@ -64,6 +65,8 @@ class Pair:
         dice = self.dice = Random(seed)
         is_travel = dice.random() < 0.3
         supervisor = random_travels(dice.randrange(2**32), Deployment.LAYER) if is_travel else random_layer(dice)
+        if not is_travel and seed % 3 == 0:
+            supervisor = limited_robot(with_defaults(supervisor, dice), dice)
         model = supervisor.model
         self.topics = [item for item in model.communications if item.kind is CommunicationKind.OUTGOING_MESSAGE]
         self.requested = [item for item in model.communications if item.kind is not CommunicationKind.OUTGOING_MESSAGE]

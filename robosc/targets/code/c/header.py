@@ -1,5 +1,6 @@
 """The generated header: numbers, names, types and functions of one robot, with their documentation."""
 
+from collections.abc import Iterable
 from functools import cache
 from importlib import resources
 from itertools import groupby
@@ -222,14 +223,17 @@ def _enumeration(name: str, words: str, members: list[str]) -> list[str]:
 def _numbers(layout: Layout) -> list[str]:
     upper, prefix = layout.upper, layout.prefix
     lines = [f"#define {upper}_NO_EVENT (-1)", ""]
-    for kind, table, words in (
-        ("event", layout.events, "Events."),
-        ("communication", layout.communications, "Messages, services and actions, in source order."),
-        ("topic", layout.topics, "Identifiers of incoming messages."),
-        *([("source", layout.received_topics, "Identifiers of outgoing messages.")] if layout.is_layer else []),
-        *([("number", layout.numbers, "Numbers that limits move.")] if layout.is_layer and layout.numbers else []),
-    ):
-        members = list(table.values()) or [f"{upper}_NO_{kind.upper()}S"]
+    tables: list[tuple[str, Iterable[str], str]] = [
+        ("event", layout.events.values(), "Events."),
+        ("communication", layout.communications.values(), "Messages, services and actions, in source order."),
+        ("topic", layout.topics.values(), "Identifiers of incoming messages."),
+    ]
+    if layout.is_layer:
+        tables.append(("source", layout.received_topics.values(), "Identifiers of outgoing messages."))
+        if layout.numbers:
+            tables.append(("number", layout.numbers.values(), "Numbers that limits move."))
+    for kind, table, words in tables:
+        members = list(table) or [f"{upper}_NO_{kind.upper()}S"]
         lines += [*_enumeration(f"{prefix}_{kind}_t", words, members), ""]
     for component, behaviour in layout.executable.behaviours:
         names = [layout.location_names[component, state.name] for state in behaviour.states]

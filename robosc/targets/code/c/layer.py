@@ -5,7 +5,8 @@ from robosc.model.structure import Communication, CommunicationKind
 from robosc.targets.code.c.layout import Layout, groups, read_by_layer, request_data, sharing
 from robosc.targets.code.c.text import comment
 
-_KNOWN = " Its data says which of them, and has the numbers that limits move; what is not known of it is unknown."
+_KNOWN = " Its data says which of them; what is not known of it is unknown."
+_LIMITED = " Its data has the numbers that limits move; what is not known of them is 0."
 _SENT = "{prefix}_sent_t what"
 
 
@@ -60,18 +61,17 @@ def request_heads(layout: Layout) -> list[tuple[str, str]]:
     for identifier in layout.topics:
         incoming = layout.of_kind(CommunicationKind.INCOMING_MESSAGE)
         names = ", ".join(item.name for item in incoming if item.identifier == identifier)
-        data = request_parameters(layout, sharing(layout.model, CommunicationKind.INCOMING_MESSAGE, identifier))
-        known = _KNOWN if data else ""
+        known = _known(layout, sharing(layout.model, CommunicationKind.INCOMING_MESSAGE, identifier))
         words = f"The caller sends a message on {identifier}: {names}.{known}"
         found.append((words, request_head(layout, identifier)))
     for group in groups(layout.model, CommunicationKind.SERVICE):
-        known = _KNOWN if request_parameters(layout, group) else ""
+        known = _known(layout, group)
         words = (
             f"The caller calls the service {_names(group)}: exactly one `answer` or `answer_default` follows.{known}"
         )
         found.append((words, call_head(layout, group)))
     for group in groups(layout.model, CommunicationKind.ACTION):
-        known = _KNOWN if request_parameters(layout, group) else ""
+        known = _known(layout, group)
         words = (
             f"The caller sends a goal of the action {_names(group)}: it is rejected, or accepted and ended once.{known}"
         )
@@ -79,6 +79,14 @@ def request_heads(layout: Layout) -> list[tuple[str, str]]:
         words = f"The caller cancels its goal of the action {_names(group)}: that is always forwarded."
         found.append((words, cancel_head(layout, group[0].name)))
     return found
+
+
+def _known(layout: Layout, group: tuple[Communication, ...]) -> str:
+    """Return what the data of a request is looked at for."""
+    read = [item for item in read_by_layer(layout.model, group) if request_data(item) is not None]
+    is_told_apart = any(item.when is not None for item in read)
+    is_limited = any(layout.model.limits_for(item.name) for item in read)
+    return (_KNOWN if is_told_apart else "") + (_LIMITED if is_limited else "")
 
 
 def _names(group: tuple[Communication, ...]) -> str:

@@ -177,10 +177,8 @@ def _tables(layout: Layout, numbers: dict[str, int]) -> list[str]:
     words = "Requests in source order; -1 where something does not apply."
     lines = _table(members, "REQUESTS", requests, words)
     if layout.is_layer and layout.numbers:
-        first = {}
-        for place, (name, _) in enumerate(layout.numbers):
-            first.setdefault(name, place)
-        rows = [str(first.get(item.name, 0)) for item in layout.requests]
+        owners = [name for name, _ in layout.numbers]
+        rows = [str(owners.index(item.name) if item.name in owners else 0) for item in layout.requests]
         lines += _table("int", "FIRST_NUMBERS", rows, "Each request's first number.")
     in_layer = [f"{communication} communication"] if layout.is_layer else []
     errors = [

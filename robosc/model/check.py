@@ -27,6 +27,7 @@ from robosc.model.communications import (
 )
 from robosc.model.constants import Constants
 from robosc.model.expression_checker import ExpressionChecker
+from robosc.model.defaults import permissive_defaults
 from robosc.model.findings import WORD, Bindings, Findings
 from robosc.model.goals import build_goals
 from robosc.model.interfaces import InterfaceChecker
@@ -53,7 +54,7 @@ from robosc.model.structure import (
 from robosc.model.synthesis_variables import check_synthesis_variables, mark_synthesis_variables
 from robosc.model.types import Types
 from robosc.model.units import Libraries, Part, Unit, make_unit, parts_of
-from robosc.source import Bundle
+from robosc.source import Bundle, Location
 
 
 @dataclass(frozen=True, slots=True)
@@ -224,6 +225,7 @@ class _RobotChecker:
         self._libraries = Libraries(bundle, self._unit, findings)
         self.parts = parts_of(self._unit, self._libraries, findings)
         self.places = Places(tree.name.location)
+        self._defaults: dict[str, Location] = {}
         self.scopes: RobotScopes | None = None
         self.communications: Mapping[str, Communication] = {}
         self.fields: Mapping[str, Mapping[str, Field]] = {}
@@ -275,7 +277,7 @@ class _RobotChecker:
         self.places.objects.update(self._types.object_places)
         if self.findings.has_errors:
             return None
-        return Model(
+        model = Model(
             name=self._tree.name.text,
             components=tuple(Component(part.name, marked.get(part.name)) for part in self.parts),
             communications=tuple(communications.values()),
@@ -289,6 +291,8 @@ class _RobotChecker:
             missions=missions,
             preferences=preferences,
         )
+        permissive_defaults(model, self.places, self._defaults, self.findings)
+        return model
 
     def _resolve_own_types(self) -> None:
         """Every type of the file itself, used or not, so that its faults are found."""
@@ -321,6 +325,7 @@ class _RobotChecker:
                     rules.append(EnumRule(condition, rule.value.text))
             default = next((rule.value.text for rule in tree.rules if rule.condition is None), None)
             self.places.enums[key] = tree.name.location
+            self._defaults.update({key: rule.value.location for rule in tree.rules if rule.condition is None})
             if default is not None:
                 found.append(EnumDefinition(key, source, enum.values, tuple(rules), default))
         return tuple(found)

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from robosc.errors import Diagnostic, InternalError, LanguageError, RelatedPlace, Severity, sorted_diagnostics
+from robosc.expressions import BooleanType, ObjectType
 from robosc.interfaces import Field
 from robosc.interfaces.catalogue import Catalogue
 from robosc.language import Parsed, parse, syntax
@@ -34,6 +35,7 @@ from robosc.model.interfaces import InterfaceChecker
 from robosc.model.missions import build_missions, build_preferences
 from robosc.model.own_requests import OwnRequests
 from robosc.model.places import Places
+from robosc.model.received import received_paths
 from robosc.model.restrictions import Restrictions
 from robosc.model.robot_scopes import RobotScopes
 from robosc.model.sent_messages import SentMessages
@@ -45,6 +47,7 @@ from robosc.model.structure import (
     Component,
     EnumDefinition,
     EnumRule,
+    EventKind,
     Goal,
     Mission,
     Model,
@@ -291,6 +294,7 @@ class _RobotChecker:
             missions=missions,
             preferences=preferences,
         )
+        self._check_results(model)
         permissive_defaults(model, self.places, self._defaults, self.findings)
         return model
 
@@ -420,6 +424,31 @@ class _RobotChecker:
                             place,
                             "Nothing needs fixing if that is meant.",
                         )
+
+    def _check_results(self, model: Model) -> None:
+        """Note a service or action that says whether it has succeeded, where nothing reads that."""
+        read = {
+            (transition.event, path[:1])
+            for component in model.components
+            for transition in (component.behaviour.transitions if component.behaviour else ())
+            for update in transition.updates
+            for path in received_paths(update.expression)
+        }
+        for item in model.communications:
+            response = item.response
+            if item.kind not in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
+                continue
+            if not isinstance(response, ObjectType) or (item.event(EventKind.RESPONSE), ("success",)) in read:
+                continue
+            types = {part.name: part.type for part in model.object(response.name).properties}
+            if isinstance(types.get("success"), BooleanType):
+                self.findings.note(
+                    "result-not-read",
+                    f"nothing reads 'success' of the response of '{item.name}', so that a refusal counts as done",
+                    self.places.communications[item.name],
+                    f"Keep it in a variable, 'on response from {item.name} do done := value.success', and let what "
+                    "follows need it.",
+                )
 
     def _check_empty(self, communications: Mapping[str, Communication]) -> None:
         if not communications and not self._tree.is_library and not self.findings.has_errors:

@@ -5,6 +5,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
 
 from robosc.errors import Diagnostic, InternalError, LanguageError, RelatedPlace, Severity, sorted_diagnostics
+from robosc.expressions import BooleanType, ObjectType
 from robosc.interfaces import Field
 from robosc.interfaces.catalogue import Catalogue
 from robosc.language import Parsed, parse, syntax
@@ -27,6 +28,7 @@ from robosc.model.communications import (
 )
 from robosc.model.constants import Constants
 from robosc.model.expression_checker import ExpressionChecker
+from robosc.model.defaults import permissive_defaults
 from robosc.model.findings import WORD, Bindings, Findings
 from robosc.model.goals import build_goals
 from robosc.model.interfaces import InterfaceChecker
@@ -36,6 +38,7 @@ from robosc.model.missions import build_missions, build_preferences
 from robosc.model.needless import PropertyUses, without
 from robosc.model.own_requests import OwnRequests
 from robosc.model.places import Places
+from robosc.model.received import received_paths
 from robosc.model.restrictions import Restrictions
 from robosc.model.robot_scopes import RobotScopes
 from robosc.model.sent_messages import SentMessages
@@ -47,6 +50,7 @@ from robosc.model.structure import (
     Component,
     EnumDefinition,
     EnumRule,
+    EventKind,
     Goal,
     Limit,
     Mission,
@@ -57,7 +61,7 @@ from robosc.model.structure import (
 from robosc.model.synthesis_variables import check_synthesis_variables, mark_synthesis_variables
 from robosc.model.types import Types
 from robosc.model.units import Libraries, Part, Unit, make_unit, parts_of
-from robosc.source import Bundle
+from robosc.source import Bundle, Location
 
 
 @dataclass(frozen=True, slots=True)
@@ -226,6 +230,7 @@ class _RobotChecker:
         self._libraries = Libraries(bundle, self._unit, findings)
         self.parts = parts_of(self._unit, self._libraries, findings)
         self.places = Places(tree.name.location)
+        self._defaults: dict[str, Location] = {}
         self.scopes: RobotScopes | None = None
         self.communications: Mapping[str, Communication] = {}
         self.fields: Mapping[str, Mapping[str, Field]] = {}
@@ -285,7 +290,7 @@ class _RobotChecker:
             return None
         needed = without(communications.values(), enums, self._types.objects.values(), interfaces.left_out)
         self.places.objects.update((name, self.places.objects[old]) for name, old in needed.origins.items())
-        return Model(
+        model = Model(
             name=self._tree.name.text,
             components=tuple(Component(part.name, marked.get(part.name)) for part in self.parts),
             communications=needed.communications,
@@ -300,6 +305,9 @@ class _RobotChecker:
             preferences=preferences,
             limits=limits,
         )
+        self._check_results(model)
+        permissive_defaults(model, self.places, self._defaults, self.findings)
+        return model
 
     def _resolve_own_types(self) -> None:
         """Every type of the file itself, used or not, so that its faults are found."""
@@ -332,6 +340,7 @@ class _RobotChecker:
                     rules.append(EnumRule(condition, rule.value.text))
             default = next((rule.value.text for rule in tree.rules if rule.condition is None), None)
             self.places.enums[key] = tree.name.location
+            self._defaults.update({key: rule.value.location for rule in tree.rules if rule.condition is None})
             if default is not None:
                 found.append(EnumDefinition(key, source, enum.values, tuple(rules), default))
         return tuple(found)
@@ -428,6 +437,31 @@ class _RobotChecker:
                             place,
                             "Nothing needs fixing if that is meant.",
                         )
+
+    def _check_results(self, model: Model) -> None:
+        """Note a service or action that says whether it has succeeded, where nothing reads that."""
+        read = {
+            (transition.event, path[:1])
+            for component in model.components
+            for transition in (component.behaviour.transitions if component.behaviour else ())
+            for update in transition.updates
+            for path in received_paths(update.expression)
+        }
+        for item in model.communications:
+            response = item.response
+            if item.kind not in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
+                continue
+            if not isinstance(response, ObjectType) or (item.event(EventKind.RESPONSE), ("success",)) in read:
+                continue
+            types = {part.name: part.type for part in model.object(response.name).properties}
+            if isinstance(types.get("success"), BooleanType):
+                self.findings.note(
+                    "result-not-read",
+                    f"nothing reads 'success' of the response of '{item.name}', so that a refusal counts as done",
+                    self.places.communications[item.name],
+                    f"Keep it in a variable, 'on response from {item.name} do done := value.success', and let what "
+                    "follows need it.",
+                )
 
     def _check_empty(self, communications: Mapping[str, Communication]) -> None:
         if not communications and not self._tree.is_library and not self.findings.has_errors:

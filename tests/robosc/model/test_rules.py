@@ -29,6 +29,13 @@ OBJECT = (
     "interface i use Scan from p datatype object Scan { range: double list: array(double) name: string n: integer }"
 )
 
+ZONES = (
+    OBJECT + " datatype enum Zone from Scan to {{ {} }} "
+    "component D {{ outgoing message scan with type: Zone links i behaviour {{ variable zone: Zone = stop "
+    "on response from scan do zone := value initial marked state s {{ }} }} }} "
+    "component E {{ incoming message go with type: none }}"
+).replace("double list: array(double) name: string n: integer }", "double list: array(double) name: string n: integer }}").replace("object Scan {", "object Scan {{")
+
 # code, severity, broken, sound
 RULES: list[tuple[str, str, str, str]] = [
     (
@@ -417,6 +424,47 @@ RULES: list[tuple[str, str, str, str]] = [
         "error",
         f"robot §{'r' * 256} {{ {component(STATES)} }}",
         f"robot {'r' * 255} {{ {component(STATES)} }}",
+    ),
+    (
+        "empty-requirement",
+        "warning",
+        robot(component(STATES, GO), "§requirement { } needs C.a"),
+        robot(component(STATES, GO), "requirement { go } needs C.a"),
+    ),
+    (
+        "result-not-read",
+        "note",
+        robot(
+            "interface t use Trigger from p datatype object A { success: boolean } component C { "
+            "service §ask with request: none, response: A links t }"
+        ),
+        robot(
+            "interface t use Trigger from p datatype object A { success: boolean } component C { "
+            "service ask with request: none, response: A links t behaviour { variable done: boolean "
+            "initial marked state s { on response from ask do done := value.success } } }"
+        ),
+    ),
+    (
+        "permissive-default",
+        "warning",
+        robot(
+            ZONES.format("min(value.list[330..30]) < 0.4 -> stop default -> §clear"),
+            "requirement go needs D.zone = clear",
+        ),
+        robot(
+            ZONES.format("min(value.list[330..30]) >= 0.4 -> clear default -> stop"),
+            "requirement go needs D.zone = clear",
+        ),
+    ),
+    (
+        "needless-acceptance",
+        "note",
+        robot("§// robosc: accept shared-topic: both are meant", component(STATES)),
+        robot(
+            "component A { outgoing message m with identifier: \"/m\", type: none }",
+            "// robosc: accept shared-topic: both are meant",
+            "component B { outgoing message n with identifier: \"/m\", type: none }",
+        ),
     ),
 ]
 

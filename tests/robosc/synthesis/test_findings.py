@@ -285,7 +285,8 @@ def test_many_names_are_cut() -> None:
 
 
 def test_an_empty_set_restricts_nothing() -> None:
-    assert only(robot(DOOR, "§requirement { } needs false")).message == "this requirement never restricts anything"
+    """The check of the model has said so: `empty-requirement`."""
+    assert found(robot(DOOR, "requirement { } needs false")) == ()
 
 
 def test_a_requirement_that_must_always_hold() -> None:
@@ -485,9 +486,49 @@ def test_findings_stand_among_the_others_by_place() -> None:
     made = make_supervisor(bundle_of(text))
     assert [item.code for item in made.diagnostics] == [
         "competing-requests",
+        "unprompted-request",
         "wrong-preposition",
         "unused-requirement",
     ]
+
+
+PACE = """component Pace {
+    incoming message §creep with identifier: "/speed", type: none
+    incoming message full with identifier: "/speed", type: none
+    behaviour {
+        initial marked state fast { on request to creep goto slow }
+        marked state slow { on request to full goto fast }
+    }
+}"""
+
+
+def loops(text: str, deployment: Deployment = Deployment.CONTROLLER) -> list[str]:
+    made = make_supervisor(bundle_of(text.replace("§", "")), deployment=deployment)
+    return [item.message for item in made.diagnostics if item.code == "unprompted-request"]
+
+
+def test_messages_that_alternate_for_ever() -> None:
+    assert loops(robot(PACE)) == [
+        "'creep' can be sent again and again with no message of the robot in between, in the initial state: "
+        "creep.request, full.request, and so on"
+    ]
+    # In a layer the existing controller sends them, and a message that changes nothing is sent once a period anyway.
+    assert loops(robot(PACE), Deployment.LAYER) == []
+    assert loops(robot("component Base { incoming message go with type: none }")) == []
+    # A button prompts each of them.
+    assert loops(robot(PACE, SWITCH, "requirement creep needs Switch.on_", "requirement full needs Switch.off")) == []
+
+
+def test_under_a_strategy_nothing_competes_and_nothing_is_unprompted() -> None:
+    lights = LIGHTS.replace("§", "")
+    assert {item.code for item in make_supervisor(bundle_of(robot(lights, PACE.replace("§", "")))).diagnostics} == {
+        "competing-requests",
+        "unprompted-request",
+    }
+    text = robot(lights, PACE.replace("§", ""), "goal always eventually Pace.slow")
+    made = make_supervisor(bundle_of(text))
+    assert made.supervisor is not None and made.supervisor.strategy is not None
+    assert made.diagnostics == ()
 
 
 # Random models against enumerated states
@@ -566,7 +607,10 @@ class Twin:
         return expected | {("unreachable-state", place) for place in self._unreached(places)}
 
     def repeated(self, places: Places) -> set[Location]:
-        """The services and actions whose request is on a circle of the graph without messages of the robot."""
+        """The communications whose request is on a circle of the graph without messages of the robot.
+
+        A message counts if its request leads to another state there.
+        """
         messages = {item.name for item in self.model.communications if item.kind is CommunicationKind.OUTGOING_MESSAGE}
         begun, steps, todo = {0}, [], [0]
         while todo:
@@ -582,12 +626,20 @@ class Twin:
                     steps.append(item)
         graph = igraph.Graph(len(self.enabled), [(source, target) for source, _, target in steps], directed=True)
         circle = graph.connected_components(mode="strong").membership
-        on_circles = {event for source, event, target in steps if circle[source] == circle[target]}
+        incoming = {
+            item.event(EventKind.REQUEST)
+            for item in self.model.communications
+            if item.kind is CommunicationKind.INCOMING_MESSAGE
+        }
+        on_circles = {
+            event
+            for source, event, target in steps
+            if circle[source] == circle[target] and not (event in incoming and source == target)
+        }
         return {
             places.communications[item.name]
             for item in self.model.communications
-            if item.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)
-            and item.event(EventKind.REQUEST) in on_circles
+            if item.kind is not CommunicationKind.OUTGOING_MESSAGE and item.event(EventKind.REQUEST) in on_circles
         }
 
     def _unreached(self, places: Places) -> set[Location]:

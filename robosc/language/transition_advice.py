@@ -80,7 +80,8 @@ class TransitionReader(RequirementReader):
         words = self._words(list(range(begin, end)))
         for at in range(5, len(words) - 1):
             phrase = phrase_at(words, at, PHRASES)
-            if phrase is not None and phrase[0] is Link.ELSE:
+            is_behind_target = self._texts[begin + at - 2] == "goto"
+            if phrase is not None and phrase[0] is Link.ELSE and is_behind_target:
                 state = self._state(end - 1, component)
                 if not state or self._texts[begin + 1] != "response":
                     return None

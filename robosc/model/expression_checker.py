@@ -507,10 +507,10 @@ class ExpressionChecker:
         if meant:
             message = f"'{name}' is a communication, not a value: '{meant}' says what became of it"
             self._findings.error("unknown-name", message, tree.location, f"Write '{meant}'.")
-        elif outcome.is_requested:
+        elif outcome.is_requested or not outcome.has_data:
             return False
         else:
-            kept = outcome.free or f"{name}_seen"
+            kept = outcome.free or f"last_{name}"
             message = f"'{name}' is a message, not a value: a variable keeps what comes with it"
             line = f"on response from {spelled(name)} do {kept} := value"
             fix = (

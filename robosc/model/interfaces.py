@@ -123,7 +123,7 @@ class InterfaceChecker:
         self._types = types
         self._findings = findings
         self._noted: set[str] = set()
-        self._reported: set[Fault] = set()
+        self._reported: set[tuple[str, str, Location]] = set()
         self._uses = uses
         self.fields: dict[str, dict[str, Field]] = {}
         self.left_out: dict[str, LeftOut] = {}
@@ -203,9 +203,10 @@ class InterfaceChecker:
 
     def _report_once(self, fault: Fault) -> None:
         """Report a fault that all nodes have, once."""
-        if fault in self._reported:
+        known = (fault.code, fault.message, fault.location)
+        if known in self._reported:
             return
-        self._reported.add(fault)
+        self._reported.add(known)
         near = self._findings.near(fault.name, fault.known) if fault.name else None
         hint, fix = (
             (fault.hint, fault.fix) if near is None else (f"; did you mean '{near}'?", f"Write '{spelled(near)}'.")

@@ -22,7 +22,9 @@ def message_outcomes(
         is_outgoing = isinstance(item.tree, syntax.Message) and item.tree.direction is syntax.Direction.OUTGOING
         own = names[item.part.name].variables if item.part.name in names else {}
         free = next((name for name, type_ in own.items() if isinstance(type_, BooleanType)), "")
-        found.setdefault(item.tree.name.text, Outcome(not is_outgoing, item.part.name, free=free))
+        type_ = item.tree.type if isinstance(item.tree, syntax.Message) else item.tree.response
+        has_data = not (isinstance(type_, syntax.BasicType) and type_.name is syntax.BasicTypeName.NONE)
+        found.setdefault(item.tree.name.text, Outcome(not is_outgoing, has_data, item.part.name, free=free))
     for behaviour in behaviours:
         component = behaviour.part.name
         initial = next(

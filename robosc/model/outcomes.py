@@ -15,6 +15,7 @@ class Outcome:
 
     Attributes:
         is_requested: True if the robot requests it.
+        has_data: True if data comes with its response.
         component: Its component.
         kept: Variables that its data is put into as it is, with their types.
         states: States that its events lead to, by the kind of the event, with the initial state of that component.
@@ -22,6 +23,7 @@ class Outcome:
     """
 
     is_requested: bool
+    has_data: bool
     component: str
     kept: dict[str, Type | None] = field(default_factory=dict)
     states: dict[str, tuple[str, str]] = field(default_factory=dict)

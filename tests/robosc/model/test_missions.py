@@ -156,7 +156,7 @@ def test_words_of_missions_are_names_of_everything() -> None:
         ("mission m { visit value }", "no-value-here", "received data"),
         ("mission m while value > 1 { visit Door.open }", "no-value-here", "received data"),
         ("mission m { visit Door.open on value > 1 from anywhere visit Door.open }", "no-value-here", "received data"),
-        ("mission m { visit seen }", "unknown-name", "unknown name 'seen'"),
+        ("mission m { visit seen }", "unknown-name", "'seen' is a message, not a value"),
         ("mission m { visit Door }", "type-mismatch", "is a component"),
         ("mission m { visit Door.open then Door.level }", "type-mismatch", "boolean is needed"),
         ("mission m { visit Door.open on Door.ajar from anywhere visit Door.open }", "unknown-name", "'ajar'"),
@@ -174,7 +174,7 @@ def test_what_stands_in_them_is_checked(text: str, code: str, words: str) -> Non
 
 def test_a_message_that_is_no_condition_is_told_how_it_becomes_one() -> None:
     (found,) = checked(robot("mission m { visit Door.open on seen from anywhere visit Door.shut }")).diagnostics
-    assert found.fix.startswith("'seen' is a communication: let a component go to a state with it")
+    assert found.fix.startswith("Let the behaviour of 'Door' keep it: 'on response from seen do last_seen := value'")
 
 
 def test_missions_have_names_of_their_own() -> None:

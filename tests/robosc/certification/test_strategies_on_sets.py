@@ -211,9 +211,10 @@ WALKER = """robot Walker {
             marked state moving {
                 on response from move goto there
                 on error from move goto start
-                on cancel to move goto start
+                on cancel to move goto stopped
             }
             marked state there { on request to home goto start }
+            marked state stopped { on request to home goto start }
         }
     }
     component Person {

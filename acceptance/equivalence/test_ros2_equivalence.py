@@ -22,6 +22,7 @@ from support.hostile import hostile_supervisor
 from support.models import model_of
 from support.random_controllers import random_controller
 from support.random_supervisors import CERTIFICATE
+from support.random_travels import random_travels
 
 pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
 
@@ -93,6 +94,15 @@ def test_services_and_actions(tmp_path: Path) -> None:
     seen = observe(supervisor, scenario)
     asked = {(kind, name) for item in seen for kind, name, _ in item.issued}
     assert asked >= {("call", "power"), ("call", "wind"), ("goal", "count"), ("goal", "reach"), ("cancel", "count")}
+    compare(ros2_target(supervisor, tmp_path), scenario, seen)
+
+
+@pytest.mark.parametrize("seed", [2, 5, 7])
+def test_goals_that_end_some_time_after_their_cancel(seed: int, tmp_path: Path) -> None:
+    supervisor = random_travels(seed)
+    scenario = node_scenario(supervisor, seed, 80, ends_on_cancel=False)
+    seen = observe(supervisor, scenario)
+    assert any(item.cancelling and item.cancelling[0] for item in seen)
     compare(ros2_target(supervisor, tmp_path), scenario, seen)
 
 

@@ -222,7 +222,8 @@ def _replies(model: Model, target: PythonTarget, dice: Random, drawn: Dice, outc
             is_cancelling = item.name in target.executor.cancelling
             if is_cancelling and outcomes is _OUTCOMES:
                 found.append(Action("refuse", item.name, how=dice.choice(("ended", "ended", "running"))))
-            how = dice.choice(_ENDS_OF_CANCELLED if is_cancelling and outcomes is _OUTCOMES else outcomes)
+            possible = _ENDS_OF_CANCELLED if outcomes is _OUTCOMES else (*outcomes, "cancelled", "cancelled")
+            how = dice.choice(possible if is_cancelling else outcomes)
             result = drawn.received(item.name, "response") if how == "succeeded" else None
             found.append(Action("end", item.name, result, how=how))
             found.append(Action("feedback", item.name, drawn.received(item.name, "feedback")))
@@ -242,11 +243,11 @@ def node_settings(model: Model, policy: str | None = "fair") -> dict[str, Any]:
     }
 
 
-def node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
+def node_scenario(supervisor: Supervisor, seed: int, length: int, *, ends_on_cancel: bool = True) -> Scenario:
     """A run for a node with real servers: each decision comes with something that comes.
 
     The period is as long as can be, so that no timer decides at its own will; servers accept every goal, and a goal
-    that the controller cancels ends.
+    that the controller cancels ends: at once, or else later and in any way.
     """
     dice = Random(seed)
     settings = node_settings(supervisor.model, dice.choice(("fair", "priority")))
@@ -264,7 +265,7 @@ def node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scenario:
             break
         actions.append(action)
         seen = target.do(action)
-        actions += follow(seen, target)
+        actions += follow(seen, target, ends_on_cancel=ends_on_cancel)
     return Scenario(tuple(actions), settings)
 
 
@@ -421,6 +422,8 @@ def follow(
     target: PythonTarget,
     issued: list[Issued] | None = None,
     answers: Mapping[str, Any] | None = None,
+    *,
+    ends_on_cancel: bool = True,
 ) -> list[Action]:
     """Let servers act at once: accept goals, end cancelled ones, and answer calls of services that have an answer.
 
@@ -432,7 +435,7 @@ def follow(
         kind, name, _ = waiting.pop(0)
         action = {
             "goal": Action("accept", name),
-            "cancel": Action("end", name, how="cancelled"),
+            "cancel": Action("end", name, how="cancelled") if ends_on_cancel else None,
             "call": Action("reply", name, answers[name]) if answers and name in answers else None,
         }.get(kind)
         if action is not None:

@@ -89,8 +89,8 @@ class Ros1Surroundings:
                 self._peer.serve(name, type_name)
             else:
                 type_name = type_name.removesuffix("Action")
-                # The end of a cancelled goal is a step of its own for a layer.
-                self._peer.act(name, type_name, ends_on_cancel=not self._is_layer)
+                # The end of a cancelled goal is a step of its own.
+                self._peer.act(name, type_name, ends_on_cancel=False)
             types[item.name] = type_name
         if self._is_layer:
             basic = {i.name for i in self._supervisor.model.communications if not isinstance(i.feedback, ObjectType)}
@@ -147,11 +147,11 @@ class Ros1Surroundings:
                 self._peer.do("answer", name=name, message=_fields(action.data))
             case "feedback":
                 self._peer.do("feedback", name=name, message=action.data)
-            case "end" if action.how != "cancelled" or self._is_layer:
+            case "end":
                 how = {"cancelled": "canceled"}.get(action.how, action.how)
                 self._peer.do("end", name=name, how=how, message=_fields(action.data))
-            case "accept" | "end":
-                # The peer does this by itself, as soon as the goal or its cancel comes.
+            case "accept":
+                # The peer does this by itself, as soon as the goal comes.
                 pass
             case _:
                 raise ValueError(action.do)

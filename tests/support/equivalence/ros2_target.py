@@ -102,8 +102,8 @@ class Ros2Surroundings:
             type_ = load_server(_ServerType(is_action, str(info.package), str(info.interface)))  # type: ignore[arg-type]
             self._seen[item.name] = 0
             if is_action:
-                # The end of a cancelled goal is a step of its own for a layer.
-                self._actions[item.name] = HeldAction(host, type_, item.identifier, ends_on_cancel=not self._is_layer)
+                # The end of a cancelled goal is a step of its own.
+                self._actions[item.name] = HeldAction(host, type_, item.identifier, ends_on_cancel=False)
             else:
                 self._services[item.name] = HeldService(host, type_, item.identifier)
             types[item.name] = type_
@@ -149,10 +149,6 @@ class Ros2Surroundings:
                 self._peer.spin_until(lambda: len(server.handles) == self._seen[name], LIMIT_S, "the goal", self._node)
             case "feedback":
                 self._actions[name].feedback(**_fields(self._actions[name].action_class.Feedback, action.data))
-            case "end" if action.how == "cancelled" and not self._is_layer:
-                # The server ends the goal as soon as the cancel comes.
-                server = self._actions[name]
-                self._peer.spin_until(server.is_last_over, LIMIT_S, "the cancelled goal's end", self._node)
             case "end":
                 result = _fields(self._actions[name].action_class.Result, action.data)
                 self._actions[name].end(_ENDS[action.how], **result)

@@ -20,7 +20,7 @@ def connections(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Any]:
     folder = tmp_path_factory.mktemp("package")
     write_files(generate(example_supervisor("line_follower/line_follower"), "ros1"), folder)
     with pytest.MonkeyPatch.context() as patch:
-        for name, members in (("rospy", {}), ("actionlib", {"ActionClient": None})):
+        for name, members in (("rospy", {}), ("actionlib", {"ActionClient": object, "CommState": None})):
             stub = ModuleType(name)
             vars(stub).update(members)
             patch.setitem(sys.modules, name, stub)

@@ -11,7 +11,7 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
-from typing import Any, Callable, FrozenSet, Optional
+from typing import Any, Callable, Optional
 
 from robosc.targets.ros.runtime.presence import Presence
 from robosc.targets.ros.runtime.reports import AbandonedGoal, Reports
@@ -77,7 +77,7 @@ class _Goal:
 
     __slots__ = ('cancelled_s', 'handle', 'is_accepted', 'servers', 'since_s', 'state')
 
-    def __init__(self, now_s: float, servers: FrozenSet[str]) -> None:
+    def __init__(self, now_s: float, servers: frozenset[str]) -> None:
         self.servers = servers
         self.handle: Any = None
         self.state = WAITING_FOR_GOAL_ACK

@@ -14,8 +14,8 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 from __future__ import annotations
 
 from collections.abc import Callable
+import os
 from typing import Any
-import uuid
 
 from robosc.targets.ros.runtime.presence import Presence
 from robosc.targets.ros.runtime.reports import AbandonedGoal, Reports
@@ -249,7 +249,7 @@ class ActionGoals:
         if not self.is_ready():
             self._end(goal_id, 'lost')
             return
-        name = uuid.uuid4().bytes
+        name = os.urandom(16)
         future = self._client.send_goal_async(
             message,
             feedback_callback=self._feedback(goal_id),

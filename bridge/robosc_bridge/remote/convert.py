@@ -377,8 +377,8 @@ def response_of(item: programs.ToProgram) -> pb.AttachResponse:
             return pb.AttachResponse(cancel=pb.ModelCancel(name=name, number=number))
         case programs.PassedOn(identifier, data):
             return pb.AttachResponse(passed_on=pb.Message(identifier=text_of(identifier), data=value_of(data)))
-        case programs.Blocked(identifier):
-            return pb.AttachResponse(blocked=pb.Blocked(identifier=text_of(identifier)))
+        case programs.Blocked(identifier, why):
+            return pb.AttachResponse(blocked=pb.Blocked(identifier=text_of(identifier), why=text_of(why)))
         case programs.Answered(call_id, data, is_default):
             answer = pb.OwnAnswer(id=call_id, data=value_of(data), is_default=is_default)
             return pb.AttachResponse(answer=answer)

@@ -591,10 +591,12 @@ class ModelCancel(_message.Message):
     def __init__(self, name: _Optional[str] = ..., number: _Optional[int] = ...) -> None: ...
 
 class Blocked(_message.Message):
-    __slots__ = ("identifier",)
+    __slots__ = ("identifier", "why")
     IDENTIFIER_FIELD_NUMBER: _ClassVar[int]
+    WHY_FIELD_NUMBER: _ClassVar[int]
     identifier: str
-    def __init__(self, identifier: _Optional[str] = ...) -> None: ...
+    why: str
+    def __init__(self, identifier: _Optional[str] = ..., why: _Optional[str] = ...) -> None: ...
 
 class OwnAnswer(_message.Message):
     __slots__ = ("id", "data", "is_default")

@@ -344,7 +344,9 @@ def test_in_standby_everything_is_held_back_and_what_was_awaited_is_answered(sce
     assert program.of(Answered) == [Answered("t", None, is_default=True)]
     assert [item.outcome for item in program.of(GoalOver)] == ["aborted"]
     assert program.say(MessageRequested, "/cmd_vel", FORWARD) == [Blocked("/cmd_vel")]
-    assert program.say(CallRequested, "turn", "a", None) == [Answered("a", None, is_default=True), Blocked("/turn")]
+    answered, blocked = program.say(CallRequested, "turn", "a", None)
+    assert (answered, blocked) == (Answered("a", None, is_default=True), Blocked("/turn"))
+    assert blocked.why == "the bridge executes no supervisor"
     assert program.say(GoalRequested, "face", "g", None) == [GoalRejected("g"), Blocked("/face")]
     scene.daemon.post(OperatorCommand.START)
     scene.live(0.3, 2.0)

@@ -306,3 +306,58 @@ def test_violations_beyond_the_limit_are_only_counted(tmp_path: Path, monkeypatc
     monkeypatch.setattr(checking, "MAXIMUM_VIOLATIONS", 2)
     found = check_log(read(tmp_path, wrong(1, event="come.request")[:1] * 5), supervisor())
     assert (len(found.violations), found.violation_count, found.has_passed) == (2, 5, False)
+
+
+LIMITED = """
+robot Limited {
+  interface sample use Sample from our_msgs
+  datatype object Sample { x: double }
+  component Wheels {
+    incoming message go with identifier: "/go", type: Sample links sample
+    outgoing message near with identifier: "/near", type: boolean
+    behaviour {
+      variable close: boolean
+      on response from near do close := value
+      initial marked state on_ground { on request to go }
+    }
+  }
+  provide go with { x: 2.0 }
+  limit go to { x: -1.0..1.0 }
+  limit go to { x: 0.0..0.25 } if Wheels.close
+}
+"""
+
+
+def test_a_controller_provides_numbers_within_their_limits(tmp_path: Path) -> None:
+    made = supervisor_of(model_of(LIMITED))
+    bench = Bench(InterpretedSystem(made))
+    bench.tick()
+    bench.receive("/near", True)
+    bench.tick()
+    entries = World.of(bench)
+    assert [entry["limited"] for entry in entries if entry["kind"] == "limited"] == [
+        ["x: 2.0 -> 1.0"],
+        ["x: 2.0 -> 0.25"],
+    ]
+    assert check_log(read(tmp_path, entries), made).violations == ()
+    for entry in entries:
+        if entry.get("event") == "go.request":
+            entry["data"] = {"x": 2.0}
+    found = check_log(read(tmp_path, entries), made)
+    assert len(found.violations) == 2
+    assert "carries {'x': 2.0}, where the model provides {'x': 1.0}" in found.violations[0].sentence.replace('"', "'")
+
+
+def test_a_layer_lets_no_number_through_that_is_outside_a_limit(tmp_path: Path) -> None:
+    made = supervisor_of(model_of(LIMITED), Deployment.LAYER)
+    bench = LayerBench(InterpretedSystem(made))
+    bench.request("/go", {"x": -5.0})
+    bench.receive("/near", True)
+    bench.request("/go", {"x": -5.0})
+    entries = World.of(bench)
+    assert check_log(read(tmp_path, entries), made).violations == ()
+    for entry in entries:
+        if entry.get("event") == "go.request":
+            entry["data"] = {"x": 0.5}
+    (found,) = check_log(read(tmp_path, entries), made).violations
+    assert "go.request went through with x = 0.5, which a limit keeps within 0.0..0.25" in found.sentence

@@ -78,9 +78,10 @@ class PassedOn(_Weighed):
 
 @dataclass(frozen=True)
 class Blocked:
-    """A request of this program on an identifier was held back."""
+    """A request of this program on an identifier was held back, for a reason in words."""
 
     identifier: str
+    why: str = field(default="", compare=False)
 
 
 @dataclass(frozen=True)

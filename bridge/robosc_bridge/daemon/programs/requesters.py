@@ -35,6 +35,7 @@ _log = logging.getLogger(__name__)
 
 _Id = tuple[Program, str]
 _GONE = "the program that asked for it is gone"
+_NO_SUPERVISOR = "the bridge executes no supervisor"
 _TOO_MUCH = "the program that asked for it sends too much at once"
 
 
@@ -163,13 +164,17 @@ class Requesters:
         """Hold a request back, since the bridge executes no supervisor now."""
         match item:
             case MessageRequested(program=program, identifier=identifier):
-                self._clients.send(program, Blocked(identifier))
+                self._clients.send(program, Blocked(identifier, _NO_SUPERVISOR))
             case CallRequested(program=program, service=service, call_id=call_id):
                 self._clients.send(program, Answered(call_id, None, is_default=True))
-                self._clients.send(program, Blocked(self._checker.identifier(CommunicationKind.SERVICE, service)))
+                self._clients.send(
+                    program, Blocked(self._checker.identifier(CommunicationKind.SERVICE, service), _NO_SUPERVISOR)
+                )
             case GoalRequested(program=program, action=action, goal_id=goal_id):
                 self._clients.send(program, GoalRejected(goal_id))
-                self._clients.send(program, Blocked(self._checker.identifier(CommunicationKind.ACTION, action)))
+                self._clients.send(
+                    program, Blocked(self._checker.identifier(CommunicationKind.ACTION, action), _NO_SUPERVISOR)
+                )
 
     def _why_refused(self, item: ProgramRequest) -> str:
         """Return the reason why a program's request is invalid now, one sentence; empty: it is valid."""
@@ -192,7 +197,7 @@ class Requesters:
         """Report to a program that its request on an identifier was held back."""
         self._was_blocked = True
         if self._asker is not None:
-            self._clients.send(self._asker, Blocked(identifier))
+            self._clients.send(self._asker, Blocked(identifier, why))
 
     def answer(self, communication: str, call_id: _Id, data: Any) -> None:
         """Send the reply of a service to the program that called it."""

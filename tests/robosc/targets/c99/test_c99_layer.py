@@ -161,7 +161,7 @@ def test_random_supervisors_behave_as_the_reference(tmp_path: Path) -> None:
     for seed in range(20):
         supervisor = msgspec.structs.replace(random_supervisor(seed), deployment=Deployment.LAYER)
         if any(len(sharing) > 1 for sharing in sharing_requests(supervisor.model)):
-            continue  # Nothing distinguishes these.
+            continue  # No condition distinguishes these.
         try:
             program = compiled_layer(supervisor, tmp_path / str(seed))
         except UnsupportedModelError:

@@ -160,13 +160,9 @@ def make_supervisor(
     problem = prepare(bundle, deployment)
     if isinstance(problem, SynthesisOutcome):
         return problem
-    outcome = _supervised(
-        bundle, problem, deployment, engine, verify_limit, allow_livelock, should_stop, on_progress
-    )
+    outcome = _supervised(bundle, problem, deployment, engine, verify_limit, allow_livelock, should_stop, on_progress)
     is_judged = outcome.status is OutcomeStatus.SUPERVISOR and deployment is Deployment.CONTROLLER
-    diagnostics, accepted = accept(
-        bundle, outcome.diagnostics, lambda code: is_judged and code in AFTER_SYNTHESIS
-    )
+    diagnostics, accepted = accept(bundle, outcome.diagnostics, lambda code: is_judged and code in AFTER_SYNTHESIS)
     return replace(outcome, diagnostics=diagnostics, accepted=sorted_diagnostics((*problem.accepted, *accepted)))
 
 

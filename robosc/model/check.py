@@ -187,9 +187,7 @@ def _with_sound_parts(parsed: Parsed, checker: "_RobotChecker") -> Checked:
         and not (item.code == "unknown-name" and _name_of(item, checker.bundle) in defined)
         and (item.location is None or (item.location.file, item.location.line) not in broken)
     ]
-    diagnostics, accepted = accept(
-        checker.bundle, sorted_diagnostics((*parsed.diagnostics, *own)), lambda code: False
-    )
+    diagnostics, accepted = accept(checker.bundle, sorted_diagnostics((*parsed.diagnostics, *own)), lambda code: False)
     return Checked(None, diagnostics, bindings=checker.findings.bindings, accepted=accepted)
 
 

@@ -94,7 +94,9 @@ def _outcome(model: Model, enum: EnumDefinition, elements: int) -> bool:
         types = {path: path_type(model, enum.source, path) for path in received_paths(rule.condition)}
         if not all(map(_is_of_numbers, types.values())):
             return False
-        read = {path: math.nan if isinstance(type_, DoubleType) else [math.nan] * elements for path, type_ in types.items()}
+        read = {
+            path: math.nan if isinstance(type_, DoubleType) else [math.nan] * elements for path, type_ in types.items()
+        }
         holds = evaluate(rule.condition, _no_state, _no_state, read.__getitem__)
         if holds is True:
             return False

@@ -30,11 +30,17 @@ OBJECT = (
 )
 
 ZONES = (
-    OBJECT + " datatype enum Zone from Scan to {{ {} }} "
-    "component D {{ outgoing message scan with type: Zone links i behaviour {{ variable zone: Zone = stop "
-    "on response from scan do zone := value initial marked state s {{ }} }} }} "
-    "component E {{ incoming message go with type: none }}"
-).replace("double list: array(double) name: string n: integer }", "double list: array(double) name: string n: integer }}").replace("object Scan {", "object Scan {{")
+    (
+        OBJECT + " datatype enum Zone from Scan to {{ {} }} "
+        "component D {{ outgoing message scan with type: Zone links i behaviour {{ variable zone: Zone = stop "
+        "on response from scan do zone := value initial marked state s {{ }} }} }} "
+        "component E {{ incoming message go with type: none }}"
+    )
+    .replace(
+        "double list: array(double) name: string n: integer }", "double list: array(double) name: string n: integer }}"
+    )
+    .replace("object Scan {", "object Scan {{")
+)
 
 # code, severity, broken, sound
 RULES: list[tuple[str, str, str, str]] = [
@@ -461,9 +467,9 @@ RULES: list[tuple[str, str, str, str]] = [
         "note",
         robot("§// robosc: accept shared-topic: both are meant", component(STATES)),
         robot(
-            "component A { outgoing message m with identifier: \"/m\", type: none }",
+            'component A { outgoing message m with identifier: "/m", type: none }',
             "// robosc: accept shared-topic: both are meant",
-            "component B { outgoing message n with identifier: \"/m\", type: none }",
+            'component B { outgoing message n with identifier: "/m", type: none }',
         ),
     ),
 ]

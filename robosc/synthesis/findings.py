@@ -14,14 +14,14 @@
   again and again, with only requests, their replies and silent steps in between, and no message of the robot that would
   prompt it; likewise a message whose request changes the state, as where two of them alternate. It is a note, because a
   patrol is meant to go on for ever. A loop is reported once, for its service or action that is declared first, or its
-  message where it has none. It is only for the controller, because in a layer the existing controller makes the requests. In a
-  large system the search is given up.
+  message where it has none. It is only for the controller, because in a layer the existing controller makes the
+  requests. In a large system the search is given up.
 - `competing-requests`: two communications of one kind (topics, services and actions have name spaces of their own)
   with one identifier that can be requested in one state, with a shortest run to such a state. It is only for the
   controller, because in a layer the existing controller chooses.
 
-Where goals are given, a strategy chooses what is requested: neither of the last two is reported, nor a cancel that never
-happens.
+Where goals are given, a strategy chooses what is requested: neither of the last two is reported, nor a cancel that
+never happens.
 """
 
 from collections import defaultdict, deque

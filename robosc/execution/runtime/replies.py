@@ -72,7 +72,7 @@ class Replies:
         return True
 
     def require_reply(self, request_id: int, data: Any) -> None:
-        """Do nothing if data can be the reply to a call under way (MissingData if it lacks any)."""
+        """Do nothing if data can be the reply to a call (MissingData if it lacks any)."""
         service = self._calls.find(request_id)
         if service is not None:
             self._steps.read(service + '.response', data)

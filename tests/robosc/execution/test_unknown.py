@@ -248,7 +248,7 @@ def test_what_cannot_be_unknown_by_its_type_is_an_error_of_the_caller(
         b.executor = Executor(b.system, b.middleware, b.executor.settings, b.clock)
         b.executor.start()
     before = b.system.signature()
-    with pytest.raises(MissingData, match="missing|must be") as raised:
+    with pytest.raises(MissingData, match=r"missing|must be") as raised:
         b.executor.receive(identifier, value)
     assert what.removeprefix("level.response: ").removeprefix("scan.response: ") in str(raised.value)
     assert (b.system.signature(), b.status(), b.events) == (before, Status.WAITING, [])

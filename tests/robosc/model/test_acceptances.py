@@ -103,5 +103,5 @@ def test_the_formatter_keeps_them() -> None:
 
 
 def test_the_codes_of_later_stages_are_those_of_their_pages() -> None:
-    assert LATER == {item.code for item in pages() if item.stage not in (Stage.TEXT, Stage.MODEL)}
+    assert {item.code for item in pages() if item.stage not in (Stage.TEXT, Stage.MODEL)} == LATER
     assert AFTER_SYNTHESIS < LATER

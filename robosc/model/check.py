@@ -27,8 +27,8 @@ from robosc.model.communications import (
     with_conditions,
 )
 from robosc.model.constants import Constants
-from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.defaults import permissive_defaults
+from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import WORD, Bindings, Findings
 from robosc.model.goals import build_goals
 from robosc.model.interfaces import InterfaceChecker
@@ -340,7 +340,9 @@ class _RobotChecker:
                     rules.append(EnumRule(condition, rule.value.text))
             default = next((rule.value.text for rule in tree.rules if rule.condition is None), None)
             self.places.enums[key] = tree.name.location
-            self._defaults.update({key: rule.value.location for rule in tree.rules if rule.condition is None})
+            for rule in tree.rules:
+                if rule.condition is None:
+                    self._defaults[key] = rule.value.location
             if default is not None:
                 found.append(EnumDefinition(key, source, enum.values, tuple(rules), default))
         return tuple(found)

@@ -133,7 +133,7 @@ def _partial(expression: Expression, component: str, variable: str, value: str) 
             return value
         case Unary(operator="not" | "holds" as operator, operand=operand):
             found = _partial(operand, component, variable, value)
-            return found if operator == "holds" else values.not_(found)  # type: ignore[no-any-return]
+            return found if operator == "holds" else values.not_(found)
         case Binary(operator="and" | "or" | "implies" | "=" | "!=" as operator, left=left, right=right):
             sides = [_partial(side, component, variable, value) for side in (left, right)]
             functions = {

@@ -283,7 +283,10 @@ def walked(supervisor: Supervisor, dice: Random, steps: int, data: Callable[[Ran
         is_own = kind in ("request", "cancel", "reset") or kind.startswith("tau_")
         if is_own and not system.enabled(event):
             continue
-        reading = system.read(event, None if is_own else data(dice))
+        try:
+            reading = system.read(event, None if is_own else data(dice))
+        except MissingData:
+            continue
         rule = system._events[event]
         successor = system._successor(rule, reading.values.get)
         if successor is None or successor.leaves_range:

@@ -15,6 +15,7 @@ MIDDLEWARE = Middleware(
         "launch",
         "launch_ros",
         "lifecycle_msgs",
+        "python3-yaml",
         "rcl_interfaces",
         "rclpy",
         "std_msgs",

@@ -429,3 +429,14 @@ def test_a_program_that_comes_twice_is_one() -> None:
     program.cycle()
     scene.daemon.post(Attached(program.program))
     assert why(program.cycle()) == ["this program is there already"]
+
+
+def test_data_that_lacks_what_every_message_has_is_refused_and_nothing_happens() -> None:
+    scene = helped()
+    program = Connected(scene, "program")
+    for data, words in ((None, "value is missing"), ("1", "value is '1', and must be an integer"), ({}, "value is {}")):
+        program.say(MessageReceived, "/go", data)
+        scene.live(0.05, 2.0)
+        assert words in why(program.of(Refused))[-1]
+    assert variable(scene, "wanted") == 0
+    assert state(scene) == "calm"

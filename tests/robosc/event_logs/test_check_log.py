@@ -67,7 +67,7 @@ def test_a_mutated_log_is_found_where_the_interpreted_system_finds_it(
 
 def test_the_random_logs_show_everything(tmp_path: Path) -> None:
     total: Counter[str] = Counter()
-    for seed in range(80):
+    for seed in range(160):
         dice, supervisor, entries = random_log(seed)
         total.update(entry["kind"] for entry in entries)
         total.update(entry["event"].rpartition(".")[2][:4] for entry in entries if entry["kind"] == "event")

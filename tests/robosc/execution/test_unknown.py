@@ -334,7 +334,7 @@ def test_an_update_that_was_counted_on_and_did_not_happen_is_a_fault() -> None:
     b = bench(RADAR)
     event = "level.response"
     assert (event, "Sensor.n") in b.system.description.sure_updates
-    b.system.read = lambda *given: Reading({}, {}, (), False)  # type: ignore[method-assign, assignment]
+    b.system.read = lambda *given: Reading({}, {}, (), False)  # type: ignore[method-assign]
     b.executor.receive("level", 3)
     assert b.executor.is_faulty
     assert b.executor.reasons == ("ExecutionError: Sensor.n was not updated at level.response",)

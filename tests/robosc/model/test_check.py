@@ -543,3 +543,33 @@ def test_a_communication_that_is_there_but_broken_is_not_unknown() -> None:
         " requirement m needs C.s requirement C.s disables m provide m with 1 }"
     ).diagnostics
     assert found.message == "unknown data type 'zork'"
+
+
+BROKEN = """robot R {
+    component A {
+        incoming message go with identifier: "/a", type: none
+        behaviour {
+            variable n: integer(0..3)
+            initial marked state idle { on request to go goto busy }
+            state busy { on request to go do goto idle }
+        }
+    }
+    requirement go needs A.nope
+    requirement go needs A.n
+    requirement go needs B.there and C.gone
+    component B { behaviour { initial marked state there { } foo } }
+    component C { behaviour { initial marked state here { } } state gone { } }
+}
+"""
+
+
+def test_a_syntax_error_hides_no_finding_of_the_sound_parts() -> None:
+    found = [(item.code, item.location.line if item.location else 0) for item in checked(BROKEN).diagnostics]
+    # 'busy' leads back, in the part that is not sound; 'C.gone' may be the state of that name.
+    assert found == [
+        ("syntax-error", 7),
+        ("unknown-name", 10),
+        ("type-mismatch", 11),
+        ("syntax-error", 13),
+        ("syntax-error", 14),
+    ]

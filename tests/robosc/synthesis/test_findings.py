@@ -502,21 +502,21 @@ PACE = """component Pace {
 }"""
 
 
-def loops(text: str, deployment: Deployment = Deployment.CONTROLLER) -> list[str]:
+def repeats(text: str, deployment: Deployment = Deployment.CONTROLLER) -> list[str]:
     made = make_supervisor(bundle_of(text.replace("§", "")), deployment=deployment)
     return [item.message for item in made.diagnostics if item.code == "unprompted-request"]
 
 
 def test_messages_that_alternate_for_ever() -> None:
-    assert loops(robot(PACE)) == [
+    assert repeats(robot(PACE)) == [
         "'creep' can be sent again and again with no message of the robot in between, in the initial state: "
         "creep.request, full.request, and so on"
     ]
     # In a layer the existing controller sends them, and a message that changes nothing is sent once a period anyway.
-    assert loops(robot(PACE), Deployment.LAYER) == []
-    assert loops(robot("component Base { incoming message go with type: none }")) == []
+    assert repeats(robot(PACE), Deployment.LAYER) == []
+    assert repeats(robot("component Base { incoming message go with type: none }")) == []
     # A button prompts each of them.
-    assert loops(robot(PACE, SWITCH, "requirement creep needs Switch.on_", "requirement full needs Switch.off")) == []
+    assert repeats(robot(PACE, SWITCH, "requirement creep needs Switch.on_", "requirement full needs Switch.off")) == []
 
 
 def test_under_a_strategy_nothing_competes_and_nothing_is_unprompted() -> None:

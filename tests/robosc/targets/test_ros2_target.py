@@ -121,6 +121,22 @@ def test_the_parameter_file_holds_every_default(files: GeneratedFiles) -> None:
     assert (checked.topic_prefix, checked.log_folder, checked.publish_state) == ("", "", False)
 
 
+def test_a_given_parameter_hides_that_of_the_file(files: GeneratedFiles, tmp_path: Path) -> None:
+    """ROS keeps one value of each type: the number of the file would win over a text, and nobody would refuse it."""
+    text = next(text for path, text in files.items() if path.endswith("/parameter_file.py"))
+    names: dict[str, Any] = {"__file__": str(tmp_path / "package" / "parameter_file.py")}
+    exec(text.replace("from .interfaces import PACKAGE", "PACKAGE = 'none'"), names)
+    (tmp_path / "config").mkdir()
+    file = tmp_path / "config" / "parameters.yaml"
+    file.write_text(files["config/parameters.yaml"], encoding="utf-8")
+    given = ["--ros-args", "-p", "period:=abc", "--param", "node:seed:=x", "-r", "a:=b"]
+    first, option, chosen, *rest = names["arguments"](given)
+    assert (first, option, rest) == ("--ros-args", "--params-file", ["--", *given])
+    whole, left = (yaml.safe_load(Path(path).read_text("utf-8"))["/**"]["ros__parameters"] for path in (file, chosen))
+    assert left == {name: value for name, value in whole.items() if name not in ("period", "seed")}
+    assert names["arguments"](["--ros-args", "-p", "other:=1"])[2] == str(file)
+
+
 def test_the_readme_names_every_topic_and_parameter(files: GeneratedFiles) -> None:
     readme = files["README.md"]
     for row in (

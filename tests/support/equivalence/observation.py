@@ -15,8 +15,8 @@ Issued = tuple[str, str, Mapping[str, Any]]
 
 A request is `publish`, `default`, `call`, `goal` or `cancel`; then its subject (`default`: a topic); then the data
 that was given, by path. A report is `pass` and `blocked` (a topic or identifier), `answer`, `no answer`, `accept`,
-`reject`, `feedback` and `ended`; `refused` is what does not happen without data that it lacks; the caller's number of
-the call or goal is in the data.
+`reject`, `feedback` and `ended`; the caller's number of the call or goal is in the data. `refused` is what did not
+happen, for lack of data.
 """
 
 Entry = Mapping[str, Any]

@@ -90,7 +90,7 @@ class Dice:
         sources = [self._source(type_) for type_ in types]
         # A missing number is NaN in C.
         is_missing = self._is_hostile and not isinstance(sources[0], DoubleType) and dice.random() < 0.05
-        if is_missing and (not is_complete or all(_may_be_unknown(source) for source in sources)):
+        if is_missing and (not is_complete or all(map(_may_be_unknown, sources))):
             return None
         match sources[0]:
             case BooleanType():

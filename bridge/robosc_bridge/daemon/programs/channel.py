@@ -8,6 +8,7 @@ import logging
 from dataclasses import dataclass
 from typing import Any
 
+from robosc.execution.runtime.protocol import MissingData
 from robosc.model.structure import Communication, CommunicationKind
 from robosc_bridge.configuration.channel_mapping import ChannelMapping
 from robosc_bridge.configuration.channels import GrpcChannel
@@ -165,7 +166,10 @@ class ProgramChannel:
         if item.identifier not in self._heard:
             self._clients.refuse(item.program, f"the model hears nothing on '{item.identifier:.255}' from programs")
         elif executor is not None:
-            executor.receive(item.identifier, item.data)
+            try:
+                executor.receive(item.identifier, item.data)
+            except MissingData as error:
+                self._clients.refuse(item.program, str(error))
 
     def take(self, item: Answer, executor: Supervised | None) -> None:
         """Pass a program's answer to a call or goal on to the executor."""
@@ -179,6 +183,15 @@ class ProgramChannel:
             what = "goal" if is_goal else "call"
             self._clients.refuse(item.program, f"{item.number} is not a {what} that this program has been asked for")
             return
+        try:
+            self._take(item, asked, executor)
+        except MissingData as error:
+            # It is still awaited.
+            self._open[item.number] = asked
+            self._clients.refuse(item.program, str(error))
+
+    def _take(self, item: Answer, asked: _Open, executor: Supervised) -> None:
+        """Pass an answer on that is awaited (MissingData if it lacks what every message has)."""
         number = asked.number
         match item:
             case GoalAccepted():

@@ -22,7 +22,7 @@ from robosc.certification.strategies import verify_strategy
 from robosc.controller_properties import Controller, check_controller, controller_findings
 from robosc.errors import Diagnostic, InternalError, NodeLimitError, sorted_diagnostics
 from robosc.model.check import check
-from robosc.model.layers import layer_findings, without_controller_findings
+from robosc.model.layers import layer_findings, layer_warnings, without_controller_findings
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
@@ -115,6 +115,7 @@ def prepare(bundle: Bundle, deployment: Deployment) -> SynthesisProblem | Synthe
         ambiguous = layer_findings(checked.model, checked.places)
         if ambiguous:
             return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, sorted_diagnostics((*diagnostics, *ambiguous)))
+        diagnostics = (*diagnostics, *layer_warnings(checked.model, checked.places))
     diagnostics = sorted_diagnostics((*diagnostics, *layer_goal_findings(checked.model, checked.places, deployment)))
     system = ExecutableSystem(checked.model, deployment)
     # A model that synthesis cannot handle is refused here.

@@ -14,8 +14,8 @@ _ITEMS = frozenset(
 )
 """Words that begin an item of a list."""
 
-_ROBOT_ITEMS = frozenset({"goal", "assume", "mission", "prefer"})
-"""Words that begin an item of a robot, where no name can stand."""
+_ROBOT_ITEMS = frozenset({"goal", "assume", "limit", "mission", "prefer"})
+"""Free words that begin an item of a robot, where no name can stand."""
 
 _BEFORE_OPERANDS = frozenset(
     """

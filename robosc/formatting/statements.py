@@ -304,9 +304,12 @@ class _Expressions:
         self.place += 1
 
     def provided(self) -> None:
-        """Walk over an object value or an expression."""
+        """Walk over an object value, an expression, or ranges as limits have them."""
         if self.texts[self.place] != "{":
             self.expression()
+            if self.texts[self.place] == "..":
+                self.place += 1
+                self.expression(1)
             return
         openings: list[int] = []
         while True:
@@ -315,6 +318,9 @@ class _Expressions:
                 self.place += 1
             else:
                 self.expression(1)
+                if self.texts[self.place] == "..":
+                    self.place += 1
+                    self.expression(1)
             while openings and self.texts[self.place] == "}":
                 opening = openings.pop()
                 if self.place > opening + 1:
@@ -347,6 +353,7 @@ class _Walker(_Expressions):
             "constant": self._constant,
             "requirement": self._requirement,
             "provide": self._provide,
+            "limit": self._provide,
             "goal": self._aim,
             "assume": self._aim,
             "mission": self._mission,
@@ -460,7 +467,7 @@ class _Walker(_Expressions):
             self.place += 2
             if key in _TYPE_KEYS:
                 self.type()
-            elif key == "when":
+            elif key == "when" and self.texts[self.place] != "default":
                 self.expression(1)
             else:
                 self.number()

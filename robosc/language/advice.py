@@ -61,6 +61,7 @@ _SAID_ELSEWHERE = {
     "interface": "import uses include using",
     "leads": "lead causes implies triggers",
     "library": "lib package namespace",
+    "limit": "limits bound clamp restrict saturate cap",
     "links": "link linked link_to maps",
     "marked": "final accepting accept end mark terminal",
     "mission": "missions task plan route tour itinerary",
@@ -306,7 +307,7 @@ def _of_brackets(token: str, expected: Sequence[str]) -> str:
 
 
 _HOMES = {
-    **dict.fromkeys(("component", "datatype", "interface", "requirement", "provide"), "the robot or library"),
+    **dict.fromkeys(("component", "datatype", "interface", "requirement", "provide", "limit"), "the robot or library"),
     **dict.fromkeys(("goal", "assume", "mission", "prefer"), "the robot"),
     "visit": "a mission",
     **dict.fromkeys(("incoming", "outgoing", "service", "action", "behaviour"), "a component"),

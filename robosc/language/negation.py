@@ -13,7 +13,7 @@ _NAME, _NUMBER, _STRING = int(Kind.NAME), int(Kind.NUMBER), int(Kind.STRING)
 _BEGIN_OPERANDS = frozenset({"(", "!", "true", "false", "value"})
 _CONVERSIONS = frozenset({"integer", "double"})
 _BEHIND_OPERANDS = frozenset({"then", "else", "in"})
-_ITEMS = frozenset({"goal", "assume", "mission", "prefer"})
+_ITEMS = frozenset({"goal", "assume", "limit", "mission", "prefer"})
 """Free words that begin an item without a sign that tells."""
 
 _BETWEEN = frozenset({",", ":", "..", "in"})
@@ -51,7 +51,7 @@ def _is_behind_operand(texts: Sequence[str], kinds: Sequence[int], index: int) -
 
 
 def _begins_item(texts: Sequence[str], kinds: Sequence[int], index: int) -> bool:
-    """Return True if the free word at a token begins a goal, an assumption, a mission or a preference.
+    """Return True if the free word at a token begins a goal, an assumption, a limit, a mission or a preference.
 
     Of a name that could be such a word itself, as in `not mission goal while ...`, only the sign behind it decides.
     """
@@ -64,7 +64,7 @@ def _begins_item(texts: Sequence[str], kinds: Sequence[int], index: int) -> bool
     if word in ("goal", "assume"):
         # The goal of the next item: `goal once not goal always eventually red`.
         return not _is_behind_operand(texts, kinds, index + 1)
-    if word == "mission" and behind == "{":
+    if (word, behind) in (("mission", "{"), ("limit", "to")):
         return True
     is_head = (word, behind) in (("mission", "while"), ("prefer", "over"))
     return is_head and following not in _ITEMS and not _is_behind_operand(texts, kinds, index + 1)

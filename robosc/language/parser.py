@@ -86,6 +86,7 @@ class _Parser(MissionParser):
             "constant": self._constant,
             "requirement": self._requirement,
             "provide": self._provide,
+            "limit": self._limit,
         }
         self._robot_items = {
             **self._library_items,
@@ -336,12 +337,17 @@ class _Parser(MissionParser):
             raise self.fault("a number that is not negative")
         return syntax.Literal(self.integer(), self.since(index))
 
+    def _when(self) -> syntax.Name | syntax.Expression:
+        if self.takes("default"):
+            return syntax.Name("default", self.at(self.place - 1))
+        return self.expression()
+
     _options: Mapping[str, Callable[["_Parser"], syntax.Name | syntax.Text | syntax.Expression]] = {
         "qos": _quality,
         "depth": _number_option,
         "max_age": _number_option,
         "stamped": ExpressionParser.string,
-        "when": ExpressionParser.expression,
+        "when": _when,
     }
 
     # Behaviours
@@ -533,6 +539,37 @@ class _Parser(MissionParser):
         self.take("}")
         self.shallower()
         return syntax.ObjectValue(tuple(properties), self.since(begin))
+
+    def _limit(self) -> syntax.Limit:
+        place = self.at(self.take("limit"))
+        communication = self.name()
+        self.take("to")
+        range_ = self._range()
+        condition = self.expression() if self.takes("if") else None
+        return syntax.Limit(communication, range_, condition, place)
+
+    def _range(self) -> syntax.ObjectRange | syntax.Range:
+        begin = self.place
+        if self.texts[begin] != "{":
+            if self.kinds[begin] == _NAME and self.texts[begin + 1] == ":":
+                raise self.fault("'{'", fix="Write '{' before it.")
+            low = self.expression()
+            self.take("..")
+            return syntax.Range(low, self.expression(), self.since(begin))
+        self.place += 1
+        self.deeper(begin)
+        properties: list[tuple[syntax.Name, syntax.ObjectRange | syntax.Range]] = []
+        if self.texts[self.place] != "}":
+            properties.append((self.name(), self._property_range()))
+            while self.takes(","):
+                properties.append((self.name(), self._property_range()))
+        self.take("}")
+        self.shallower()
+        return syntax.ObjectRange(tuple(properties), self.since(begin))
+
+    def _property_range(self) -> syntax.ObjectRange | syntax.Range:
+        self.take(":")
+        return self._range()
 
     def _property_value(self) -> syntax.ObjectValue | syntax.Expression:
         self.take(":")

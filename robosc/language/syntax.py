@@ -218,7 +218,8 @@ class Option(msgspec.Struct, frozen=True, gc=False):
 
     Attributes:
         key: Key of the option; `location` is the key's.
-        value: A Name for `qos`, a Text for `stamped`, a number for `depth` and `max_age`, a condition for `when`.
+        value: A Name for `qos`, a Text for `stamped`, a number for `depth` and `max_age`, a condition or the
+            Name `default` for `when`.
     """
 
     key: OptionKey
@@ -375,6 +376,30 @@ class Provide(msgspec.Struct, frozen=True, gc=False):
     location: Location
 
 
+class Range(msgspec.Struct, frozen=True, gc=False):
+    """`low .. high`; `location` is the whole of it."""
+
+    low: Expression
+    high: Expression
+    location: Location
+
+
+class ObjectRange(msgspec.Struct, frozen=True, gc=False):
+    """`{ property: range, ... }`."""
+
+    properties: tuple[tuple[Name, "ObjectRange | Range"], ...]
+    location: Location
+
+
+class Limit(msgspec.Struct, frozen=True, gc=False):
+    """`limit communication to range if condition`."""
+
+    communication: Name
+    range: ObjectRange | Range
+    condition: Expression | None
+    location: Location
+
+
 GoalForm = Word["always eventually", "leads to", "once"]
 
 
@@ -462,6 +487,7 @@ Item = (
     | Requirement
     | Invariant
     | Provide
+    | Limit
     | Goal
     | Assumption
     | Mission

@@ -21,6 +21,7 @@ STARTS: dict[str, Literal[True, "a name", "names"] | frozenset[str]] = {
     "interface": "a name",
     "requirement": True,
     "provide": "a name",
+    "limit": "a name",
     "goal": "a name",
     "assume": "a name",
     "mission": "a name",
@@ -43,7 +44,9 @@ STARTS: dict[str, Literal[True, "a name", "names"] | frozenset[str]] = {
 An error inside one item ends where the next one seems to begin.
 """
 
-_DEFINITIONS = frozenset({"'component'", "'constant'", "'datatype'", "'interface'", "'requirement'", "'provide'"})
+_DEFINITIONS = frozenset(
+    {"'component'", "'constant'", "'datatype'", "'interface'", "'requirement'", "'provide'", "'limit'"}
+)
 
 _GROUPS: tuple[tuple[str, frozenset[str]], ...] = (
     ("a definition", _DEFINITIONS | {"'goal'", "'assume'", "'mission'", "'prefer'"}),

@@ -41,7 +41,7 @@ class ArrayLengths:
         for type_, part in parts.values():
             self._check_type(type_, part, catalogue)
         for option in tree.options:
-            if option.key == "when" and EventKind.REQUEST in parts:
+            if option.key == "when" and not isinstance(option.value, syntax.Name) and EventKind.REQUEST in parts:
                 self._check(option.value, *parts[EventKind.REQUEST], catalogue)  # type: ignore[arg-type]  # as parsed
 
     def check_transition(

@@ -174,7 +174,7 @@ class Uses:
     """Uses of communications in a robot, as written.
 
     Attributes:
-        commanded: Names of those that requirements and provide statements name.
+        commanded: Names of those that requirements, provide statements and limits name.
         reactions: Kinds of the events that behaviours react to, of each that they name.
     """
 
@@ -189,7 +189,7 @@ def uses_of(trees: Iterable[BehaviourTree], items: Iterable[syntax.Item]) -> Use
         match item:
             case syntax.Requirement(communications=names):
                 commanded.update(name.text for name in names)
-            case syntax.Provide(communication=name):
+            case syntax.Provide(communication=name) | syntax.Limit(communication=name):
                 commanded.add(name.text)
     reactions = defaultdict[str, set[str]](set)
     for tree in trees:

@@ -28,6 +28,7 @@ from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Bindings, Findings
 from robosc.model.goals import build_goals
 from robosc.model.interfaces import InterfaceChecker
+from robosc.model.limits import check_together
 from robosc.model.missions import build_missions, build_preferences
 from robosc.model.own_requests import OwnRequests
 from robosc.model.places import Places
@@ -43,6 +44,7 @@ from robosc.model.structure import (
     EnumDefinition,
     EnumRule,
     Goal,
+    Limit,
     Mission,
     Model,
     Provide,
@@ -207,7 +209,9 @@ class _RobotChecker:
         interfaces = InterfaceChecker(self._bundle, self._types, self.findings)
         fitting = interfaces.check(trees, communications, self._unit)
         self.fields = interfaces.fields
-        self._check_data(trees, communications, provides, fitting)
+        limits = tuple(restrictions.limits)
+        check_together(limits, self.places.limits, marked, self.findings)
+        self._check_data(trees, communications, provides, limits, fitting)
         self._check_indices(trees, communications, behaviour_trees, fitting)
         self._check_requests(communications, marked, requirements)
         self._check_empty(communications)
@@ -227,6 +231,7 @@ class _RobotChecker:
             assumptions=assumptions,
             missions=missions,
             preferences=preferences,
+            limits=limits,
         )
 
     def _resolve_own_types(self) -> None:
@@ -305,11 +310,13 @@ class _RobotChecker:
         trees: Iterable[CommunicationTree],
         communications: Mapping[str, Communication],
         provides: Iterable[Provide],
+        limits: Iterable[Limit],
         fitting: Mapping[str, Catalogue],
     ) -> None:
         """Check what requests send against the interfaces that they fit."""
         placed = tuple(zip(provides, self.places.provides, strict=True))
-        sent = SentMessages(fitting, placed, self._types, self.findings)
+        limited = tuple(zip(limits, self.places.limits, strict=True))
+        sent = SentMessages(fitting, placed, limited, self._types, self.findings)
         for item in trees:
             communication = communications.get(item.tree.name.text)
             if communication is not None:

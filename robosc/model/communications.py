@@ -126,12 +126,15 @@ def with_conditions(
     scopes: RobotScopes,
     findings: Findings,
 ) -> dict[str, Communication]:
-    """The communications with the conditions (`when`) that distinguish messages on one identifier."""
+    """The communications with the conditions (`when`) that distinguish requests on one identifier."""
     found = dict(communications)
     for item in trees:
         communication = found.get(item.tree.name.text)
         for option in item.tree.options:
-            if option.key != "when" or communication is None or communication.kind is not _INCOMING:
+            if option.key != "when" or communication is None or communication.request is None:
+                continue
+            if isinstance(option.value, syntax.Name):
+                found[communication.name] = msgspec.structs.replace(communication, is_when_default=True)
                 continue
             scope = replace(scopes.of(item.part.unit), components={}, received=communication.request)
             condition = ExpressionChecker(scope, findings).condition(option.value)  # type: ignore[arg-type]  # as parsed

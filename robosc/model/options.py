@@ -10,14 +10,14 @@ _ALLOWED: dict[str, tuple[CommunicationKind, ...]] = {
     "depth": _MESSAGES,
     "max_age": (CommunicationKind.OUTGOING_MESSAGE,),
     "stamped": (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.ACTION),
-    "when": (CommunicationKind.INCOMING_MESSAGE,),
+    "when": (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.SERVICE, CommunicationKind.ACTION),
 }
 _PURPOSE = {
     "qos": "says how a message travels",
     "depth": "says how many messages are kept",
     "max_age": "says when an outgoing message is stale",
     "stamped": "stamps what the controller sends: an incoming message or an action's request",
-    "when": "distinguishes incoming messages on one identifier",
+    "when": "distinguishes requests on one identifier",
 }
 
 

@@ -26,6 +26,7 @@ class Places:
         missions: In the order of the model's missions.
         visits: For each mission the places of its visits, then those of each detour's visits.
         preferences: In the order of the model's preferences.
+        limits: In the order of the model's limits.
         identifiers: By communication; where its identifier is written, or its name.
     """
 
@@ -45,4 +46,5 @@ class Places:
     missions: list[Location] = field(default_factory=list)
     visits: list[tuple[Location, ...]] = field(default_factory=list)
     preferences: list[Location] = field(default_factory=list)
+    limits: list[Location] = field(default_factory=list)
     identifiers: dict[str, Location] = field(default_factory=dict)

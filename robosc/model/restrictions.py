@@ -1,4 +1,4 @@
-"""Requirements, invariants and provided data of a robot, its own and imported ones."""
+"""Requirements, invariants, provided data and limits of a robot, its own and imported ones."""
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
@@ -8,14 +8,15 @@ from robosc.errors import RelatedPlace
 from robosc.language import syntax
 from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Findings
+from robosc.model.limits import LimitBuilder
 from robosc.model.places import Places
 from robosc.model.requirements import ProvideBuilder, build_invariant, build_requirement
 from robosc.model.robot_scopes import RobotScopes
-from robosc.model.structure import Communication, Invariant, Provide, Requirement
+from robosc.model.structure import Communication, Invariant, Limit, Provide, Requirement
 from robosc.model.types import Types
 from robosc.model.units import Libraries, Part, Unit
 
-_Item = syntax.Requirement | syntax.Invariant | syntax.Provide
+_Item = syntax.Requirement | syntax.Invariant | syntax.Provide | syntax.Limit
 
 
 @dataclass(frozen=True, slots=True)
@@ -23,12 +24,12 @@ class _Offer:
     """Items that a library may bring, by what a component must have for it; with each item its place in the text.
 
     Attributes:
-        by_communication: Requirements by their first communication, provide statements by theirs.
+        by_communication: Requirements by their first communication, provide statements and limits by theirs.
         by_component: State invariants by each component that they read.
         read: The components that each invariant reads, by its place.
     """
 
-    by_communication: defaultdict[str, list[tuple[int, syntax.Requirement | syntax.Provide]]] = field(
+    by_communication: defaultdict[str, list[tuple[int, syntax.Requirement | syntax.Provide | syntax.Limit]]] = field(
         default_factory=lambda: defaultdict(list)
     )
     by_component: defaultdict[str, list[tuple[int, syntax.Invariant]]] = field(
@@ -44,7 +45,7 @@ class _Offer:
             match item:
                 case syntax.Requirement(communications=names) if names:
                     offer.by_communication[names[0].text].append((place, item))
-                case syntax.Provide(communication=name):
+                case syntax.Provide(communication=name) | syntax.Limit(communication=name):
                     offer.by_communication[name.text].append((place, item))
                 case syntax.Invariant(expression=expression):
                     offer.read[place] = frozenset(_roots(expression) & unit.components.keys())
@@ -68,6 +69,7 @@ class Restrictions:
         requirements: Those that are sound.
         invariants: Those that are sound.
         provides: Those that are sound.
+        limits: Those that are sound.
     """
 
     def __init__(
@@ -86,10 +88,11 @@ class Restrictions:
         self._types = types
         self._findings = findings
         self._offers: dict[Unit, _Offer] = {}
-        self._builders: dict[Unit, tuple[ExpressionChecker, ProvideBuilder]] = {}
+        self._builders: dict[Unit, tuple[ExpressionChecker, ProvideBuilder, LimitBuilder]] = {}
         self.requirements: list[Requirement] = []
         self.invariants: list[Invariant] = []
         self.provides: list[Provide] = []
+        self.limits: list[Limit] = []
 
     def build(self, communications: Mapping[str, Communication], places: Places) -> None:
         """Build all of them and note where they stand."""
@@ -120,7 +123,9 @@ class Restrictions:
             found: dict[int, _Item] = {}
             for each in own:
                 for place, item in offer.by_communication.get(each, ()):
-                    if isinstance(item, syntax.Provide) or all(other.text in names for other in item.communications):
+                    if isinstance(item, syntax.Provide | syntax.Limit) or all(
+                        other.text in names for other in item.communications
+                    ):
                         found[place] = item
             imported = self._scopes.of(unit).components.keys()
             found |= {place: item for place, item in offer.by_component.get(name, ()) if offer.read[place] <= imported}
@@ -135,7 +140,7 @@ class Restrictions:
         scope = self._scopes.of(unit)
         missing = sorted((_roots_of(tree) & unit.components.keys()) - scope.components.keys())
         if missing:
-            what = "provide statement" if isinstance(tree, syntax.Provide) else "requirement"
+            what = _WHAT.get(type(tree), "requirement")
             self._findings.error(
                 "unknown-name",
                 f"importing '{part.tree.name.text}' brings a {what} that reads '{missing[0]}', which is not imported",
@@ -148,8 +153,12 @@ class Restrictions:
     def _add(self, tree: _Item, unit: Unit, communications: Mapping[str, Communication], places: Places) -> None:
         if unit not in self._builders:
             checker = ExpressionChecker(self._scopes.of(unit), self._findings)
-            self._builders[unit] = checker, ProvideBuilder(checker, self._types, self._findings, places.communications)
-        checker, provide_builder = self._builders[unit]
+            self._builders[unit] = (
+                checker,
+                ProvideBuilder(checker, self._types, self._findings, places.communications),
+                LimitBuilder(checker, self._types, self._findings),
+            )
+        checker, provide_builder, limit_builder = self._builders[unit]
         match tree:
             case syntax.Requirement():
                 requirement = build_requirement(tree, checker, communications, self._findings)
@@ -166,9 +175,20 @@ class Restrictions:
                 if provide is not None:
                     self.provides.append(provide)
                     places.provides.append(tree.location)
+            case syntax.Limit():
+                limit = limit_builder.build(tree, communications)
+                if limit is not None:
+                    self.limits.append(limit)
+                    places.limits.append(tree.location)
+
+
+_WHAT: dict[type[_Item], str] = {syntax.Provide: "provide statement", syntax.Limit: "limit"}
 
 
 def _roots_of(tree: _Item) -> set[str]:
+    if isinstance(tree, syntax.Limit):
+        # Bounds are constant.
+        return set() if tree.condition is None else _roots(tree.condition)
     if isinstance(tree, syntax.Provide):
         found = set[str]() if tree.condition is None else _roots(tree.condition)
         values = [tree.value]

@@ -11,7 +11,7 @@ from robosc.model.communications import middleware_type
 from robosc.model.findings import Findings
 from robosc.model.interfaces import KINDS, headers_of
 from robosc.model.message_fields import basic_field
-from robosc.model.structure import Communication, CommunicationKind, ObjectValue, Provide, ProvidedValue
+from robosc.model.structure import Communication, CommunicationKind, Limit, ObjectValue, Provide, ProvidedValue
 from robosc.model.types import Types
 from robosc.source import Location
 
@@ -27,6 +27,7 @@ class SentMessages:
     Args:
         fitting: For each communication that fits the interface that it is linked to, the interfaces.
         provides: Provide statements with their places.
+        limits: Limits with theirs.
         types: Types of the model.
         findings: Findings to which faults are reported.
     """
@@ -35,6 +36,7 @@ class SentMessages:
         self,
         fitting: Mapping[str, Catalogue],
         provides: Sequence[tuple[Provide, Location]],
+        limits: Sequence[tuple[Limit, Location]],
         types: Types,
         findings: Findings,
     ) -> None:
@@ -45,6 +47,7 @@ class SentMessages:
         self._provides: dict[str, list[tuple[Provide, Location]]] = {}
         for provide, place in provides:
             self._provides.setdefault(provide.communication, []).append((provide, place))
+        self._limits = limits
 
     def check(self, item: Communication, tree: syntax.Communication, place: Location) -> None:
         """Report what is doubtful about the requests of a communication.
@@ -66,8 +69,15 @@ class SentMessages:
             return
         if item.kind in _STAMPED:
             self._check_headers(item, tree, place, definition[0], catalogue)
-        for provide, where in self._provides.get(item.name, ()):
-            for field, value in _fields(provide.value, definition[0], catalogue):
+        given = [(provide.value, where) for provide, where in self._provides.get(item.name, ())]
+        given += [
+            (value, where)
+            for limit, where in self._limits
+            if limit.communication == item.name
+            for value in _ends(limit)
+        ]
+        for given_value, where in given:
+            for field, value in _fields(given_value, definition[0], catalogue):
                 reason = _misfit(field, value)
                 if reason:
                     self._findings.warning(
@@ -106,6 +116,16 @@ class SentMessages:
 
     def _report_empty(self, message: str, place: Location) -> None:
         self._findings.warning("empty-frame", message, place, 'Name the frame, such as "map" or "base_link".')
+
+
+def _ends(limit: Limit) -> Iterator[ProvidedValue]:
+    """Yield the ends of the ranges of a limit as a request could send them."""
+    for bound in limit.bounds:
+        for end in (bound.low, bound.high):
+            value: ProvidedValue = Constant(end)
+            for name in reversed(bound.path):
+                value = ObjectValue(((name, value),))
+            yield value
 
 
 def _leaves_frame_empty(value: ProvidedValue) -> bool:

@@ -132,7 +132,8 @@ class Communication(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
         depth: Number of messages that are kept for a slow receiver, if the model says so.
         max_age: Seconds after which an outgoing message that was not seen again is stale.
         frame: Frame with which the header of an incoming message, or an action's request, is stamped.
-        when: Condition for the messages on a shared identifier that are this one, in a supervision layer.
+        when: Condition for the requests on a shared identifier that are this one, in a supervision layer.
+        is_when_default: True if those are the all-default ones, their header apart.
     """
 
     name: Name
@@ -148,6 +149,12 @@ class Communication(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     max_age: Annotated[float, msgspec.Meta(gt=0, le=MAXIMUM_AGE)] | None = None
     frame: Annotated[str, msgspec.Meta(max_length=255)] | None = None
     when: Expression | None = None
+    is_when_default: bool = False
+
+    @property
+    def has_condition(self) -> bool:
+        """True if a supervision layer recognizes it by a condition."""
+        return self.when is not None or self.is_when_default
 
     @property
     def effective_quality(self) -> Quality:
@@ -400,8 +407,33 @@ class Provide(msgspec.Struct, frozen=True, gc=False):
     condition: Expression | None
 
 
+class Bound(msgspec.Struct, frozen=True, gc=False):
+    """Bounds of one number of a request.
+
+    Attributes:
+        path: Properties that lead to it; nothing for a request that is a number itself.
+        low: The lower bound: of the type of the number, as the other is.
+        high: The upper bound; never below the lower one.
+    """
+
+    path: tuple[Name, ...]
+    low: int | float
+    high: int | float
+
+
+class Limit(msgspec.Struct, frozen=True, gc=False):
+    """Bounds into which numbers of a request are moved, unless the condition is false."""
+
+    communication: Name
+    bounds: tuple[Bound, ...]
+    condition: Expression | None
+
+
 class Model(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
-    """A checked robot; its encoded form has fields for goals, assumptions, missions and preferences only if needed."""
+    """A checked robot.
+
+    Its encoded form has fields for goals, assumptions, missions, preferences and limits only if needed.
+    """
 
     name: Name
     components: tuple[Component, ...]
@@ -415,6 +447,7 @@ class Model(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     assumptions: tuple[Assumption, ...] = ()
     missions: tuple[Mission, ...] = ()
     preferences: tuple[Preference, ...] = ()
+    limits: tuple[Limit, ...] = ()
 
     @property
     def has_goals(self) -> bool:
@@ -444,6 +477,10 @@ class Model(msgspec.Struct, frozen=True, gc=False, omit_defaults=True):
     def provides_for(self, communication: str) -> tuple[Provide, ...]:
         """The provide statements of one communication, in source order."""
         return tuple(item for item in self.provides if item.communication == communication)
+
+    def limits_for(self, communication: str) -> tuple[Limit, ...]:
+        """The limits of one communication, in source order."""
+        return tuple(item for item in self.limits if item.communication == communication)
 
     @property
     def taus(self) -> tuple[str, ...]:
@@ -476,6 +513,7 @@ __all__ = [
     "ISSUED_KINDS",
     "Assumption",
     "Behaviour",
+    "Bound",
     "Communication",
     "CommunicationKind",
     "Component",
@@ -488,6 +526,7 @@ __all__ = [
     "GoalForm",
     "Interface",
     "Invariant",
+    "Limit",
     "Mission",
     "Model",
     "ObjectDefinition",

@@ -9,12 +9,14 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from math import isfinite
 
 from robosc.automata.structure import System
 from robosc.errors import InvalidExpressionError, InvalidSupervisorError
 from robosc.expressions import (
     ArrayType,
     BooleanType,
+    DoubleType,
     EnumType,
     Expression,
     IntegerType,
@@ -42,6 +44,7 @@ from robosc.model.structure import (
     EventKind,
     Goal,
     GoalForm,
+    Limit,
     Mission,
     Model,
     ObjectDefinition,
@@ -112,6 +115,9 @@ def validate(supervisor: Supervisor) -> None:
         for number, provide in enumerate(model.provides, start=1):
             with _at(f"provide statement {number} (for {provide.communication})"):
                 _validate_provide(provide, names)
+        for number, limit in enumerate(model.limits, start=1):
+            with _at(f"limit {number} (of {limit.communication})"):
+                _validate_limit(limit, names)
         _validate_synthesis_variables(model, names)
         _validate_certificate(supervisor.certificate)
         if supervisor.certificate.deployment is not supervisor.deployment:
@@ -256,12 +262,14 @@ def _validate_communications(model: Model, names: _Names) -> None:
             _validate_options(communication, names)
 
 
+_REQUESTED_KINDS = (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.SERVICE, CommunicationKind.ACTION)
+
 _OPTIONS: dict[str, tuple[CommunicationKind, ...]] = {
     "quality": (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSAGE),
     "depth": (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.OUTGOING_MESSAGE),
     "max_age": (CommunicationKind.OUTGOING_MESSAGE,),
     "frame": (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.ACTION),
-    "when": (CommunicationKind.INCOMING_MESSAGE,),
+    "when": _REQUESTED_KINDS,
 }
 """The kinds of communication that each option suits."""
 
@@ -272,6 +280,8 @@ def _validate_options(communication: Communication, names: _Names) -> None:
             raise InvalidSupervisorError(f"{option} does not suit its kind")
     if communication.frame is not None and communication.interface is None:
         raise InvalidSupervisorError("what is stamped needs a middleware type")
+    if communication.is_when_default and (communication.when is not None or communication.request is None):
+        raise InvalidSupervisorError("it has another condition, or no request, beside the all-default message")
     if communication.when is not None:
         without_state = replace(names.scope, variables={}, states=frozenset())
         if not isinstance(without_state.infer(communication.when, communication.request), BooleanType):
@@ -467,6 +477,30 @@ def _validate_provided(value: ProvidedValue, type_: Type, names: _Names) -> None
             if name not in properties:
                 raise InvalidSupervisorError(f"{wanted.name} has no such property")
             _validate_provided(inner, properties[name], names)
+
+
+def _validate_limit(limit: Limit, names: _Names) -> None:
+    if limit.condition is not None:
+        _require_boolean(limit.condition, names.scope)
+    if len({bound.path for bound in limit.bounds}) < len(limit.bounds):
+        raise InvalidSupervisorError("two bounds are of one number")
+    for bound in limit.bounds:
+        type_ = _sent_type(_request_type(limit.communication, names), names)
+        for name in bound.path:
+            properties = names.scope.objects[type_.name] if isinstance(type_, ObjectType) else {}
+            if name not in properties:
+                raise InvalidSupervisorError(f"there is no property {name}")
+            type_ = _sent_type(properties[name], names)
+        wanted = {DoubleType: float, IntegerType: int}.get(type(type_))
+        if wanted is None or {type(bound.low), type(bound.high)} != {wanted}:
+            raise InvalidSupervisorError(f"bounds of {type_text(type_)} are no numbers of its kind")
+        if not (isfinite(bound.low) and isfinite(bound.high) and bound.low <= bound.high):
+            raise InvalidSupervisorError("no number is within its bounds")
+
+
+def _sent_type(type_: Type, names: _Names) -> Type:
+    """Return the type as which data of a type is sent."""
+    return names.sources[type_.name] if isinstance(type_, EnumType) else type_
 
 
 def _validate_synthesis_variables(model: Model, names: _Names) -> None:

@@ -1,7 +1,9 @@
 """Text of generated files: lines of any language, and parts of a model as a user writes them."""
 
+from collections.abc import Sequence
+
 from robosc.expressions.text import expression_text
-from robosc.model.structure import Invariant, Model, ObjectValue, Provide, ProvidedValue, Requirement
+from robosc.model.structure import Bound, Invariant, Limit, Model, ObjectValue, Provide, ProvidedValue, Requirement
 
 
 def indent(lines: list[str], levels: int = 1) -> list[str]:
@@ -48,6 +50,22 @@ def provide_text(statement: Provide) -> str:
     """A provide statement as a user writes it."""
     condition = f" if {expression_text(statement.condition)}" if statement.condition is not None else ""
     return f"provide {statement.communication} with {_value_text(statement.value)}{condition}"
+
+
+def limit_text(statement: Limit) -> str:
+    """A limit as a user writes it."""
+    condition = f" if {expression_text(statement.condition)}" if statement.condition is not None else ""
+    return f"limit {statement.communication} to {_bounds_text(statement.bounds)}{condition}"
+
+
+def _bounds_text(bounds: Sequence[Bound], depth: int = 0) -> str:
+    """Return the ranges of the properties below the first ones of their paths."""
+    if any(len(bound.path) == depth for bound in bounds):
+        return f"{bounds[0].low}..{bounds[0].high}"
+    parts: dict[str, list[Bound]] = {}
+    for bound in bounds:
+        parts.setdefault(bound.path[depth], []).append(bound)
+    return "{ " + ", ".join(f"{name}: {_bounds_text(part, depth + 1)}" for name, part in parts.items()) + " }"
 
 
 def _value_text(provided: ProvidedValue) -> str:

@@ -18,38 +18,49 @@ class BothSides(RecordingMiddleware):
     What the robot's side receives stands in `sent` as in the base class; what the caller's side receives as
     ("pass", identifier, message), ("blocked", identifier), ("answer", service, id, data), ("no answer", service, id),
     ("accept", action, id), ("reject", action, id), ("feedback", action, id, data), ("end", action, id, outcome, data).
+
+    Attributes:
+        reasons: The reasons that the caller's side was given, in order.
     """
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.reasons: list[str] = []
 
     def pass_on(self, identifier: str, message: Any) -> None:
         self._maybe_fail("pass_on", identifier)
         self._send("pass", identifier, message)
 
-    def blocked(self, identifier: str) -> None:
+    def blocked(self, identifier: str, why: str) -> None:
         self._maybe_fail("blocked", identifier)
+        self.reasons.append(why)
         self._send("blocked", identifier)
 
     def answer(self, communication: str, call_id: Any, data: Any) -> None:
         self._maybe_fail("answer", communication)
         self._send("answer", communication, call_id, data)
 
-    def answer_default(self, communication: str, call_id: Any) -> None:
+    def answer_default(self, communication: str, call_id: Any, why: str) -> None:
         self._maybe_fail("answer_default", communication)
+        self.reasons.append(why)
         self._send("no answer", communication, call_id)
 
     def accept_goal(self, communication: str, goal_id: Any) -> None:
         self._maybe_fail("accept_goal", communication)
         self._send("accept", communication, goal_id)
 
-    def reject_goal(self, communication: str, goal_id: Any) -> None:
+    def reject_goal(self, communication: str, goal_id: Any, why: str) -> None:
         self._maybe_fail("reject_goal", communication)
+        self.reasons.append(why)
         self._send("reject", communication, goal_id)
 
     def pass_feedback(self, communication: str, goal_id: Any, data: Any) -> None:
         self._maybe_fail("pass_feedback", communication)
         self._send("feedback", communication, goal_id, data)
 
-    def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any) -> None:
+    def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any, why: str) -> None:
         self._maybe_fail("end_goal", communication)
+        self.reasons.append(why)
         self._send("end", communication, goal_id, outcome, data)
 
 

@@ -165,6 +165,9 @@ class _Converter:
                 self._in_robot(node, place)
                 preferred, others = (tuple(map(self._name, part.names)) for part in (node.preferred, node.others))
                 return syntax.Preference(preferred, others, place)
+            case "Limit":
+                range_, condition = self._range(node.range), self._condition(node.condition)
+                return syntax.Limit(self._name(node.communication), range_, condition, self._first(node, "limit"))
             case _:
                 value, condition = self._provided(node.value), self._condition(node.condition)
                 return syntax.Provide(self._name(node.communication), value, condition, self._first(node, "provide"))
@@ -193,6 +196,13 @@ class _Converter:
 
     def _detour(self, node: Any) -> syntax.Detour:
         return syntax.Detour(self._expression(node.trigger), self._visits(node.visits), self._first(node, "on"))
+
+    def _range(self, node: Any) -> syntax.ObjectRange | syntax.Range:
+        if node.object is None:
+            low, high = self._expression(node.bounds.low), self._expression(node.bounds.high)
+            return syntax.Range(low, high, self._at(node.bounds))
+        properties = tuple((self._name(item.name), self._range(item.range)) for item in node.object.properties)
+        return syntax.ObjectRange(properties, self._at(node.object))
 
     def _provided(self, node: Any) -> syntax.ObjectValue | syntax.Expression:
         if node.object is None:
@@ -239,6 +249,8 @@ class _Converter:
                 return self._name(node.quality)
             case "stamped":
                 return self._text(node.text)
+            case "when" if node.default is not None:
+                return self._name(node.default)
             case "when":
                 return self._expression(node.condition)
         number = node.number

@@ -76,7 +76,9 @@ def _info(model: Model, communication: Communication) -> CommunicationInfo:
         requirement_count=len(requirements),
         conjunct_count=sum(len(conjuncts(item.condition)) for item in requirements),
         max_age_s=communication.max_age,
-        has_condition=communication.when is not None,
+        has_condition=communication.has_condition,
+        is_when_default=communication.is_when_default,
+        has_limits=bool(model.limits_for(communication.name)),
     )
 
 

@@ -94,6 +94,16 @@ class InterpretedSystem:
             for item in model.communications
         }
         self._when = {item.name: WhenRule.of(item) for item in model.communications if item.when is not None}
+        self._limits = {
+            item.name: tuple(
+                (
+                    None if limit.condition is None else function_of(limit.condition),
+                    tuple((bound.path, bound.low, bound.high) for bound in limit.bounds),
+                )
+                for limit in model.limits_for(item.name)
+            )
+            for item in model.communications
+        }
         self._initial = initial_state(model)
         self._state = self._initial
         self.changes = 0
@@ -184,6 +194,15 @@ class InterpretedSystem:
             if condition is None or holds(condition, self._state):
                 return value(self._state)
         return True, None
+
+    def limits(self, communication: str) -> tuple[tuple[tuple[str, ...], float, float], ...]:
+        """Bounds of numbers of a request: of all limits whose condition is not false."""
+        return tuple(
+            bound
+            for condition, bounds in self._limits[communication]
+            if condition is None or condition(self._state, no_data) is not False
+            for bound in bounds
+        )
 
     def matches(self, communication: str, data: Any) -> Match:
         """Return whether a message is an incoming message, by its condition `when`."""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, List, NamedTuple, Optional
+from typing import Any, Dict, List, NamedTuple, Optional, Sequence
 
 from robosc.execution.runtime.calls import Calls, Goals
 
@@ -86,10 +86,10 @@ class Callers:
         """Return the goal with a number of the robot's side, if its caller waits for it."""
         return self._waiting_goals.get(number)
 
-    def find_goal(self, action: str, goal_id: Any) -> Optional[CallerGoal]:
-        """Return an action's goal with an id of the caller's side, if it has not ended there."""
+    def find_goal(self, actions: Sequence[str], goal_id: Any) -> Optional[CallerGoal]:
+        """Return a goal of some actions by its id on the caller's side, unless it ended there."""
         for goal in self._waiting_goals.values():
-            if goal.action == action and goal.goal_id == goal_id:
+            if goal.action in actions and goal.goal_id == goal_id:
                 return goal
         return None
 

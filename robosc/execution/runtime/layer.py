@@ -18,6 +18,7 @@ from robosc.execution.runtime.cancels import BY_CALLER
 from robosc.execution.runtime.clock import Clock
 from robosc.execution.runtime.command_timeouts import CommandTimeouts
 from robosc.execution.runtime.event_log import EventLog
+from robosc.execution.runtime.limits import Limited, limited
 from robosc.execution.runtime.middleware_messages import is_finite
 from robosc.execution.runtime.protocol import (
     CommunicationInfo,
@@ -37,6 +38,9 @@ _A_FAULT = 'a fault'
 _NOT_ALLOWED = 'not allowed now'
 _NOT_FINITE = 'a NaN or an infinity'
 _NOT_KNOWN = 'no message of the model'
+_NOT_WITHIN = 'no number is within all limits'
+_FAILED = 'the call failed or took too long'
+_SUPERVISOR = 'the supervisor cancelled it, or it took too long'
 _STILL_RUNNING = 'its last goal may still be under way'
 _OLD_GOALS = 'goals from before the restart have not ended'
 _AT_REST = {
@@ -58,7 +62,7 @@ class Layer(Runner):
     :param clock: The only source of time; the computer's if None.
     :param log: The event log; none if None.
     :raises DeploymentError: The model has actions and the supervisor was made for a controller, or
-        it does not distinguish its incoming messages on one identifier.
+        it does not distinguish its requests on one identifier.
     :raises SettingsError: A setting is wrong, or names what the model does not have.
     """
 
@@ -74,7 +78,16 @@ class Layer(Runner):
         super().__init__(system, robot, 'layer', settings, clock, log)
         self._caller = caller
         self._named = {request.name: request for request in self._requests}
-        self._messages = _messages(system.description.communications)
+        self._messages = _sharing(system.description.communications, _INCOMING_MESSAGE)
+        self._groups = {
+            name: names
+            for kind in ('service', 'action')
+            for names in _sharing(system.description.communications, kind).values()
+            for name in names
+        }
+        self._defaults = frozenset(
+            info.name for info in system.description.communications if info.is_when_default
+        )
         self._callers = Callers(self._calls, self._goals)
         self._command_timeouts = CommandTimeouts(self._releases, self.settings.command_timeout_s)
 
@@ -83,7 +96,9 @@ class Layer(Runner):
     @guarded
     def on_request(self, identifier: str, message: Any) -> None:
         """
-        Let a message of the existing controller through unchanged, or hold it back.
+        Let a message of the existing controller through, or hold it back.
+
+        It goes through unchanged, but for the numbers that limits move.
 
         :param identifier: Identifier that the message is for.
         :param message: Mapping or object with the properties, or the plain value of a basic type;
@@ -109,7 +124,8 @@ class Layer(Runner):
 
         A call that is held back gets a default response at once.
 
-        :param service: Name of the service in the model.
+        :param service: Name of the service in the model; any of those on one identifier, which
+            `when` tells apart.
         :param call_id: Id by which its answer is to be addressed; the executor only hands it back.
         :param message: The request.
         """
@@ -122,7 +138,7 @@ class Layer(Runner):
             why = self._let_call_through(request, call_id, message)
         finally:
             if why is not None:
-                self._notify(self._caller.answer_default, service, call_id)
+                self._notify(self._caller.answer_default, service, call_id, why)
                 self._hold_back(request.identifier, why)
 
     @guarded
@@ -130,7 +146,8 @@ class Layer(Runner):
         """
         Take a goal of the existing controller: reject it if it is held back, else accept it.
 
-        :param action: Name of the action in the model.
+        :param action: Name of the action in the model; any of those on one identifier, which
+            `when` tells apart.
         :param goal_id: Id of the goal on the caller's side.
         :param message: The goal.
         """
@@ -143,7 +160,7 @@ class Layer(Runner):
             why = self._let_goal_through(request, goal_id, message)
         finally:
             if why is not None:
-                self._notify(self._caller.reject_goal, action, goal_id)
+                self._notify(self._caller.reject_goal, action, goal_id, why)
                 self._hold_back(request.identifier, why)
 
     @guarded
@@ -154,11 +171,11 @@ class Layer(Runner):
         The cancel is always forwarded, also while the robot is stopped; its event follows when the
         goal has ended.
 
-        :param action: Name of the action in the model.
+        :param action: Name of the action in the model, as in `on_goal`.
         :param goal_id: Id of the goal on the caller's side.
         """
         self._look_at_clock()
-        waiting = self._callers.find_goal(action, goal_id)
+        waiting = self._callers.find_goal(self._groups.get(action, ()), goal_id)
         goal = None if waiting is None else self._goals.find(waiting.number)
         if waiting is None or goal is None:
             self._recorder.unexpected({'what': 'a cancel of no goal of {}'.format(action)})
@@ -237,14 +254,19 @@ class Layer(Runner):
             waiting = None if self._goals.find(goal_id) else self._callers.close_goal(goal_id)
             if waiting is not None:
                 end = waiting.outcome(outcome)
-                self._notify(self._caller.end_goal, waiting.action, waiting.goal_id, end, data)
+                why = 'its server: {}'.format(outcome) if end == 'aborted' else ''
+                self._notify(
+                    self._caller.end_goal, waiting.action, waiting.goal_id, end, data, why
+                )
 
     def _finish(self) -> None:
         """Report calls and goals that failed or violate a requirement. Never raises."""
         for call in self._callers.close_failed_calls():
-            self._notify(self._caller.answer_default, call.service, call.call_id)
+            self._notify(self._caller.answer_default, call.service, call.call_id, _FAILED)
         for goal in self._callers.close_failed_goals():
-            self._notify(self._caller.end_goal, goal.action, goal.goal_id, 'aborted', None)
+            self._notify(
+                self._caller.end_goal, goal.action, goal.goal_id, 'aborted', None, _SUPERVISOR
+            )
 
     # Requests: why each is held back, or None if it went through.
 
@@ -257,10 +279,18 @@ class Layer(Runner):
             return _NOT_KNOWN
         if not self._system.enabled(request.event):
             return _NOT_ALLOWED
-        is_default = request.keeps_acting and self._robot.is_default(request.name, message)
-        self._take(request, message)
+        found = self._limited(request, message)
+        if found is None:
+            return _NOT_WITHIN
+        message, moved = found
+        # What was moved counts as acting, whatever it is: a release too many does no harm.
+        is_default = (
+            request.keeps_acting and not moved and self._robot.is_default(request.name, message)
+        )
+        self._take(request, message, moved)
         if request.keeps_acting:
-            self._releases.sent(request.name, request.identifier, is_default)
+            data = message if request.has_limits else None
+            self._releases.sent(request.name, request.identifier, is_default, data)
         self._robot.publish(request.name, message)
         return None
 
@@ -268,9 +298,17 @@ class Layer(Runner):
         why = self._refusal(message)
         if why is not None:
             return why
+        chosen = self._recognized(self._groups[request.name], message)
+        if chosen is None:
+            return _NOT_KNOWN
+        request = chosen
         if not self._system.enabled(request.event):
             return _NOT_ALLOWED
-        self._take(request, message)
+        found = self._limited(request, message)
+        if found is None:
+            return _NOT_WITHIN
+        message, moved = found
+        self._take(request, message, moved)
         number = self._calls.call(self._robot, request.name, message, self._now_s)
         self._callers.open_call(number, request.name, call_id)
         return None
@@ -279,11 +317,19 @@ class Layer(Runner):
         why = self._refusal(message)
         if why is not None:
             return why
+        chosen = self._recognized(self._groups[request.name], message)
+        if chosen is None:
+            return _NOT_KNOWN
+        request = chosen
         if self._goals.is_open(request.name):
             return _STILL_RUNNING
         if not self._system.enabled(request.event):
             return _NOT_ALLOWED
-        self._take(request, message)
+        found = self._limited(request, message)
+        if found is None:
+            return _NOT_WITHIN
+        message, moved = found
+        self._take(request, message, moved)
         goal = self._goals.send(self._robot, request.name, message, self._now_s)
         self._caller.accept_goal(request.name, goal_id)
         self._callers.open_goal(goal.number, request.name, goal_id)
@@ -298,8 +344,16 @@ class Layer(Runner):
             return _AT_REST[status]
         return None if is_finite(message) else _NOT_FINITE
 
-    def _take(self, request: Request, message: Any) -> None:
+    def _limited(self, request: Request, message: Any) -> Optional[Limited]:
+        """Return the message with its numbers within the limits that apply; None if none are."""
+        if not request.has_limits:
+            return Limited(message, ())
+        return limited(message, self._system.limits(request.name))
+
+    def _take(self, request: Request, message: Any, moved: Sequence[str]) -> None:
         """Take the request and the silent steps after it, before its message goes out."""
+        if moved:
+            self._recorder.limited(request.event, moved)
         self._steps.take(request.event, message)
         self._steps.settle(request.name)
         # A message that goes out now may wait for time to pass: looked up as soon as the clock
@@ -313,6 +367,10 @@ class Layer(Runner):
         :raises ExecutionError: An enum of the message is unknown, and that is a fault.
         """
         for name in names:
+            if name in self._defaults:
+                if self._robot.is_default(name, message):
+                    return self._named[name]
+                continue
             match = self._system.matches(name, message)
             if match.unknown:
                 self._recorder.unknown(name + '.request', match.unknown)
@@ -335,7 +393,7 @@ class Layer(Runner):
 
     def _hold_back(self, identifier: str, why: str) -> None:
         self._recorder.blocked(identifier, why)
-        self._notify(self._caller.blocked, identifier)
+        self._notify(self._caller.blocked, identifier, why)
 
     def _notify(self, method: Callable[..., None], *arguments: Any) -> None:
         """Notify the caller; a failure of the call is a fault. Never raises."""
@@ -345,21 +403,21 @@ class Layer(Runner):
             self._fail(describe_error(error))
 
 
-def _messages(infos: Sequence[CommunicationInfo]) -> Dict[str, Tuple[str, ...]]:
+def _sharing(infos: Sequence[CommunicationInfo], kind: str) -> Dict[str, Tuple[str, ...]]:
     """
-    Return the incoming messages of each identifier, in source order.
+    Return the communications of a kind on each identifier, in source order.
 
     :raises DeploymentError: One that has no condition is not the last of its identifier.
     """
     found: Dict[str, Tuple[CommunicationInfo, ...]] = {}
     for info in infos:
-        if info.kind == _INCOMING_MESSAGE:
+        if info.kind == kind:
             found[info.identifier] = (*found.get(info.identifier, ()), info)
     for identifier, sharing in found.items():
         for info in sharing[:-1]:
             if not info.has_condition:
                 raise DeploymentError(
-                    "a message on '{}' may be '{}' or '{}': a supervision layer needs 'when: "
+                    "what comes on '{}' may be '{}' or '{}': a supervision layer needs 'when: "
                     "CONDITION' in the list of '{}'".format(
                         identifier, info.name, sharing[-1].name, info.name
                     )

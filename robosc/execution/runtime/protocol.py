@@ -33,8 +33,10 @@ class CommunicationInfo(NamedTuple):
     :ivar requirement_count: Number of requirements on its request.
     :ivar conjunct_count: Number of top-level conjuncts of those requirements, all counted on.
     :ivar max_age_s: Seconds after which an outgoing message is stale, if the model says so.
-    :ivar has_condition: True if an incoming message has a condition `when`, by which a supervision
-        layer recognizes it.
+    :ivar has_condition: True if it has a condition `when`, by which a supervision layer recognizes
+        its requests.
+    :ivar is_when_default: True if that condition is that a request is the all-default one.
+    :ivar has_limits: True if there are limits of its request.
     """
 
     name: str
@@ -47,6 +49,8 @@ class CommunicationInfo(NamedTuple):
     conjunct_count: int
     max_age_s: Optional[float] = None
     has_condition: bool = False
+    is_when_default: bool = False
+    has_limits: bool = False
 
 
 class Aim(NamedTuple):
@@ -235,9 +239,16 @@ class ControlledSystem(Protocol):
         default.
         """
 
+    def limits(self, communication: str) -> Sequence[Tuple[Tuple[str, ...], float, float]]:
+        """
+        Return the bounds of numbers of a request that apply in the current state.
+
+        Each has the properties that lead to the number, a lower and an upper bound.
+        """
+
     def matches(self, communication: str, data: Any) -> Match:
         """
-        Return whether a message is an incoming message, by its condition `when`.
+        Return whether a request is a communication's, by its condition `when`.
 
         Never raises for any data.
         """
@@ -353,32 +364,40 @@ class LayerMiddleware(Protocol):
     def pass_on(self, identifier: str, message: Any) -> None:
         """Pass on a message of the robot, unchanged, after the supervisor has seen it."""
 
-    def blocked(self, identifier: str) -> None:
-        """Report that a request on an identifier was held back."""
+    def blocked(self, identifier: str, why: str) -> None:
+        """Report that a request on an identifier was held back, and why."""
 
     def answer(self, communication: str, call_id: Any, data: Any) -> None:
         """Pass on the service's reply to a call, unchanged."""
 
-    def answer_default(self, communication: str, call_id: Any) -> None:
-        """Give a default reply to a call that was held back or has failed."""
+    def answer_default(self, communication: str, call_id: Any, why: str) -> None:
+        """
+        Give a default reply to a call that was held back or has failed.
+
+        The reason stands in the reply where its type has a text for that.
+        """
 
     def accept_goal(self, communication: str, goal_id: Any) -> None:
         """Accept a goal that is let through. Exactly one `end_goal` follows."""
 
-    def reject_goal(self, communication: str, goal_id: Any) -> None:
-        """Reject a goal that is held back."""
+    def reject_goal(self, communication: str, goal_id: Any, why: str) -> None:
+        """Reject a goal that is held back, and say why if the middleware can."""
 
     def pass_feedback(self, communication: str, goal_id: Any, data: Any) -> None:
         """Feedback of a goal, unchanged."""
 
-    def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any) -> None:
+    def end_goal(
+        self, communication: str, goal_id: Any, outcome: str, data: Any, why: str
+    ) -> None:
         """
         End an accepted goal for its caller.
 
         :param communication: The action.
         :param goal_id: Id of the goal.
         :param outcome: `succeeded`, `aborted` or `cancelled`.
-        :param data: The server's result, unchanged; None for the default one.
+        :param data: The server's result, unchanged; None for the default one, in which the reason
+            stands where its type has a text for that.
+        :param why: Reason why it ends otherwise than its server or its caller wanted; else empty.
         """
 
 

@@ -19,12 +19,14 @@ class Counters(NamedTuple):
     :ivar unexpected: Events that the state could not accept, replies that match no request.
     :ivar faults: Faults.
     :ivar dropped: Entries that the event log lost.
+    :ivar limited: Numbers of requests that were moved into the bounds of limits.
     """
 
     unknown: int
     unexpected: int
     faults: int
     dropped: int
+    limited: int = 0
 
 
 class Recorder:
@@ -45,6 +47,7 @@ class Recorder:
         '_system',
         'began_s',
         'faults',
+        'limited_count',
         'unexpected_count',
         'unknown_count',
     )
@@ -55,6 +58,7 @@ class Recorder:
         self._log = log
         self._lost = 0
         self.unknown_count = 0
+        self.limited_count = 0
         self.unexpected_count = 0
         self.faults = 0
         self.began_s = 0.0
@@ -67,7 +71,11 @@ class Recorder:
     def counters(self) -> Counters:
         """Return the counters now."""
         return Counters(
-            self.unknown_count, self.unexpected_count, self.faults, self._lost + self._log.dropped
+            self.unknown_count,
+            self.unexpected_count,
+            self.faults,
+            self._lost + self._log.dropped,
+            self.limited_count,
         )
 
     def event(self, event: str, is_controllable: bool, data: Any) -> None:
@@ -93,6 +101,11 @@ class Recorder:
         """Record that data was unknown at an event."""
         self.unknown_count += len(what)
         self._write({'kind': 'unknown', 'event': event, 'unknown': list(what)})
+
+    def limited(self, event: str, moved: Sequence[str]) -> None:
+        """Record that numbers of a request were moved into the bounds of limits."""
+        self.limited_count += len(moved)
+        self._write({'kind': 'limited', 'event': event, 'limited': list(moved)})
 
     def fault(self, what: str) -> None:
         """Note a fault."""

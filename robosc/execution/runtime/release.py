@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from typing import Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 
 from robosc.execution.runtime.falling_conditions import have_fallen
+from robosc.execution.runtime.limits import is_within
 from robosc.execution.runtime.protocol import ControlledSystem
 
 
@@ -15,19 +16,22 @@ class _Acting:
     :ivar request: Name of the communication whose request sent it.
     :ivar event: Event of that request.
     :ivar was_enabled: True if the request was enabled in the last stable state since.
-    :ivar held: Values for the conjuncts of its requirements: True if one held in that state.
+    :ivar held: Values for the conjuncts of its requirements: True if one held in that state; then
+        whether the message was within the limits that applied there.
+    :ivar data: Its data, or the message itself, if there are limits; else None.
     :ivar is_due: True if the message is to be released, because a condition that held holds no
         longer. It stays due until something is sent there, so it is enough to remember the last
         stable state.
     """
 
-    __slots__ = ('event', 'held', 'is_due', 'request', 'was_enabled')
+    __slots__ = ('data', 'event', 'held', 'is_due', 'request', 'was_enabled')
 
-    def __init__(self, request: str, was_enabled: bool, held: Tuple[bool, ...]) -> None:
+    def __init__(self, request: str, was_enabled: bool, held: Tuple[bool, ...], data: Any) -> None:
         self.request = request
         self.event = request + '.request'
         self.was_enabled = was_enabled
         self.held = held
+        self.data = data
         self.is_due = False
 
 
@@ -88,11 +92,18 @@ class Releases:
     def _observe(self, acting: _Acting) -> None:
         """Observe one message in a stable state."""
         is_enabled = self._system.enabled(acting.event)
-        holds = self._system.conjuncts(acting.request)
+        holds = self._holds(acting.request, acting.data)
         if (acting.was_enabled and not is_enabled) or have_fallen(acting.held, holds):
             acting.is_due = True
         acting.was_enabled = is_enabled
         acting.held = holds
+
+    def _holds(self, request: str, data: Any) -> Tuple[bool, ...]:
+        """Return what allows a message to go on acting, apart from its request."""
+        holds = self._system.conjuncts(request)
+        if data is None:
+            return holds
+        return (*holds, is_within(data, self._system.limits(request)))
 
     def _another_is_enabled(self, identifier: str, acting: _Acting) -> bool:
         enabled = self._system.enabled
@@ -110,20 +121,24 @@ class Releases:
         if identifier in self.waiting:
             self.released(identifier)
 
-    def sent(self, request: str, identifier: str, is_default: bool) -> None:
+    def sent(self, request: str, identifier: str, is_default: bool, data: Any = None) -> None:
         """
         Note that a message went out on a release identifier.
 
         The system is in the stable state after its request.
+
+        :param data: Its data, or the message itself, if there are limits of the request.
         """
         self.released(identifier)
         if not is_default:
             is_enabled = self._system.enabled(request + '.request')
             self._acting[identifier] = _Acting(
-                request, is_enabled, self._system.conjuncts(request)
+                request, is_enabled, self._holds(request, data), data
             )
 
-    def sent_unchanged(self, request: str, identifier: str, is_default: bool) -> None:
+    def sent_unchanged(
+        self, request: str, identifier: str, is_default: bool, data: Any = None
+    ) -> None:
         """
         Note a sent message whose request changed nothing.
 
@@ -131,7 +146,7 @@ class Releases:
         """
         acting = self._acting.get(identifier)
         if is_default or acting is None or acting.request != request:
-            self.sent(request, identifier, is_default)
+            self.sent(request, identifier, is_default, data)
 
     def is_acting(self, identifier: str) -> bool:
         """Return True if the last message sent on a release identifier still acts."""

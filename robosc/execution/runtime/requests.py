@@ -6,6 +6,7 @@ from typing import Dict, NamedTuple, Optional, Sequence, Tuple
 
 from robosc.execution.runtime.calls import Calls, Goals
 from robosc.execution.runtime.decision import Policy
+from robosc.execution.runtime.limits import limited
 from robosc.execution.runtime.progress import ProgressAccount
 from robosc.execution.runtime.protocol import (
     CommunicationInfo,
@@ -31,6 +32,7 @@ class Request(NamedTuple):
     :ivar identifier: Identifier that its message goes to.
     :ivar kind: `incoming message`, `service` or `action`.
     :ivar keeps_acting: True if that is a release identifier.
+    :ivar has_limits: True if there are limits of it.
     """
 
     name: str
@@ -38,6 +40,7 @@ class Request(NamedTuple):
     identifier: str
     kind: str
     keeps_acting: bool
+    has_limits: bool = False
 
 
 def requests_of(
@@ -56,6 +59,7 @@ def requests_of(
             identifier=info.identifier,
             kind=info.kind,
             keeps_acting=info.kind == _MESSAGE and info.identifier in released,
+            has_limits=info.has_limits,
         )
         for info in requesting(infos)
     )
@@ -140,21 +144,29 @@ class Decisions:
 
     def _issue(self, request: Request, now_s: float) -> bool:
         """Issue a request; return False if its data is unknown or does not fit."""
-        name, event, identifier, kind, keeps_acting = request
+        name, event, identifier, kind, keeps_acting, has_limits = request
+        moved: Tuple[str, ...] = ()
         unchanging = self._steps.unchanging
         known = unchanging.get(name)
         if known is None:
             is_known, data = self._system.provide(name)
             if not is_known:
                 return self._withhold(request, 'its data')
+            if has_limits:
+                found = limited(data, self._system.limits(name))
+                if found is None:
+                    return self._withhold(request, 'no number is within all limits')
+                data, moved = found
         else:
-            data, is_default = known
+            data, is_default, moved = known
         middleware = self._middleware
         try:
             message = middleware.prepare(name, data)
         except DataDoesNotFit as error:
             return self._withhold(request, 'its data does not fit: {}'.format(error))
         releases = self._releases
+        if moved:
+            self._recorder.limited(event, moved)
         if known is None:
             is_default = keeps_acting and middleware.is_default(name, message)
             if keeps_acting and releases.waiting:
@@ -165,11 +177,13 @@ class Decisions:
         if kind == _MESSAGE:
             if has_changed:
                 if keeps_acting:
-                    releases.sent(name, identifier, is_default)
+                    releases.sent(name, identifier, is_default, data if has_limits else None)
             else:
-                unchanging[name] = (data, is_default)
+                unchanging[name] = (data, is_default, moved)
                 if keeps_acting:
-                    releases.sent_unchanged(name, identifier, is_default)
+                    releases.sent_unchanged(
+                        name, identifier, is_default, data if has_limits else None
+                    )
             middleware.publish(name, message)
         elif kind == 'service':
             self._calls.call(middleware, name, message, now_s)

@@ -38,8 +38,8 @@ class Steps:
     :ivar candidates: Numbers of the requests that may be issued in the stable state, or None
         before they are computed.
     :ivar unchanging: Messages whose request was issued in this stable state and changed nothing:
-        their data, and whether it is the default. A request's data and its step depend only on
-        the state.
+        their data, whether it is the default, and what of it limits moved. A request's data and
+        its step depend only on the state.
     """
 
     __slots__ = (
@@ -77,7 +77,7 @@ class Steps:
         self._on_unknown = on_unknown
         self._progress = progress
         self.candidates: Optional[Tuple[int, ...]] = None
-        self.unchanging: Dict[str, Tuple[Any, bool]] = {}
+        self.unchanging: Dict[str, Tuple[Any, bool, Tuple[str, ...]]] = {}
         # The system's `changes` in the last stable state, or None if the state may not be stable.
         self._stable: Optional[int] = None
         # A fault that waits for the end of its batch, because on_unknown is `fault`.

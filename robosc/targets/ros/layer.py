@@ -48,7 +48,7 @@ def require_names_of_a_layer(found: tuple[Topic, ...], asked: tuple[Communicatio
             )
     _require_one_each("topics", ((topic.identifier, topic.identifier) for topic in found))
     for kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION):
-        _require_one_each(f"{kind}s", ((item.identifier, item.name) for item in asked if item.kind is kind))
+        _require_one_each(f"{kind}s", ((item.identifier, item.identifier) for item in asked if item.kind is kind))
 
 
 def require_own_topics(

@@ -111,6 +111,7 @@ def context(
         "topics": found,
         "release_identifiers": release_identifiers(found),
         "servers": asked,
+        "shares": _shares(asked),
         "deployment": str(supervisor.deployment),
         "shapes": _shapes(model, supervisor.deployment),
         "sent": {item.name: sent_paths(model, item) for item in requested},
@@ -122,6 +123,14 @@ def context(
         "transitions": tables.transitions,
         "called": tuple(item.name for item in model.communications if item.kind in CALLED_KINDS),
     }
+
+
+def _shares(asked: tuple[Communication, ...]) -> dict[str, str | None]:
+    """For each service and action the first one of its kind with its identifier, if that is another."""
+    first: dict[tuple[CommunicationKind, str], str] = {}
+    for item in asked:
+        first.setdefault((item.kind, item.identifier), item.name)
+    return {item.name: found if (found := first[item.kind, item.identifier]) != item.name else None for item in asked}
 
 
 def _shapes(model: Model, deployment: Deployment) -> dict[str, object]:

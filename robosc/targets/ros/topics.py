@@ -248,8 +248,10 @@ def _shape(model: Model, communication: Communication, type_: Type, inside: tupl
 
 
 def sent_paths(model: Model, communication: Communication) -> tuple[tuple[str, ...], ...]:
-    """Every property that some provide statement sets, sorted; the empty path for a basic type."""
-    return tuple(sorted({path for item in model.provides_for(communication.name) for path in _paths(item.value)}))
+    """Every property that some provide statement or limit sets, sorted; the empty path for a basic type."""
+    provided = {path for item in model.provides_for(communication.name) for path in _paths(item.value)}
+    limited = {bound.path for item in model.limits_for(communication.name) for bound in item.bounds}
+    return tuple(sorted(provided | limited))
 
 
 def _paths(value: ProvidedValue) -> list[tuple[str, ...]]:

@@ -68,7 +68,7 @@ def test_a_call_waits_in_its_thread_until_it_is_answered(calls: Calls) -> None:
     second.join(LIMIT_S)
     assert calls.answers == ["for b"]
     assert first.is_alive()
-    calls.service.answer_default(1)
+    calls.service.answer_default(1, "why")
     assert calls.end() == ["default", "for b"]
     assert not calls.service.is_busy
 
@@ -118,12 +118,20 @@ class Goals:
         self.warnings: list[str] = []
         self.is_allowed = True
         self.action = ServedAction(
-            "/count", self.inbox.append, self.judge, lambda number: self.reported.append(number), self.warnings.append
+            "/count",
+            lambda: "default",
+            self.inbox.append,
+            self.judge,
+            lambda number: self.reported.append(number),
+            self.warnings.append,
         )
 
     def judge(self, number: int, goal: Any) -> None:
         self.reported.append((number, goal))
-        (self.action.accept if self.is_allowed else self.action.reject)(number)
+        if self.is_allowed:
+            self.action.accept(number)
+        else:
+            self.action.reject(number, "held back")
 
     def turn(self) -> None:
         while self.inbox:
@@ -152,15 +160,15 @@ def test_a_goal_ends_with_the_given_outcome_and_result(outcome: str, method: str
     goals = Goals()
     handle = goals.come("x")
     goals.action.feedback(1, "half")
-    goals.action.end(1, outcome, "result")
-    assert handle.reported == [("set_accepted",), ("publish_feedback", "half"), (method, "result")]
+    goals.action.end(1, outcome, "result", "why")
+    assert handle.reported == [("set_accepted",), ("publish_feedback", "half"), (method, "result", "why")]
 
 
 def test_a_goal_that_is_held_back_is_rejected_and_forgotten() -> None:
     goals = Goals()
     goals.is_allowed = False
     handle = goals.come("x")
-    assert handle.reported == [("set_rejected",)]
+    assert handle.reported == [("set_rejected", "default", "held back")]
     goals.action.cancel_came(handle)
     goals.turn()
     assert goals.reported == [(1, "goal x")]
@@ -174,7 +182,7 @@ def test_a_cancel_is_handed_over_with_its_goal_until_that_has_ended() -> None:
     goals.action.cancel_came(Handle("y"))
     goals.turn()
     assert goals.reported[-1] == 2
-    goals.action.end(2, "cancelled", None)
+    goals.action.end(2, "cancelled", None, "")
     goals.action.cancel_came(Handle("y"))
     goals.turn()
     assert goals.reported == [(1, "goal x"), (2, "goal y"), 2]
@@ -187,8 +195,8 @@ def test_goals_that_run_at_the_end_are_aborted_and_new_ones_rejected() -> None:
     goals.action.goal_came(late)
     goals.action.take_leave()
     assert goals.inbox == []
-    assert late.reported == [("set_rejected",)]
-    assert handle.reported[-1] == ("set_aborted", None)
+    assert late.reported == [("set_rejected", "default", "the layer has ended")]
+    assert handle.reported[-1] == ("set_aborted", "default", "the layer has ended")
 
 
 def test_a_caller_that_cannot_be_reached_is_a_warning() -> None:

@@ -34,7 +34,7 @@ class Calls:
     def _hand_over(self, number: int, request: Any) -> None:
         self.given.append((number, request))
         if request == "held":
-            self.calls.answer_default(number)
+            self.calls.answer_default(number, "why")
 
     def call(self, request: str, header: str) -> None:
         self.service.send_response(self.calls.handle(request, None), header)
@@ -107,7 +107,7 @@ class Goals:
         if goal != "held":
             self.goals.accept(number)
         if goal == "fails":
-            self.goals.end(number, "aborted", None)
+            self.goals.end(number, "aborted", None, "why")
 
     def notify_execute(self, handle: Any, end: Any) -> None:
         self.ends.append((handle, end))
@@ -131,13 +131,13 @@ def test_a_goal_ends_with_the_given_outcome_and_result(outcome: str) -> None:
     world.goals.feedback(1, "near")
     assert handle.log == ["execute", "near"]
     assert world.ends == []
-    world.goals.end(1, outcome, "there")
+    world.goals.end(1, outcome, "there", "")
     assert world.goals.is_ending
     assert world.finish() == ["there"]
     assert handle.log[-1] == outcome
     assert not world.goals.is_ending
     world.goals.feedback(1, "late")
-    world.goals.end(1, "aborted", None)
+    world.goals.end(1, "aborted", None, "why")
     assert world.ends == []
     assert handle.log[-1] == outcome
 
@@ -164,7 +164,7 @@ def test_cancels_are_forwarded_until_the_end() -> None:
     assert world.goals.cancel(second)
     assert world.goals.cancel(first)
     assert world.cancelled == [2, 1]
-    world.goals.end(1, "cancelled", None)
+    world.goals.end(1, "cancelled", None, "why")
     assert not world.goals.cancel(first)
     assert world.cancelled == [2, 1]
 
@@ -176,7 +176,7 @@ def test_a_goal_whose_caller_is_gone_before_it_begins_is_cancelled() -> None:
     world.goals.check()
     assert world.cancelled == [1]
     assert world.warnings == ["a goal of /a is cancelled: its caller is gone"]
-    world.goals.end(1, "cancelled", None)
+    world.goals.end(1, "cancelled", None, "why")
     assert world.ends == []
 
 

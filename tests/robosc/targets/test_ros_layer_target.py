@@ -160,14 +160,14 @@ def test_a_relative_name_stays_relative_without_a_prefix() -> None:
         (
             "interface s use S from x_srvs component C {"
             '  service a with identifier: "/s", request: none, response: none links s'
-            '  service b with identifier: "/s", request: none, response: none links s }',
-            "the services 'a' and 'b' have one name, /s",
+            '  service b with identifier: "s", request: none, response: none links s }',
+            "the services '/s' and 's' have one name, /s",
         ),
         (
             "interface i use Go from x_msgs component C {"
             '  action a with identifier: "/s", request: none, response: none, feedback: none links i'
             '  action b with identifier: "s", request: none, response: none, feedback: none links i }',
-            "the actions 'a' and 'b' have one name, /s",
+            "the actions '/s' and 's' have one name, /s",
         ),
     ],
 )

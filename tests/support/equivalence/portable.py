@@ -122,25 +122,25 @@ class World:
     def pass_on(self, identifier: str, message: Any) -> None:
         self._note("pass", identifier, message)
 
-    def blocked(self, identifier: str) -> None:
+    def blocked(self, identifier: str, why: str) -> None:
         self._note("blocked", identifier)
 
     def answer(self, communication: str, call_id: Any, data: Any) -> None:
         self._note("answer", communication, data, caller=call_id)
 
-    def answer_default(self, communication: str, call_id: Any) -> None:
+    def answer_default(self, communication: str, call_id: Any, why: str) -> None:
         self._note("no answer", communication, caller=call_id)
 
     def accept_goal(self, communication: str, goal_id: Any) -> None:
         self._note("accept", communication, caller=goal_id)
 
-    def reject_goal(self, communication: str, goal_id: Any) -> None:
+    def reject_goal(self, communication: str, goal_id: Any, why: str) -> None:
         self._note("reject", communication, caller=goal_id)
 
     def pass_feedback(self, communication: str, goal_id: Any, data: Any) -> None:
         self._note("feedback", communication, data, caller=goal_id)
 
-    def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any) -> None:
+    def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any, why: str) -> None:
         self._note("ended", communication, data, caller=goal_id, how=outcome)
 
 

@@ -188,7 +188,7 @@ class Requesters:
         """Pass a message of the robot on to all programs, after the supervisor has received it."""
         self._clients.send_all(PassedOn(identifier, message))
 
-    def blocked(self, identifier: str) -> None:
+    def blocked(self, identifier: str, why: str) -> None:
         """Report to a program that its request on an identifier was held back."""
         self._was_blocked = True
         if self._asker is not None:
@@ -199,7 +199,7 @@ class Requesters:
         self._calls.pop(call_id, None)
         self._clients.send(call_id[0], Answered(call_id[1], data, is_default=False))
 
-    def answer_default(self, communication: str, call_id: _Id) -> None:
+    def answer_default(self, communication: str, call_id: _Id, why: str) -> None:
         """Send the default reply to a call that was held back or has failed."""
         self._calls.pop(call_id, None)
         self._clients.send(call_id[0], Answered(call_id[1], None, is_default=True))
@@ -208,7 +208,7 @@ class Requesters:
         """Report to a program that its goal is let through."""
         self._clients.send(goal_id[0], GoalTaken(goal_id[1]))
 
-    def reject_goal(self, communication: str, goal_id: _Id) -> None:
+    def reject_goal(self, communication: str, goal_id: _Id, why: str) -> None:
         """Report to a program that its goal is held back."""
         self._goals.pop(goal_id, None)
         self._clients.send(goal_id[0], GoalRejected(goal_id[1]))
@@ -217,7 +217,7 @@ class Requesters:
         """Send the feedback of a goal to its program."""
         self._clients.send(goal_id[0], FeedbackPassed(goal_id[1], data))
 
-    def end_goal(self, communication: str, goal_id: _Id, outcome: str, data: Any) -> None:
+    def end_goal(self, communication: str, goal_id: _Id, outcome: str, data: Any, why: str) -> None:
         """Report the end of an accepted goal to its program."""
         self._goals.pop(goal_id, None)
         self._clients.send(goal_id[0], GoalOver(goal_id[1], outcome, data))

@@ -23,6 +23,7 @@ from robosc.targets.code.python.changes import (
 )
 from robosc.targets.code.python.expressions import constant
 from robosc.targets.code.python.folding import folded
+from robosc.targets.code.python.limits import limits_method
 from robosc.targets.code.python.provide import provide_method
 from robosc.targets.code.python.received import converter
 from robosc.targets.code.python.statements import statement_lines
@@ -161,6 +162,7 @@ def _class(writer: Writer) -> list[str]:
     methods += [conditions.requirements_method(name) for name in requested]
     methods += [conditions.conjuncts_method(name) for name in requested]
     methods += [matches_method(writer, item) for item in model.communications if item.when is not None]
+    methods += [limits_method(writer, name) for purpose, name in writer.layout.methods if purpose == "limits"]
     if writer.layout.supervisor.strategy is not None:
         methods += strategy_methods(writer, writer.layout.supervisor.strategy)
     methods += conditions.nodes.values()
@@ -202,7 +204,7 @@ def _constructor(writer: Writer, description: Description) -> list[str]:
     for (purpose, subject), method in methods.items():
         tables.setdefault(purpose, []).append(f"{subject!r}: self.{method},")
     lines = ["def __init__(self):"]
-    for purpose in ("allow", "read", "step", "provide", "requirements", "conjuncts", "matches", "receive"):
+    for purpose in ("allow", "read", "step", "provide", "requirements", "conjuncts", "matches", "limits", "receive"):
         entries = tables.get(purpose, [])
         lines += (
             [f"    self._{purpose} = {{", *indent(entries, 2), "    }"] if entries else [f"    self._{purpose} = {{}}"]
@@ -288,8 +290,12 @@ def provide(self, communication):
     return self._provide[communication]()
 
 def matches(self, communication, data):
-    """Return whether a message is an incoming message, by its condition `when`."""
+    """Return whether a request is a communication's, by its condition `when`."""
     return self._matches[communication](data) if communication in self._matches else MATCHES
+
+def limits(self, communication):
+    """Return the bounds of numbers of a request that apply now: (path, low, high)."""
+    return self._limits[communication]() if communication in self._limits else ()
 
 def requirements(self, communication):
     """Return for each requirement on a request whether it holds now."""

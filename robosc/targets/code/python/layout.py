@@ -17,6 +17,7 @@ PROTOCOL_NAMES = (
     "enabled",
     "enabled_requests",
     "enabled_silent",
+    "limits",
     "location",
     "matches",
     "mode",
@@ -104,6 +105,8 @@ def _method_names(supervisor: Supervisor, members: PythonNamer) -> dict[tuple[st
                 methods[purpose, item.name] = members.name(f"{purpose}_{item.name}")
         if item.when is not None:
             methods["matches", item.name] = members.name(f"matches_{item.name}")
+        if model.limits_for(item.name):
+            methods["limits", item.name] = members.name(f"limits_{item.name}")
     for item in model.communications:
         if item.kind is CommunicationKind.OUTGOING_MESSAGE and ("receive", item.identifier) not in methods:
             methods["receive", item.identifier] = members.name(f"receive_{item.identifier.strip('/')}")

@@ -82,6 +82,7 @@ class Server(NamedTuple):
     :ivar package: Package of its type.
     :ivar type_name: Name of its type.
     :ivar frame: Frame of the header of its requests, or None.
+    :ivar shares: Name of the first one of its kind with the same identifier, if it is another.
     """
 
     name: str
@@ -90,6 +91,7 @@ class Server(NamedTuple):
     package: str
     type_name: str
     frame: str | None
+    shares: str | None = None
 
     @property
     def subject(self) -> str:

@@ -12,11 +12,37 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 from __future__ import annotations
 
 from collections.abc import Iterable
+import json
 
 BLOCKED = 'blocked'
-"""Topic on which the identifiers of requests that are held back are published."""
+"""Topic on which it is published what requests are held back, and why."""
 
 SUPERVISED = 'supervised'
+
+
+REASON_FIELDS = (
+    'message',
+    'error_msg',
+    'error_string',
+    'error_message',
+    'status_message',
+    'reason',
+)
+"""Fields of responses and results that are meant for people, each with a text."""
+
+
+def blocked_text(identifier: str, why: str) -> str:
+    """Return what is published about a request that is held back: JSON."""
+    return json.dumps({'identifier': identifier, 'reason': why})
+
+
+def with_reason(message: object, why: str) -> object:
+    """Return a default response or result with a reason in the field for it, if it has one."""
+    for name in REASON_FIELDS:
+        if isinstance(getattr(message, name, None), str):
+            setattr(message, name, why)
+            break
+    return message
 
 
 def robots_name(prefix: str, identifier: str) -> str:

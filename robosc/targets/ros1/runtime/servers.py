@@ -20,7 +20,10 @@ from contextlib import contextmanager
 import threading
 from typing import Any
 
+from robosc.targets.ros.runtime.supervised import with_reason
 from robosc.targets.ros1.runtime.inbox import Action
+
+ENDED = 'the layer has ended'
 
 
 class _Call:
@@ -76,7 +79,7 @@ class CalledService:
         call = _Call()
         with self._lock:
             if self._is_closed:
-                return self._make_default()
+                return with_reason(self._make_default(), ENDED)
             self._count += 1
             number = self._count
             self._waiting[number] = call
@@ -93,9 +96,9 @@ class CalledService:
         call.response = response
         call.is_answered.set()
 
-    def answer_default(self, number: int) -> None:
-        """Answer a call with the default response."""
-        self.answer(number, self._make_default())
+    def answer_default(self, number: int, why: str) -> None:
+        """Answer a call with the default response, and the reason in it."""
+        self.answer(number, with_reason(self._make_default(), why))
 
     def close(self) -> None:
         """Answer every new call with the default response from now on, without a notice."""
@@ -105,7 +108,7 @@ class CalledService:
     def take_leave(self) -> None:
         """Answer every call that waits with the default response."""
         for number in list(self._waiting):
-            self.answer_default(number)
+            self.answer_default(number, ENDED)
 
     @property
     def is_busy(self) -> bool:
@@ -119,6 +122,7 @@ class ServedAction:
     The goals of one action.
 
     :param name: The action's name on ROS, for warnings.
+    :param make_default: Makes the default result.
     :param put: Hands something to the executor's thread.
     :param on_goal: Called there with the number and the message of each goal; it calls `accept`
         or `reject`.
@@ -129,12 +133,14 @@ class ServedAction:
     def __init__(
         self,
         name: str,
+        make_default: Callable[[], Any],
         put: Callable[[Action], None],
         on_goal: Callable[[int, Any], None],
         on_cancel: Callable[[int], None],
         warn: Callable[[str], None],
     ) -> None:
         self._name = name
+        self._make_default = make_default
         self._put = put
         self._on_goal = on_goal
         self._on_cancel = on_cancel
@@ -154,7 +160,7 @@ class ServedAction:
             if not self._is_closed:
                 self._put(lambda: self._judge(handle))
                 return
-        handle.set_rejected()
+        handle.set_rejected(with_reason(self._make_default(), ENDED), ENDED)
 
     def cancel_came(self, handle: Any) -> None:
         """Take in that a caller wants to cancel a goal."""
@@ -177,25 +183,29 @@ class ServedAction:
         """Let the goal through."""
         self._try_to('acceptance', self._goals[number].set_accepted)
 
-    def reject(self, number: int) -> None:
-        """Hold the goal back."""
-        self._try_to('rejection', self._forgotten(number).set_rejected)
+    def reject(self, number: int, why: str) -> None:
+        """Hold the goal back; the reason is the text of its status."""
+        handle = self._forgotten(number)
+        result = with_reason(self._make_default(), why)
+        self._try_to('rejection', lambda: handle.set_rejected(result, why))
 
     def feedback(self, number: int, data: Any) -> None:
         """Publish feedback on a goal."""
         handle = self._goals[number]
         self._try_to('feedback', lambda: handle.publish_feedback(data))
 
-    def end(self, number: int, outcome: str, result: Any) -> None:
+    def end(self, number: int, outcome: str, result: Any, why: str) -> None:
         """
         End a goal.
 
-        `succeeded`, `aborted` or `cancelled`, with its result, or None for the default one.
+        `succeeded`, `aborted` or `cancelled`, with its result, or None for the default one. The
+        reason is the text of its status, and stands in a default result.
         """
         handle = self._forgotten(number)
         ends = {'succeeded': handle.set_succeeded, 'cancelled': handle.set_canceled}
         end = ends.get(outcome, handle.set_aborted)
-        self._try_to('end', lambda: end(result))
+        found = with_reason(self._make_default(), why) if result is None else result
+        self._try_to('end', lambda: end(found, why))
 
     def close(self) -> None:
         """From now on reject every new goal, without a notice."""
@@ -205,7 +215,7 @@ class ServedAction:
     def take_leave(self) -> None:
         """Abort every goal, for its caller waits."""
         for number in list(self._goals):
-            self.end(number, 'aborted', None)
+            self.end(number, 'aborted', None, ENDED)
 
     def _forgotten(self, number: int) -> Any:
         handle = self._goals.pop(number)

@@ -18,6 +18,10 @@ from __future__ import annotations
 from collections.abc import Callable
 from typing import Any
 
+from robosc.targets.ros.runtime.supervised import with_reason
+
+ENDED = 'the layer has ended'
+
 
 class _Call:
     """
@@ -90,14 +94,14 @@ class CalledService:
         else:
             self._send_to(call.header, response)
 
-    def answer_default(self, number: int) -> None:
-        """Answer a call with the default response."""
-        self.answer(number, self._make_default())
+    def answer_default(self, number: int, why: str) -> None:
+        """Answer a call with the default response, and the reason in it."""
+        self.answer(number, with_reason(self._make_default(), why))
 
     def take_leave(self) -> None:
         """Answer every call with the default response, for its caller waits."""
         for number in list(self._calls):
-            self.answer_default(number)
+            self.answer_default(number, ENDED)
 
     def _send_to(self, header: Any, response: Any) -> None:
         try:
@@ -111,14 +115,14 @@ class _Goal:
     A goal that was accepted.
 
     :ivar handle: Handle by which rclpy refers to it, once it is known.
-    :ivar end: Outcome and result, if they came before that.
+    :ivar end: Outcome, result and reason, if they came before that.
     """
 
     __slots__ = ('end', 'handle')
 
     def __init__(self) -> None:
         self.handle: Any = None
-        self.end: tuple[str, Any] | None = None
+        self.end: tuple[str, Any, str] | None = None
 
 
 class ServedAction:
@@ -221,26 +225,27 @@ class ServedAction:
         except Exception as error:
             self._warn(f'no feedback of a goal of {self._name}: {error}')
 
-    def end(self, number: int, outcome: str, result: Any) -> None:
+    def end(self, number: int, outcome: str, result: Any, why: str) -> None:
         """
         End a goal.
 
-        `succeeded`, `aborted` or `cancelled`, with its result, or None for the default one.
+        `succeeded`, `aborted` or `cancelled`, with its result, or None for the default one, in
+        which the reason stands.
         """
         goal = self._goals.get(number)
         if goal is None:
             return  # Its caller was gone.
         if goal.handle is None:
-            goal.end = (outcome, result)
+            goal.end = (outcome, result, why)
             return
         del self._goals[number]
         del self._numbers[bytes(goal.handle.goal_id.uuid)]
         self._ending += 1
         self._server.notify_execute(
-            goal.handle, lambda handle: self._conclude(handle, outcome, result)
+            goal.handle, lambda handle: self._conclude(handle, outcome, result, why)
         )
 
-    def _conclude(self, handle: Any, outcome: str, result: Any) -> Any:
+    def _conclude(self, handle: Any, outcome: str, result: Any, why: str) -> Any:
         """End a goal: its result."""
         self._ending -= 1
         if outcome == 'succeeded':
@@ -249,12 +254,12 @@ class ServedAction:
             handle.canceled()
         else:
             handle.abort()
-        return self._make_default() if result is None else result
+        return with_reason(self._make_default(), why) if result is None else result
 
     def take_leave(self) -> None:
         """Abort every goal, for its caller waits."""
         for number in list(self._goals):
-            self.end(number, 'aborted', None)
+            self.end(number, 'aborted', None, ENDED)
 
     @property
     def is_ending(self) -> bool:

@@ -19,7 +19,8 @@ from robosc.expressions import (
 )
 from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.targets.code.c.header import batch, batch_parameters
-from robosc.targets.code.c.layout import Layout, event_data
+from robosc.targets.code.c.layer import request_parameters
+from robosc.targets.code.c.layout import Layout, event_data, request_data
 from robosc.targets.code.c.provide import Field, request_field
 from robosc.targets.code.c.text import comment, string_literal
 from robosc.targets.code.c.unit import Unit
@@ -57,12 +58,12 @@ class Writer:
         layout = self.layout
         tables = self._tables()
         states = [*self._visit_state(), *self._visit_communications(), *self._put_taken()]
-        requests = self._put_request()
+        requests = [] if layout.is_layer else self._put_request()
         received = [line for number, identifier in enumerate(received_topics(layout)) for line in
                     self._receive(number, identifier)]  # fmt: skip
         answers = [line for item in layout.requests for event in answers_of(item) for line in self._take(event)]
-        fills = [line for item in layout.requests for line in self._fill(item)]
-        body = [*tables, *states, *requests, *self._functions, *received, *answers, *fills]
+        asked = self._asked() if layout.is_layer else [line for item in layout.requests for line in self._fill(item)]
+        body = [*tables, *states, *requests, *self._functions, *received, *answers, *asked]
         head = [*_INCLUDES.splitlines(), "", f"namespace {self.package} {{", "", *_TOP.splitlines(), ""]
         return "\n".join([*head, *body, "}  // namespace model", "", f"}}  // namespace {self.package}"]) + "\n"
 
@@ -264,6 +265,61 @@ class Writer:
             "}",
         ]
 
+    # Requests of the caller, before a layer.
+
+    def _asked(self) -> list[str]:
+        layout = self.layout
+        lines: list[str] = []
+        for identifier in layout.topics:
+            lines += self._ask_message(identifier)
+        for item in layout.requests:
+            if item.kind in CALLED_KINDS:
+                lines += self._ask_server(item)
+        return lines
+
+    def _ask_message(self, identifier: str) -> list[str]:
+        layout = self.layout
+        parameters = request_parameters(layout, identifier)
+        sharing = [
+            item for item in layout.of_kind(CommunicationKind.INCOMING_MESSAGE) if item.identifier == identifier
+        ]
+        lines = [line for item in sharing for line in self._checks(item.request or NoneType(), "message", ())]
+        lines = [*dict.fromkeys(lines), "[[maybe_unused]] Arena arena;"]
+        for name, type_ in parameters.values():
+            lines += self._datum(type_, name)
+        for item in sharing:
+            data = request_data(item)
+            if data is not None and layout.raw(data) in parameters:
+                lines += self._note(item.event(EventKind.REQUEST), data, parameters[layout.raw(data)][0])
+        arguments = "".join(self._argument(type_, name) for name, type_ in parameters.values())
+        lines.append(f"{layout.function('request', identifier)}(robot, now{arguments}, what);")
+        return _function(
+            f"template <class M>\nvoid {ask_topic_name(layout, identifier)}({layout.prefix}_t* robot, std::uint64_t now, "
+            f"[[maybe_unused]] const M& message, {layout.prefix}_sent_t what, [[maybe_unused]] Notes& notes)",
+            lines,
+            comment(f"The caller sends a message on {identifier}."),
+        )
+
+    def _ask_server(self, item: Communication) -> list[str]:
+        layout = self.layout
+        is_action = item.kind is CommunicationKind.ACTION
+        name = ask_name(layout, item)
+        checks = self._checks(item.request or NoneType(), "message", ())
+        call = f"{layout.function('goal' if is_action else 'call', item.name)}(robot, now, caller, what);"
+        lines = _function(
+            f"template <class M>\nvoid {name}({layout.prefix}_t* robot, std::uint64_t now, std::uint32_t caller, "
+            f"[[maybe_unused]] const M& message, {layout.prefix}_sent_t what)",
+            [*checks, call],
+            comment(f"The caller {'sends a goal of' if is_action else 'calls'} {item.name}."),
+        )
+        if is_action:
+            lines += _function(
+                f"inline void cancel_{name}({layout.prefix}_t* robot, std::uint64_t now, std::uint32_t caller)",
+                [f"{layout.function('cancel', item.name)}(robot, now, caller);"],
+                comment(f"The caller cancels its goal of {item.name}."),
+            )
+        return lines
+
     # Received.
 
     def _type_number(self, type_: Type) -> int:
@@ -366,10 +422,12 @@ class Writer:
                 arguments[raw] = self._argument(type_, names[raw])
                 lines += self._datum(type_, names[raw])
             notes += self._note(event, type_, names[raw])
-        call = f"{layout.function('receive', identifier)}(robot, now{''.join(arguments.values())});"
+        whole = ", whole" if layout.is_layer else ""
+        call = f"{layout.function('receive', identifier)}(robot, now{''.join(arguments.values())}{whole});"
         return _function(
             f"template <class M>\nvoid receive_{number}({layout.prefix}_t* robot, std::uint64_t now, "
-            "[[maybe_unused]] const M& message, [[maybe_unused]] Notes& notes)",
+            "[[maybe_unused]] const M& message, [[maybe_unused]] Notes& notes"
+            f"{', const void* whole' if layout.is_layer else ''})",
             [*lines, *notes, call],
             comment(f"A message came on {identifier}."),
         )
@@ -385,7 +443,8 @@ class Writer:
         if type_ is not None:
             lines += [*self._datum(type_, "data"), *self._note(event, type_, "data")]
             argument = self._argument(type_, "data")
-        lines.append(f"{layout.function(purpose, name)}(robot, now, id{argument});")
+        whole = ", &message" if layout.is_layer else ""
+        lines.append(f"{layout.function(purpose, name)}(robot, now, id{argument}{whole});")
         return _function(
             f"template <class M>\nvoid {take_name(layout, event)}({layout.prefix}_t* robot, std::uint64_t now, "
             "std::uint32_t id, [[maybe_unused]] const M& message, [[maybe_unused]] Notes& notes)",
@@ -410,6 +469,16 @@ def answers_of(item: Communication) -> Iterator[str]:
 def fill_name(layout: Layout, item: Communication) -> str:
     """The function that fills the message of a request."""
     return f"fill_{list(layout.communications).index(item.name)}"
+
+
+def ask_topic_name(layout: Layout, identifier: str) -> str:
+    """The function that takes a message of the caller."""
+    return f"ask_topic_{list(layout.topics).index(identifier)}"
+
+
+def ask_name(layout: Layout, item: Communication) -> str:
+    """The function that takes a call or a goal of the caller."""
+    return f"ask_{list(layout.communications).index(item.name)}"
 
 
 def take_name(layout: Layout, event: str) -> str:

@@ -3,6 +3,7 @@
 from robosc.model.structure import Interface
 from robosc.targets.cpp.package import Middleware
 from robosc.targets.ros.runtime.parameters import USE_SIM_TIME
+from robosc.targets.ros1.runtime.remapping import PARTS_OF_ACTIONS, remapped
 
 _ENDINGS = {
     "action": "Action",
@@ -33,6 +34,11 @@ MIDDLEWARE = Middleware(
         "package.xml": "package.xml.j2",
         "src/node.cpp": "node.cpp.j2",
     },
+    of_a_layer=("ros1_callers.hpp",),
+    launch=".launch",
+    remapped=remapped,
+    parts_of_actions=PARTS_OF_ACTIONS,
+    python="robosc.targets.ros1",
     # The parameter is one of the whole graph in ROS 1, read by the client library.
     without=frozenset({USE_SIM_TIME}),
 )

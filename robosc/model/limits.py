@@ -7,7 +7,6 @@ from math import prod
 from robosc.errors import RelatedPlace
 from robosc.expressions import (
     DoubleType,
-    EnumType,
     Expression,
     IntegerType,
     NoneType,
@@ -33,6 +32,8 @@ from robosc.source import Location
 
 _MAXIMUM_COMBINATIONS = 10_000
 """Combinations of states and values that are tried to find out whether two conditions can hold together."""
+
+_State = Mapping[tuple[str, str | None], Value]
 
 _NUMBERS = (DoubleType, IntegerType)
 
@@ -77,9 +78,6 @@ class LimitBuilder:
         self, tree: syntax.ObjectRange | syntax.Range, wanted: Type, name: syntax.Name, path: tuple[str, ...]
     ) -> tuple[Bound, ...] | None:
         """The bounds of the numbers at a path and below it, or None where one is broken."""
-        if isinstance(wanted, EnumType):
-            # What is sent is a value of the type that the enum is made from.
-            wanted = self._types.sources[wanted.name]
         if isinstance(tree, syntax.ObjectRange):
             return self._object(tree, wanted, path)
         if not isinstance(wanted, _NUMBERS):
@@ -188,18 +186,17 @@ def can_hold_together(conditions: Sequence[Expression], behaviours: Mapping[str,
     values = [item for item in domains if item is not None]
     if prod(map(len, values)) > _MAXIMUM_COMBINATIONS:
         return True
-    for chosen in product(*values):
-        state = dict(zip(places, chosen, strict=True))
+    return any(_are_possible(conditions, dict(zip(places, chosen, strict=True))) for chosen in product(*values))
 
-        def location(component: str, state: Mapping[tuple[str, str | None], Value] = state) -> Value:
-            return state[component, None]
 
-        def variable(component: str, name: str, state: Mapping[tuple[str, str | None], Value] = state) -> Value:
-            return state[component, name]
+def _are_possible(conditions: Iterable[Expression], state: _State) -> bool:
+    def location(component: str) -> str:
+        return str(state[component, None])
 
-        if all(evaluate(condition, location, variable) is not False for condition in conditions):
-            return True
-    return False
+    def variable(component: str, name: str) -> Value:
+        return state[component, name]
+
+    return all(evaluate(condition, variable, location) is not False for condition in conditions)
 
 
 def _places(conditions: Iterable[Expression]) -> Iterator[tuple[str, str | None]]:

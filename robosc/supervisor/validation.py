@@ -485,22 +485,17 @@ def _validate_limit(limit: Limit, names: _Names) -> None:
     if len({bound.path for bound in limit.bounds}) < len(limit.bounds):
         raise InvalidSupervisorError("two bounds are of one number")
     for bound in limit.bounds:
-        type_ = _sent_type(_request_type(limit.communication, names), names)
+        type_ = _request_type(limit.communication, names)
         for name in bound.path:
             properties = names.scope.objects[type_.name] if isinstance(type_, ObjectType) else {}
             if name not in properties:
                 raise InvalidSupervisorError(f"there is no property {name}")
-            type_ = _sent_type(properties[name], names)
+            type_ = properties[name]
         wanted = {DoubleType: float, IntegerType: int}.get(type(type_))
         if wanted is None or {type(bound.low), type(bound.high)} != {wanted}:
             raise InvalidSupervisorError(f"bounds of {type_text(type_)} are no numbers of its kind")
         if not (isfinite(bound.low) and isfinite(bound.high) and bound.low <= bound.high):
             raise InvalidSupervisorError("no number is within its bounds")
-
-
-def _sent_type(type_: Type, names: _Names) -> Type:
-    """Return the type as which data of a type is sent."""
-    return names.sources[type_.name] if isinstance(type_, EnumType) else type_
 
 
 def _validate_synthesis_variables(model: Model, names: _Names) -> None:

@@ -35,6 +35,7 @@ from support.page_courier import messages, page_courier_supervisor
 from support.random_controllers import random_controller, random_robot
 from support.random_couriers import strategic_courier
 from support.random_goals import strategic_controller
+from support.random_limits import limited_controller, limited_robot
 from support.random_supervisors import CERTIFICATE, random_supervisor
 from support.random_travels import random_travels
 from support.random_waiting import strategic_waiting
@@ -160,6 +161,47 @@ def test_an_example_in_c(robot: str, tmp_path: Path) -> None:
     supervisor = robot_supervisor(robot)
     for scenario in (read_recorded(robot), random_scenario(supervisor, 7, 400)):
         compare(c99_target(supervisor, tmp_path), scenario, observe(supervisor, scenario))
+
+
+def _limited(seed: int) -> Supervisor:
+    """A random robot with limits, of one kind or another."""
+    if seed % 2:
+        return limited_controller(Random(seed))
+    return limited_robot(
+        msgspec.structs.replace(random_supervisor(seed), deployment=Deployment.CONTROLLER), Random(seed)
+    )
+
+
+@settings(max_examples=examples(40))
+@given(st.integers(0, 2**32 - 1))
+def test_limits_in_python(seed: int) -> None:
+    supervisor = _limited(seed)
+    scenario = random_scenario(supervisor, seed, 60)
+    expected, module = observe(supervisor, scenario), load_module(supervisor)
+    compare(generated_python(supervisor, module), scenario, expected)
+    compare(generated_python(supervisor, module, has_log=False), scenario, expected)
+    compare(reference(supervisor, has_log=False), scenario, expected)
+
+
+@needs_gcc
+@settings(max_examples=examples(6))
+@given(st.integers(0, 2**32 - 1))
+def test_limits_in_c(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:
+    supervisor = _limited(seed)
+    scenario = random_scenario(supervisor, seed, 120)
+    try:
+        target = C99Target(supervisor, tmp_path_factory.mktemp("c"))
+    except UnsupportedModelError:
+        return  # The random models hold what C cannot keep, too: received texts.
+    compare(target, scenario, observe(supervisor, scenario))
+
+
+def test_the_random_limits_move_numbers() -> None:
+    seen: Counter[str] = Counter()
+    for seed in range(60):
+        for item in observe(_limited(seed), random_scenario(_limited(seed), seed, 60)):
+            seen.update(entry["kind"] for entry in item.log)
+    assert seen["limited"] > 20, seen
 
 
 @needs_gcc

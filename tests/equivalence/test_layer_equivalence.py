@@ -10,7 +10,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.errors import UnsupportedModelError
-from robosc.model.structure import CommunicationKind, Deployment
+from robosc.model.layers import sharing_requests
+from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import generate
 from support.c99 import GCC
@@ -21,6 +22,7 @@ from support.equivalence.random_scenarios import random_scenario
 from support.equivalence.targets import compare
 from support.generated import example_supervisor, load_module, loaded_file
 from support.random_layers import random_layer
+from support.random_limits import limited_robot, with_defaults
 from support.random_supervisors import random_supervisor
 
 ROBOTS = ("line_follower/line_follower_layer", "maze_solver/maze_solver", "navigation/navigation")
@@ -34,9 +36,8 @@ def python_target(supervisor: Supervisor) -> PythonTarget:
 def some_layer(seed: int) -> Supervisor:
     """A random robot, of one kind or another."""
     supervisor = msgspec.structs.replace(random_supervisor(seed), deployment=Deployment.LAYER)
-    incoming = [i for i in supervisor.model.communications if i.kind is CommunicationKind.INCOMING_MESSAGE]
-    # Messages that share an identifier there are not distinguished by conditions.
-    if seed % 2 or len(incoming) > len({item.identifier for item in incoming}):
+    # Requests that share an identifier there are not distinguished by conditions.
+    if seed % 2 or any(len(sharing) > 1 for sharing in sharing_requests(supervisor.model)):
         return random_layer(Random(seed))
     return supervisor
 
@@ -89,3 +90,36 @@ def test_the_random_runs_show_everything_that_a_layer_does() -> None:
         assert seen[kind] > 5, kind
     for kind in ("accept", "reject", "feedback", "ended", "log release", "log stop", "log fault", "log unexpected"):
         assert seen[kind] > 5, kind
+
+
+def some_limited_layer(seed: int) -> Supervisor:
+    """A random robot with limits, and with messages that are the all-default ones."""
+    dice = Random(seed)
+    return limited_robot(with_defaults(random_layer(dice), dice), dice)
+
+
+@settings(max_examples=examples(40))
+@given(st.integers(0, 2**32 - 1))
+def test_limits_in_python(seed: int) -> None:
+    supervisor = some_limited_layer(seed)
+    scenario = random_scenario(supervisor, seed, 60)
+    compare(generated_python(supervisor, load_module(supervisor)), scenario, observe(supervisor, scenario))
+
+
+@needs_gcc
+@settings(max_examples=examples(6))
+@given(st.integers(0, 2**32 - 1))
+def test_limits_in_c(tmp_path_factory: pytest.TempPathFactory, seed: int) -> None:
+    supervisor = some_limited_layer(seed)
+    scenario = random_scenario(supervisor, seed, 120)
+    compare(C99Layer(supervisor, tmp_path_factory.mktemp("c")), scenario, observe(supervisor, scenario))
+
+
+def test_the_random_limits_show_everything_that_they_do() -> None:
+    seen: Counter[str] = Counter()
+    for seed in range(60):
+        supervisor = some_limited_layer(seed)
+        for item in observe(supervisor, random_scenario(supervisor, seed, 60)):
+            seen.update(entry.get("why", f"log {entry['kind']}") for entry in item.log)
+    for kind in ("log limited", "log release", "no number is within all limits"):
+        assert seen[kind] > 5, seen

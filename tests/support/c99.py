@@ -200,6 +200,7 @@ class Reference:
         assert type_ is not None
         provided = [item.value for item in self.model.provides_for(communication)]
         order = [path for value in provided for path in _paths(value, ())]
+        order += [bound.path for limit in self.model.limits_for(communication) for bound in limit.bounds]
         given = dict(self._given(type_, message, ()))
         parts = [f"{'.'.join(path)}={given[path]}" for path in _grouped(order) if path in given]
         return " ".join([str(self.numbers[communication]), *parts])
@@ -224,7 +225,7 @@ class Reference:
         """Remember what happened."""
         kind = entry["kind"]
         self.unknown += kind == "unknown"
-        if kind in ("event", "unknown", "unexpected"):
+        if kind in ("event", "unknown", "unexpected", "limited"):
             number = self.events[entry["event"]] if "event" in entry else -1
             self.lines.append(f"log {kind} {number}")
         elif kind == "release":

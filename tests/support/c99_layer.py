@@ -14,6 +14,7 @@ from robosc.execution.runtime.layer import (
     _NOT_FINITE,
     _NOT_KNOWN,
     _OLD_GOALS,
+    _NOT_WITHIN,
     _STILL_RUNNING,
     Layer,
 )
@@ -24,7 +25,7 @@ from robosc.expressions import DoubleType, Type
 from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
 from robosc.targets.code.c.layer import request_parameters
-from robosc.targets.code.c.layout import Layout
+from robosc.targets.code.c.layout import Layout, groups, sharing
 from support.c99 import OUTCOMES, Reference, _hex, built, compare, data_words, microseconds
 from support.c99_layer_main import CALLBACKS, TOKENS, layer_program
 from support.c99_main import batch_types, events_back
@@ -33,6 +34,7 @@ REFUSALS = (
     _NOT_ALLOWED,
     _NOT_FINITE,
     _NOT_KNOWN,
+    _NOT_WITHIN,
     _STILL_RUNNING,
     _AT_REST[Status.NEW],
     _AT_REST[Status.WAITING],
@@ -40,6 +42,13 @@ REFUSALS = (
     _AT_REST[Status.STOPPED],
     _A_FAULT,
 )
+
+
+def refusals_of(layout: Layout) -> list[str]:
+    """The reasons of a layer, in the order of its enumeration."""
+    return [why for why in REFUSALS if layout.numbers or why != _NOT_WITHIN]
+
+
 _ENDS = ("succeeded", "aborted", "cancelled")
 
 
@@ -62,10 +71,20 @@ def layer_settings_words(layout: Layout, settings: Settings) -> list[object]:
 
 def caller_place(layout: Layout, name: str) -> int:
     """Number of the function for a caller's call, goal or cancel, such as `goal_NAME`."""
-    names = [f"call_{item.name}" for item in layout.of_kind(CommunicationKind.SERVICE)]
-    for item in layout.of_kind(CommunicationKind.ACTION):
-        names += [f"goal_{item.name}", f"cancel_{item.name}"]
-    return len(layout.topics) + names.index(name)
+    purpose, _, asked = name.partition("_")
+    item = layout.model.communication(asked)
+    names = [f"call_{group[0].name}" for group in groups(layout.model, CommunicationKind.SERVICE)]
+    for group in groups(layout.model, CommunicationKind.ACTION):
+        names += [f"goal_{group[0].name}", f"cancel_{group[0].name}"]
+    first = sharing(layout.model, item.kind, item.identifier)[0].name
+    return len(layout.topics) + names.index(f"{purpose}_{first}")
+
+
+def looked_at(layout: Layout, name: str) -> list[Type]:
+    """The types as which a layer takes the data of the requests on the identifier of a communication."""
+    item = layout.model.communication(name)
+    group = sharing(layout.model, item.kind, item.identifier)
+    return [layout.source(type_) for _, type_ in request_parameters(layout, group).values()]
 
 
 class LayerReference(Reference):
@@ -114,8 +133,10 @@ class LayerReference(Reference):
 
     def number(self, message: Any) -> int:
         """Return the number of a message: its last one."""
-        found = next(place for place in reversed(range(len(self.messages))) if self.messages[place] is message)
-        return found % TOKENS
+        for place in reversed(range(len(self.messages))):
+            if self.messages[place] is message:
+                return place % TOKENS
+        return self.asked  # Limits have made another of it.
 
     def publish(self, communication: str, message: Any) -> None:
         """Remember."""
@@ -171,8 +192,15 @@ class LayerReference(Reference):
 
     def write(self, entry: dict[str, Any]) -> None:
         """Remember what happened."""
-        if entry["kind"] == "blocked":
-            self.refusal = REFUSALS.index(entry["why"])
+        if entry["kind"] == "limited":
+            name = entry["event"].rpartition(".")[0]
+            for word in entry["limited"]:
+                path, _, value = word.partition(": ")
+                place = list(self.layout.numbers).index((name, () if path == "value" else tuple(path.split("."))))
+                self.lines.append(f"set {self.asked} {place} {float(value.split(' -> ')[1]):.17g}")
+            self.lines.append(f"log limited {self.events[entry['event']]}")
+        elif entry["kind"] == "blocked":
+            self.refusal = refusals_of(self.layout).index(entry["why"])
             self.lines.append(f"log blocked {self.refusal}")
         else:
             super().write(entry)
@@ -265,20 +293,24 @@ class LayerReference(Reference):
             return
         self.last_caller += 1
         self.callers.append(self.last_caller)
-        message = self._whole({"x": self.dice.choice([0, 1.5])})
+        types = looked_at(self.layout, item.name)
+        message, data = self._shared(types, self._sendable)
+        if not types:
+            message = self._whole({"x": self.dice.choice([0, 1.5])})
         name = ("call_" if item.kind is CommunicationKind.SERVICE else "goal_") + item.name
-        words = [self.last_caller, *self._sent(item.name, message)]
+        words = [self.last_caller, *self._sent(item.name, message), *data]
         ask = self.executor.on_call if item.kind is CommunicationKind.SERVICE else self.executor.on_goal
         ask(item.name, self.last_caller, message)
         self._note_command(["q", now, self._place(name), *words])
 
     def send(self, identifier: str, now: int) -> None:
         """The caller sends a random message."""
-        types = [type_ for _, type_ in request_parameters(self.layout, identifier).values()]
-        datum, words = self._shared([self.layout.source(type_) for type_ in types], self._sendable)
+        messages = self.layout.of_kind(CommunicationKind.INCOMING_MESSAGE)
+        name = next(item.name for item in messages if item.identifier == identifier)
+        types = looked_at(self.layout, name)
+        datum, words = self._shared(types, self._sendable)
         if not types and self.dice.random() < 0.8:
             datum = self._whole({"x": self.dice.choice([0, 1.5])})
-        name = next(item.name for item in self.layout.requests if item.identifier == identifier)
         sent = self._sent(name, datum)
         self.executor.on_request(identifier, datum)
         self._note_command(["q", now, self.topics.index(identifier), *sent, *words])
@@ -314,6 +346,7 @@ class LayerReference(Reference):
         return super().is_default(communication, message)
 
     def _sent(self, name: str, message: Any) -> list[object]:
+        self.asked = len(self.messages) % TOKENS
         flags = [int(is_finite(message)), int(self.is_default(name, message))]
         return [self.remember(message), *flags]
 

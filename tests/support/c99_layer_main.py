@@ -3,11 +3,11 @@
 import re
 
 from robosc.expressions import Type
-from robosc.model.structure import CommunicationKind
+from robosc.model.structure import Communication, CommunicationKind
 from robosc.supervisor import Supervisor
 from robosc.targets.code.c.header import receive_head, reply_head
 from robosc.targets.code.c.layer import call_head, cancel_head, goal_head, request_head, request_parameters
-from robosc.targets.code.c.layout import Layout, event_data
+from robosc.targets.code.c.layout import Layout, event_data, groups, sharing
 from support.c99_main import _TOP, BEGIN, END, LOG, _Program, batch_types, events_back
 
 TOKENS = 4096
@@ -27,6 +27,15 @@ static bool do_@name@(void *context@parameters@)
         return false;
     }
     printf(@format@);
+    return true;
+}
+"""
+
+_SET_NUMBER = """
+static bool do_set_number(void *context, const void *message, @p@_number_t number, double value)
+{
+    (void)context;
+    printf("set %d %d %.17g\\n", token(message), (int)number, value);
     return true;
 }
 """
@@ -135,6 +144,10 @@ class _LayerProgram(_Program):
         arguments = [item for word in around for item in (data if word == "@data" else [word])]
         return f"{{ {' '.join(lines)} {function.group(1)}({', '.join(['&r', 'now_us', *arguments])}); break; }}"
 
+    def callbacks(self) -> list[str]:
+        """Names of the callbacks of this layer."""
+        return [*(["set_number"] if self.layout.numbers else []), *CALLBACKS]
+
     def text(self) -> str:
         layout = self.layout
         receive = [
@@ -148,14 +161,14 @@ class _LayerProgram(_Program):
             back.append(self.call_with(reply_head(layout, event), types, "id", "@data", "message"))
         asked = []
         for identifier in layout.topics:
-            types = [layout.source(type_) for _, type_ in request_parameters(layout, identifier).values()]
+            group = sharing(layout.model, CommunicationKind.INCOMING_MESSAGE, identifier)
+            types = [layout.source(type_) for _, type_ in request_parameters(layout, group).values()]
             call = self.call_with(request_head(layout, identifier), types, "@data", "what")
             asked.append(f"{{ const @p@_sent_t what = read_sent(); {call} break; }}")
-        for head in _caller_heads(layout):
-            function = head.partition("(")[0].removeprefix("void ")
-            what = ", what" if "_sent_t" in head else ""
+        for head, parameters in _caller_heads(layout):
+            what = ["what"] if "_sent_t" in head else []
             read = "const @p@_sent_t what = read_sent(); " if what else ""
-            call = f"{function}(&r, now_us, caller_id{what});"
+            call = self.call_with(head, [layout.source(type_) for type_ in parameters], "caller_id", "@data", *what)
             asked.append(f"{{ const uint32_t caller_id = read_id(); {read}{call} break; }}")
         resets = "".join(f" {pool}_used = 0;" for pool in self.pools)
         parts = [
@@ -175,17 +188,22 @@ class _LayerProgram(_Program):
             self.cases("do_back", "int number, uint64_t now_us, uint32_t id, const void *message", back),
             self.cases("do_request", "int number, uint64_t now_us", asked),
             self.print_state(),
+            *([_SET_NUMBER] if layout.numbers else []),
             *(_callback(name, place) for place, name in enumerate(CALLBACKS)),
-            _MAIN.replace("@callbacks@", ", ".join(f"do_{name}" for name in CALLBACKS)),
+            _MAIN.replace("@callbacks@", ", ".join(f"do_{name}" for name in self.callbacks())),
         ]
         return "\n".join(parts).replace("@p@", layout.prefix).replace("@P@", layout.upper)
 
 
-def _caller_heads(layout: Layout) -> list[str]:
-    """The functions for the caller's calls, goals and cancels."""
-    heads = [call_head(layout, item.name) for item in layout.of_kind(CommunicationKind.SERVICE)]
-    for item in layout.of_kind(CommunicationKind.ACTION):
-        heads += [goal_head(layout, item.name), cancel_head(layout, item.name)]
+def _caller_heads(layout: Layout) -> list[tuple[str, list[Type]]]:
+    """The functions for the caller's calls, goals and cancels, with the types of the data that they look at."""
+
+    def types(group: tuple[Communication, ...]) -> list[Type]:
+        return [type_ for _, type_ in request_parameters(layout, group).values()]
+
+    heads = [(call_head(layout, group), types(group)) for group in groups(layout.model, CommunicationKind.SERVICE)]
+    for group in groups(layout.model, CommunicationKind.ACTION):
+        heads += [(goal_head(layout, group), types(group)), (cancel_head(layout, group[0].name), [])]
     return heads
 
 

@@ -102,8 +102,12 @@ static void print_reason(int action) { (void)action; }
 static void do_log(void *context, @p@_log_t kind, int what)
 {
     static const char *const kinds[]
-        = {"event", "unexpected", "unknown", "release", "fault", "stop", "resume", "cancelling", "cancel_overdue",
-           "restart", @more@};
+        = {"event", "unexpected", "unknown",
+#if @P@_LIMIT_COUNT > 0
+           "limited",
+#endif
+           "release", "fault", "stop", "resume",
+           "cancelling", "cancel_overdue", "restart", @more@};
     (void)context;
     if (kind == @P@_LOG_CANCELLING || kind == @P@_LOG_CANCEL_OVERDUE) {
         printf("log %s %d", kinds[kind], what);

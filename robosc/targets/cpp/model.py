@@ -20,7 +20,7 @@ from robosc.expressions import (
 from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.targets.code.c.header import batch, batch_parameters
 from robosc.targets.code.c.layer import request_parameters
-from robosc.targets.code.c.layout import Layout, event_data, request_data
+from robosc.targets.code.c.layout import Layout, event_data, groups, request_data, sharing
 from robosc.targets.code.c.provide import Field, request_field
 from robosc.targets.code.c.text import comment, string_literal
 from robosc.targets.code.c.unit import Unit
@@ -31,6 +31,11 @@ from robosc.targets.text import indent
 _LITERAL = 100
 """Characters of one piece of a long literal."""
 
+_PURPOSES = {
+    CommunicationKind.INCOMING_MESSAGE: "request",
+    CommunicationKind.SERVICE: "call",
+    CommunicationKind.ACTION: "goal",
+}
 _KINDS = {BooleanType: "boolean", IntegerType: "integer", DoubleType: "double", StringType: "string"}
 
 
@@ -268,57 +273,43 @@ class Writer:
     # Requests of the caller, before a layer.
 
     def _asked(self) -> list[str]:
-        layout = self.layout
-        lines: list[str] = []
-        for identifier in layout.topics:
-            lines += self._ask_message(identifier)
-        for item in layout.requests:
-            if item.kind in CALLED_KINDS:
-                lines += self._ask_server(item)
-        return lines
+        kinds = (CommunicationKind.INCOMING_MESSAGE, *CALLED_KINDS)
+        return [line for kind in kinds for group in groups(self.layout.model, kind) for line in self._ask(group)]
 
-    def _ask_message(self, identifier: str) -> list[str]:
-        layout = self.layout
-        parameters = request_parameters(layout, identifier)
-        sharing = [
-            item for item in layout.of_kind(CommunicationKind.INCOMING_MESSAGE) if item.identifier == identifier
-        ]
-        lines = [line for item in sharing for line in self._checks(item.request or NoneType(), "message", ())]
-        lines = [*dict.fromkeys(lines), "[[maybe_unused]] Arena arena;"]
-        for name, type_ in parameters.values():
-            lines += self._datum(type_, name)
-        for item in sharing:
+    def _ask(self, group: tuple[Communication, ...]) -> list[str]:
+        """The function that takes what the caller sends on an identifier, and for an action the one for a cancel."""
+        layout, first = self.layout, group[0]
+        purpose = _PURPOSES[first.kind]
+        is_message = first.kind is CommunicationKind.INCOMING_MESSAGE
+        subject = first.identifier if is_message else first.name
+        caller = "" if is_message else ", caller"
+        name = ask_name(layout, first)
+        lines = [line for item in group for line in self._checks(item.request or NoneType(), "message", ())]
+        # The copy takes the numbers that limits move.
+        lines = [*dict.fromkeys(lines), "[[maybe_unused]] Arena arena;", "M sent = message;", "what.message = &sent;"]
+        parameters = request_parameters(layout, group)
+        for parameter, type_ in parameters.values():
+            lines += self._datum(type_, parameter)
+        for item in group:
             data = request_data(item)
             if data is not None and layout.raw(data) in parameters:
                 lines += self._note(item.event(EventKind.REQUEST), data, parameters[layout.raw(data)][0])
-        arguments = "".join(self._argument(type_, name) for name, type_ in parameters.values())
-        lines.append(f"{layout.function('request', identifier)}(robot, now{arguments}, what);")
-        return _function(
-            f"template <class M>\nvoid {ask_topic_name(layout, identifier)}({layout.prefix}_t* robot, std::uint64_t now, "
-            f"[[maybe_unused]] const M& message, {layout.prefix}_sent_t what, [[maybe_unused]] Notes& notes)",
+        arguments = "".join(self._argument(type_, parameter) for parameter, type_ in parameters.values())
+        lines.append(f"{layout.function(purpose, subject)}(robot, now{caller}{arguments}, what);")
+        found = _function(
+            f"template <class M>\nvoid {name}({layout.prefix}_t* robot, std::uint64_t now, "
+            f"{'' if is_message else 'std::uint32_t caller, '}const M& message, {layout.prefix}_sent_t what, "
+            "[[maybe_unused]] Notes& notes)",
             lines,
-            comment(f"The caller sends a message on {identifier}."),
+            comment(f"The caller asks for {', '.join(item.name for item in group)}."),
         )
-
-    def _ask_server(self, item: Communication) -> list[str]:
-        layout = self.layout
-        is_action = item.kind is CommunicationKind.ACTION
-        name = ask_name(layout, item)
-        checks = self._checks(item.request or NoneType(), "message", ())
-        call = f"{layout.function('goal' if is_action else 'call', item.name)}(robot, now, caller, what);"
-        lines = _function(
-            f"template <class M>\nvoid {name}({layout.prefix}_t* robot, std::uint64_t now, std::uint32_t caller, "
-            f"[[maybe_unused]] const M& message, {layout.prefix}_sent_t what)",
-            [*checks, call],
-            comment(f"The caller {'sends a goal of' if is_action else 'calls'} {item.name}."),
-        )
-        if is_action:
-            lines += _function(
+        if first.kind is CommunicationKind.ACTION:
+            found += _function(
                 f"inline void cancel_{name}({layout.prefix}_t* robot, std::uint64_t now, std::uint32_t caller)",
-                [f"{layout.function('cancel', item.name)}(robot, now, caller);"],
-                comment(f"The caller cancels its goal of {item.name}."),
+                [f"{layout.function('cancel', subject)}(robot, now, caller);"],
+                comment(f"The caller cancels a goal of {', '.join(item.name for item in group)}."),
             )
-        return lines
+        return found
 
     # Received.
 
@@ -471,14 +462,14 @@ def fill_name(layout: Layout, item: Communication) -> str:
     return f"fill_{list(layout.communications).index(item.name)}"
 
 
-def ask_topic_name(layout: Layout, identifier: str) -> str:
-    """The function that takes a message of the caller."""
-    return f"ask_topic_{list(layout.topics).index(identifier)}"
-
-
 def ask_name(layout: Layout, item: Communication) -> str:
-    """The function that takes a call or a goal of the caller."""
-    return f"ask_{list(layout.communications).index(item.name)}"
+    """The function that takes what the caller of a layer sends: one for all on its identifier."""
+    return f"ask_{list(layout.communications).index(first_of(layout, item).name)}"
+
+
+def first_of(layout: Layout, item: Communication) -> Communication:
+    """The first communication of its kind with its identifier."""
+    return sharing(layout.model, item.kind, item.identifier)[0]
 
 
 def take_name(layout: Layout, event: str) -> str:

@@ -11,13 +11,14 @@ from robosc.model.structure import Communication, CommunicationKind, Deployment,
 from robosc.supervisor import Supervisor
 from robosc.targets.code import templates
 from robosc.targets.code.c.header import head, runtime_text
+from robosc.targets.code.c.layout import Layout
 from robosc.targets.code.c.package import generate as generate_c
 from robosc.targets.code.c.text import safe, string_literal
 from robosc.targets.code.c.unit import Unit, make_unit
 from robosc.targets.code.naming import package_name
 from robosc.targets.code.python.folding import folded
 from robosc.targets.code.templates import shared_values
-from robosc.targets.cpp.model import Writer, ask_name, ask_topic_name, fill_name, received_topics, take_name
+from robosc.targets.cpp.model import Writer, ask_name, fill_name, first_of, received_topics, take_name
 from robosc.targets.cpp.naming import require_namespace, require_package_name
 from robosc.targets.cpp.recording import PERIOD_S, record
 from robosc.targets.files import GeneratedFiles
@@ -189,6 +190,7 @@ def _context(
         **_layered(found, asked, options, middleware),
         "deployment": str(supervisor.deployment),
         "is_layer": layout.is_layer,
+        "numbers": _numbers(layout, found, asked, middleware) if layout.is_layer else [],
         "text_type": middleware.type_name("msg", _OWN_TYPES[1]),
         "release_identifiers": released,
         "header": head(supervisor, "# ", "# ", ""),
@@ -199,7 +201,7 @@ def _context(
         "has_actions": any(item.kind is CommunicationKind.ACTION for item in asked),
         "has_services": any(item.kind is CommunicationKind.SERVICE for item in asked),
         "topics": [_topic(unit, topic, numbers, middleware) for topic in found],
-        "servers": [_server(unit, number, item, middleware) for number, item in enumerate(asked)],
+        "servers": [_server(unit, number, asked, middleware) for number in range(len(asked))],
         "is_known_license": is_known(options.metadata.license),
         "typed_state": typed_state and middleware.type_name("msg", typed_state),
         "topic_table": found,
@@ -216,6 +218,25 @@ def _layered(
     if middleware.remapped is None:
         return {}
     return {"supervised": options.supervised, "remapped": remapped_names(found, asked, middleware.remapped)}
+
+
+def _numbers(
+    layout: Layout, found: tuple[Topic, ...], asked: tuple[Communication, ...], middleware: Middleware
+) -> list[dict[str, str]]:
+    """Return the numbers that limits move: the enumerator, the type of the message, and the place in it."""
+    types = {item.name: middleware.type_name("msg", topic.interface) for topic in found for item in topic.published}
+    for item in asked:
+        part = "goal" if item.kind is CommunicationKind.ACTION else "request"
+        if item.interface is not None:
+            types[item.name] = middleware.type_name(part, item.interface)
+    return [
+        {
+            "enumerator": enumerator,
+            "type": types[name],
+            "place": ".".join(("sent", *path)) if path else "basic_field(sent)",
+        }
+        for (name, path), enumerator in layout.numbers.items()
+    ]
 
 
 def _recorded(supervisor: Supervisor, unit: Unit, middleware: Middleware) -> dict[str, object]:
@@ -239,7 +260,7 @@ def _topic(unit: Unit, topic: Topic, numbers: dict[str, int], middleware: Middle
         "literal": string_literal(topic.identifier),
         "caller": string_literal(callers_name("", topic.identifier)),
         "sent": layout.topics.get(topic.identifier),
-        "ask": ask_topic_name(layout, topic.identifier) if topic.published else None,
+        "ask": ask_name(layout, topic.published[0]) if topic.published else None,
         "received": numbers.get(topic.identifier) if topic.received else None,
         "publisher": topic.publisher_quality,
         "subscription": topic.subscription_quality,
@@ -257,7 +278,10 @@ def _topic(unit: Unit, topic: Topic, numbers: dict[str, int], middleware: Middle
     }
 
 
-def _server(unit: Unit, number: int, item: Communication, middleware: Middleware) -> dict[str, object]:
+def _server(
+    unit: Unit, number: int, asked_of: tuple[Communication, ...], middleware: Middleware
+) -> dict[str, object]:
+    item = asked_of[number]
     layout, model = unit.layout, unit.layout.model
     if item.interface is None:
         raise UnsupportedModelError(f"'{item.name}' needs a link to the type of its {item.kind}")
@@ -276,6 +300,7 @@ def _server(unit: Unit, number: int, item: Communication, middleware: Middleware
         "literal": string_literal(item.identifier),
         "caller": string_literal(callers_name("", item.identifier)),
         "ask": ask_name(layout, item),
+        "served": next(place for place, other in enumerate(asked_of) if other.name == first_of(layout, item).name),
         "enumerator": layout.communications[item.name],
         "fill": fill_name(layout, item),
         "answer": take_name(layout, item.event(EventKind.RESPONSE)),

@@ -132,7 +132,7 @@ def test_a_model_without_goals_is_written_as_before() -> None:
     model = model_of(robot("requirement never Door.level > 8"))
     fields = json.loads(msgspec.json.encode(model))
     assert {"goals", "assumptions"} & fields.keys() == set()
-    younger = ("goals", "assumptions", "missions", "preferences")
+    younger = ("goals", "assumptions", "missions", "preferences", "limits")
     assert list(fields) == [name for name in Model.__struct_fields__ if name not in younger]
     goal = json.loads(msgspec.json.encode(model_of(robot("goal once Door.open"))))["goals"]
     assert [sorted(item) for item in goal] == [["condition", "form"]]

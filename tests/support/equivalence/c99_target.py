@@ -15,10 +15,9 @@ from robosc.execution.runtime.settings import Settings, settings_for
 from robosc.expressions import BooleanType, DoubleType, EnumType, StringType, Type
 from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
-from robosc.targets.code.c.layer import request_parameters
 from robosc.targets.code.c.layout import event_data, make_layout
 from support.c99 import OUTCOMES, SANITIZERS, compiled, data_words, microseconds, settings_words
-from support.c99_layer import REFUSALS, caller_place, compiled_layer, layer_settings_words
+from support.c99_layer import caller_place, compiled_layer, layer_settings_words, looked_at, refusals_of
 from support.c99_layer_main import TOKENS
 from support.c99_main import batch_types, events_back
 from support.equivalence.observation import Entry, Issued, Observation, Sight
@@ -260,6 +259,7 @@ class C99Layer(C99Target):
         )
         self._callers = Callers()
         self._messages: list[Any] = []
+        self._moved: dict[int, dict[str, float]] = {}
 
     def _compiled(self, folder: Path, *options: str) -> Path:
         return compiled_layer(self._supervisor, folder, *options)
@@ -272,12 +272,15 @@ class C99Layer(C99Target):
         name = action.subject
         kind = action.do.removeprefix("ask_")
         if action.do == "ask":
-            types = [self._layout.source(type_) for _, type_ in request_parameters(self._layout, name).values()]
+            incoming = self._layout.of_kind(CommunicationKind.INCOMING_MESSAGE)
+            types = looked_at(self._layout, next(item.name for item in incoming if item.identifier == name))
             data = [word for type_ in types for word in data_words(self._layout, type_, action.data, is_root=True)]
             return self._ask(action, self._topics.index(name), self._sent(action.data) + data)
         if kind in ("call", "goal"):
             place = caller_place(self._layout, f"{kind}_{name}")
-            return self._ask(action, place, [self._callers.next(name), *self._sent(action.data)])
+            types = looked_at(self._layout, name)
+            data = [word for type_ in types for word in data_words(self._layout, type_, action.data, is_root=True)]
+            return self._ask(action, place, [self._callers.next(name), *self._sent(action.data), *data])
         if kind == "cancel":
             return self._ask(action, caller_place(self._layout, f"cancel_{name}"), [self._callers.last(name)])
         return super().do(action, awaited)
@@ -297,12 +300,17 @@ class C99Layer(C99Target):
 
     def _entry(self, kind: str, number: str = "-1", *more: str) -> Entry:
         if kind == "blocked":
-            return {"kind": kind, "why": REFUSALS[int(number)]}
+            return {"kind": kind, "why": refusals_of(self._layout)[int(number)]}
         return super()._entry(kind, number, *more)
 
     def _issued(self, kind: str, words: list[str]) -> list[Issued]:
         if kind == "blocked":
             return [(kind, _text(words[0]), {})]
+        if kind == "set":
+            token, place = int(words[0]), int(words[1])
+            _, path = list(self._layout.numbers)[place]
+            self._moved.setdefault(token, {})[".".join(path)] = float(words[2])
+            return []
         numbers = [int(word) for word in words]
         match kind:
             case "default" | "publish":
@@ -324,7 +332,7 @@ class C99Layer(C99Target):
         return [(kind.replace("_", " "), name, caller)]
 
     def _data(self, number: int = -1) -> dict[str, Any]:
-        return {} if number < 0 else flat(self._messages[number])
+        return {} if number < 0 else {**flat(self._messages[number]), **self._moved.get(number, {})}
 
 
 def c99_target(supervisor: Supervisor, folder: Path) -> C99Target:

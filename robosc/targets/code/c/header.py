@@ -25,6 +25,7 @@ from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.supervisor import Supervisor
 from robosc.targets.code.c.layer import request_declarations
 from robosc.targets.code.c.layout import Layout, data_that_comes, event_data, width
+from robosc.targets.code.c.limits import limited, limited_paths
 from robosc.targets.code.c.observation import remembered_places
 from robosc.targets.code.c.provide import request_field, request_struct
 from robosc.targets.code.c.received import unknown_name
@@ -199,6 +200,8 @@ def counts(layout: Layout) -> dict[str, int]:
             }
         ),
         **({"WHEN": sum(item.when is not None for item in model.communications)} if layout.is_layer else {}),
+        "LIMIT": len(limited(layout)),
+        "NUMBER": max((len(limited_paths(layout, item.name)) for _, item in limited(layout)), default=0),
     }
 
 
@@ -224,6 +227,7 @@ def _numbers(layout: Layout) -> list[str]:
         ("communication", layout.communications, "Messages, services and actions, in source order."),
         ("topic", layout.topics, "Identifiers of incoming messages."),
         *([("source", layout.received_topics, "Identifiers of outgoing messages.")] if layout.is_layer else []),
+        *([("number", layout.numbers, "Numbers that limits move.")] if layout.is_layer and layout.numbers else []),
     ):
         members = list(table.values()) or [f"{upper}_NO_{kind.upper()}S"]
         lines += [*_enumeration(f"{prefix}_{kind}_t", words, members), ""]

@@ -3,7 +3,7 @@
 from robosc.model.structure import CommunicationKind
 from robosc.targets.code.c.example import CANCEL, PUBLISH_DEFAULT, main_text
 from robosc.targets.code.c.layer import request_parameters
-from robosc.targets.code.c.layout import Layout
+from robosc.targets.code.c.layout import Layout, groups
 from robosc.targets.code.c.received import unknown_name
 from robosc.targets.code.c.unit import Unit
 from robosc.targets.text import indent
@@ -23,6 +23,16 @@ static bool print_pass_on(void *context, {prefix}_source_t source, const void *m
     (void)context;
     (void)message;
     printf("pass on %s\\n", {prefix}_source_name((int)source));
+    return true;
+}}
+"""
+
+_SET_NUMBER = """\
+static bool print_set_number(void *context, const void *message, {prefix}_number_t number, double value)
+{{
+    (void)context;
+    (void)message;
+    printf("%s becomes %g\\n", {prefix}_number_name((int)number), value);
     return true;
 }}
 """
@@ -87,6 +97,9 @@ def layer_example_file(unit: Unit) -> str:
     if layout.requests:
         texts.append(_BLOCKED)
         settings.append("blocked = print_blocked")
+    if layout.numbers:
+        texts.append(_SET_NUMBER)
+        settings.append("set_number = print_set_number")
     if layout.received_topics:
         texts.append(_PASS_ON)
         settings.append("pass_on = print_pass_on")
@@ -115,17 +128,21 @@ def _requests(layout: Layout) -> list[str]:
         "/* This example has no messages; that they are finite must be found out where they come from. */",
         f"const {layout.prefix}_sent_t what = {{NULL, true, false}};",
     ]
-    for identifier in layout.topics:
-        data = [
-            f"&{unknown_name(raw)}" if layout.is_by_pointer(type_) else _UNKNOWN[raw].format(upper=layout.upper)
-            for raw, (_, type_) in request_parameters(layout, identifier).items()
-        ]
-        arguments = ", ".join(["&layer", "now_us", *data, "what"])
-        lines.append(f"{layout.function('request', identifier)}({arguments});")
-    for item in layout.of_kind(CommunicationKind.SERVICE):
-        lines.append(f"{layout.function('call', item.name)}(&layer, now_us, (uint32_t)period, what);")
-    for item in layout.of_kind(CommunicationKind.ACTION):
-        lines.append(f"{layout.function('goal', item.name)}(&layer, now_us, (uint32_t)period, what);")
+    for kind, purpose in (
+        (CommunicationKind.INCOMING_MESSAGE, "request"),
+        (CommunicationKind.SERVICE, "call"),
+        (CommunicationKind.ACTION, "goal"),
+    ):
+        for group in groups(layout.model, kind):
+            data = [
+                f"&{unknown_name(raw)}" if layout.is_by_pointer(type_) else _UNKNOWN[raw].format(upper=layout.upper)
+                for raw, (_, type_) in request_parameters(layout, group).items()
+            ]
+            is_message = kind is CommunicationKind.INCOMING_MESSAGE
+            number = [] if is_message else ["(uint32_t)period"]
+            arguments = ", ".join(["&layer", "now_us", *number, *data, "what"])
+            name = group[0].identifier if is_message else group[0].name
+            lines.append(f"{layout.function(purpose, name)}({arguments});")
     return lines
 
 

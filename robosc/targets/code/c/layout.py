@@ -30,7 +30,8 @@ _ENGINE_NAMES = """
     t ACTION_COUNT AIM_COUNT ASSUMPTION_COUNT COMMUNICATION_COUNT CONJUNCT_COUNT EVENT_COUNT FALSE H MISSION_COUNT
     NO_COMMUNICATIONS NO_EVENT NO_EVENTS NO_SOURCES NO_TOPICS RECEIVED_COUNT REQUEST_COUNT REQUIREMENT_COUNT
     SENSOR_COUNT SERVICE_COUNT SILENT_COUNT TOPIC_COUNT TRUE UNCONTROLLABLE_DATA UNKNOWN UNKNOWN_INTEGER VISIT_COUNT
-    WHEN_COUNT acting_t approached call_failed call_t callbacks_t cancel_refused cancel_t cancelling cancelling_t chosen
+    WHEN_COUNT LIMIT_COUNT NO_NUMBERS NUMBER_COUNT number_name number_t
+    acting_t approached call_failed call_t callbacks_t cancel_refused cancel_t cancelling cancelling_t chosen
     communication_name communication_t counters_t default_settings detour enabled end_t event_name event_t fault fault_t
     goal_accepted goal_ended goal_t init item_t log_t mission mission_t on_unknown_t outcome_t policy_t refusal_t
     request_t restart sensor_t sent_t settings_t source_name source_t standing standing_t start state_t status status_t
@@ -60,6 +61,7 @@ class Layout:
         values: Enumerator of each value of an enum.
         converters: Function that makes each enum out of received data.
         properties: Member of each property, by object and property.
+        numbers: Enumerator of each number that a layer may move, by communication and path.
         request_members: Member of a request's union for each communication.
         mode: Member of the state for the goal that is approached; empty where there is no strategy.
     """
@@ -78,6 +80,7 @@ class Layout:
     values: dict[tuple[str, str], str] = field(default_factory=dict)
     converters: dict[str, str] = field(default_factory=dict)
     properties: dict[tuple[str, str], str] = field(default_factory=dict)
+    numbers: dict[tuple[str, tuple[str, ...]], str] = field(default_factory=dict)
     request_members: dict[str, str] = field(default_factory=dict)
     _namer: CNamer = field(default_factory=CNamer)
     _functions: dict[tuple[str, str], str] = field(default_factory=dict)
@@ -207,6 +210,11 @@ def make_layout(supervisor: Supervisor, prefix: str | None = None) -> Layout:
             layout.values[enum.name, value] = name(f"{upper}_VALUE_{enum.name}_{value}")
         layout.converters[enum.name] = name(f"{layout.prefix}_convert_{enum.name}")
     _name_state(layout)
+    for limit in model.limits:
+        for bound in limit.bounds:
+            key = (limit.communication, bound.path)
+            if key not in layout.numbers:
+                layout.numbers[key] = name("_".join((upper, "NUMBER", limit.communication, *bound.path)))
     requests = CNamer(frozenset({"nothing"}))
     layout.request_members = {item.name: requests.member(item.name) for item in layout.requests}
     for item_ in model.objects:
@@ -243,27 +251,33 @@ def _name_state(layout: Layout) -> None:
         layout.mode = members.name("mode")
 
 
-def possible_messages(model: Model, identifier: str) -> tuple[Communication, ...]:
-    """Return the communications that a message on an identifier may be in a supervision layer.
+def sharing(model: Model, kind: CommunicationKind, identifier: str) -> tuple[Communication, ...]:
+    """Return the communications that a request on an identifier may be in a supervision layer.
 
     They go up to the first that needs no condition.
     """
     found = []
     for item in model.communications:
-        if item.kind is CommunicationKind.INCOMING_MESSAGE and item.identifier == identifier:
+        if item.kind is kind and item.identifier == identifier:
             found.append(item)
-            if item.when is None:
+            if not item.has_condition:
                 break
     return tuple(found)
 
 
-def recognized_by_data(model: Model, identifier: str) -> tuple[Communication, ...]:
-    """Those of them that are known by their data."""
-    return tuple(item for item in possible_messages(model, identifier) if item.when is not None)
+def groups(model: Model, kind: CommunicationKind) -> tuple[tuple[Communication, ...], ...]:
+    """The communications of each identifier of a kind that a request there may be."""
+    identifiers = dict.fromkeys(item.identifier for item in model.communications if item.kind is kind)
+    return tuple(sharing(model, kind, identifier) for identifier in identifiers)
+
+
+def read_by_layer(model: Model, group: tuple[Communication, ...]) -> tuple[Communication, ...]:
+    """Those of a group whose data a layer looks at: to recognize them, or to move their numbers."""
+    return tuple(item for item in group if item.when is not None or model.limits_for(item.name))
 
 
 def request_data(item: Communication) -> Type | None:
-    """Type of the data that an incoming message carries, which `when` reads; None without data."""
+    """Type of the data that a request carries, which `when` and limits read; None without data."""
     return None if isinstance(item.request, NoneType) else item.request
 
 
@@ -272,7 +286,13 @@ def data_that_comes(layout: Layout) -> tuple[Type, ...]:
     model = layout.model
     found = [event.received for event in layout.executable.events.values() if not event.is_issued]
     if layout.is_layer:
-        found += [request_data(item) for topic in layout.topics for item in recognized_by_data(model, topic)]
+        kinds = (CommunicationKind.INCOMING_MESSAGE, CommunicationKind.SERVICE, CommunicationKind.ACTION)
+        found += [
+            request_data(item)
+            for kind in kinds
+            for group in groups(model, kind)
+            for item in read_by_layer(model, group)
+        ]
     return tuple(type_ for type_ in found if type_ is not None)
 
 

@@ -34,27 +34,45 @@ class Field:
 
 
 def request_field(unit: Unit, item: Communication) -> Field | None:
-    """All that the provide statements of a communication give, or None for nothing."""
+    """All that the provide statements and limits of a communication give, or None for nothing."""
     if item.request is None:
         return None
     root = Field(item.request)
     for statement in unit.layout.model.provides_for(item.name):
         _extend(unit, root, statement.value)
     is_given = any(not isinstance(s.value, ObjectValue) for s in unit.layout.model.provides_for(item.name))
+    for limit in unit.layout.model.limits_for(item.name):
+        for bound in limit.bounds:
+            _extend_to(unit, root, bound.path)
+        is_given = True
     return root if root.parts or is_given else None
 
 
 def _extend(unit: Unit, found: Field, provided: ProvidedValue) -> None:
-    if not isinstance(provided, ObjectValue) or not isinstance(found.type, ObjectType):
-        return
-    types = {part.name: part.type for part in unit.layout.model.object(found.type.name).properties}
-    for name, inner in provided.properties:
-        if name not in found.parts:
-            taken = [word for member, part in found.parts.values() for word in (member, part.flag)]
-            namer = CNamer(frozenset(taken))
-            member = namer.member(name)
-            found.parts[name] = (member, Field(types[name], value=member, flag=namer.name(f"has_{member}")))
-        _extend(unit, found.parts[name][1], inner)
+    if isinstance(provided, ObjectValue):
+        for name, inner in provided.properties:
+            part = _part(unit, found, name)
+            if part is not None:
+                _extend(unit, part, inner)
+
+
+def _extend_to(unit: Unit, found: Field, path: tuple[str, ...]) -> None:
+    part: Field | None = found
+    for name in path:
+        part = None if part is None else _part(unit, part, name)
+
+
+def _part(unit: Unit, found: Field, name: str) -> Field | None:
+    """The field of a property, which from now on is given; None where the datum has no properties."""
+    if not isinstance(found.type, ObjectType):
+        return None
+    if name not in found.parts:
+        types = {part.name: part.type for part in unit.layout.model.object(found.type.name).properties}
+        taken = [word for member, part in found.parts.values() for word in (member, part.flag)]
+        namer = CNamer(frozenset(taken))
+        member = namer.member(name)
+        found.parts[name] = (member, Field(types[name], value=member, flag=namer.name(f"has_{member}")))
+    return found.parts[name][1]
 
 
 def request_struct(found: Field) -> list[str]:

@@ -14,6 +14,8 @@ from robosc.targets.code.c.header import batch, batch_parameters, counts, head, 
 from robosc.targets.code.c.helpers import HELPERS, called
 from robosc.targets.code.c.layer_source import request_functions
 from robosc.targets.code.c.layout import Layout, data_that_comes, event_data
+from robosc.targets.code.c.limits import HELPERS_TEXT as LIMITING
+from robosc.targets.code.c.limits import get_function, limit_function, limited, set_function
 from robosc.targets.code.c.provide import default_function, provide_function
 from robosc.targets.code.c.received import converter, converter_head, unknown_name
 from robosc.targets.code.c.statements import statement_lines, unused
@@ -44,6 +46,11 @@ def source_file(unit: Unit) -> str:
     messages = layout.of_kind(CommunicationKind.INCOMING_MESSAGE)
     provided = [] if layout.is_layer else [provide_function(unit, item) for item in layout.requests]
     provided += [] if layout.is_layer else [default_function(unit, item) for item in messages]
+    limiting = [limit_function(unit, item) for _, item in limited(layout)]
+    if not layout.is_layer:
+        limiting += [made(unit, item) for _, item in limited(layout) for made in (get_function, set_function)]
+    if limiting:
+        limiting = [LIMITING.splitlines(), *limiting]
     held = [conditions.conjuncts_function(item.name) for item in messages]
     held += [conditions.requirements_function(item.name) for item in layout.of_kind(CommunicationKind.ACTION)]
     chosen: list[list[str]] = []
@@ -55,7 +62,7 @@ def source_file(unit: Unit) -> str:
     engine = [runtime_text(layout, f"{part}.c").rstrip().splitlines() for part in parts]
     asked = request_functions(unit) if layout.is_layer else []
     ends = [*engine, *happens, *asked, *_entries(layout), *_names(layout)]
-    rest = [*allows, *steps, *provided, *held, *_dispatchers(unit), *chosen, *ends]
+    rest = [*allows, *steps, *provided, *held, *limiting, *_dispatchers(unit), *chosen, *ends]
     converters = {layout.converters[enum.name]: converter(unit, enum) for enum in layout.model.enums}
     functions = {
         **HELPERS,
@@ -167,6 +174,12 @@ def _tables(layout: Layout, numbers: dict[str, int]) -> list[str]:
     members += ["int conjuncts", *(["const char *identifier"] if layout.is_layer else [])]
     words = "Requests in source order; -1 where something does not apply."
     lines = _table(members, "REQUESTS", requests, words)
+    if layout.is_layer and layout.numbers:
+        first = {}
+        for place, (name, _) in enumerate(layout.numbers):
+            first.setdefault(name, place)
+        rows = [str(first.get(item.name, 0)) for item in layout.requests]
+        lines += _table("int", "FIRST_NUMBERS", rows, "Each request's first number.")
     in_layer = [f"{communication} communication"] if layout.is_layer else []
     errors = [
         [*([layout.communications[name]] if in_layer else []), layout.events[f"{name}.error"]] for name in services
@@ -252,6 +265,7 @@ def _dispatchers(unit: Unit) -> list[list[str]]:
         defaults = [(place, f"return {function('is_default', item.name)}(data);") for place, item in messages]
         head_ = f"static bool is_data_default(int request, const {data})"
         result.append(_switch(head_, "request data", "request", defaults, "return true;"))
+    result += _limit_dispatchers(layout)
     held = [(place, f"{function('conjuncts', item.name)}(s, holds);\nbreak;") for place, item in messages]
     actions = list(enumerate(layout.of_kind(CommunicationKind.ACTION)))
     required = [(place, f"{function('requirements', item.name)}(s, holds);\nbreak;") for place, item in actions]
@@ -259,6 +273,27 @@ def _dispatchers(unit: Unit) -> list[list[str]]:
         if cases:
             head_ = f"static void get_{name}({state}, int {subject}, bool *holds)"
             result.append(_switch(head_, f"s {subject} holds", subject, cases, ""))
+    return result
+
+
+def _limit_dispatchers(layout: Layout) -> list[list[str]]:
+    """Return the functions by which the engine moves numbers; none where nothing has limits."""
+    function, found = layout.function, limited(layout)
+    if not found:
+        return []
+    moves = [(place, f"return {function('limits', item.name)}(s, numbers);") for place, item in found]
+    head_ = "static int limit_numbers(const state_t *s, int request, double *numbers)"
+    result = [_switch(head_, "s request numbers", "request", moves, "return 0;")]
+    if not layout.is_layer:
+        request = f"{layout.prefix}_request_t *data"
+        for name, purpose, parameters in (
+            ("get", "numbers", f"int request, const {request}, double *numbers"),
+            ("set", "moves", f"int request, {request}, const double *numbers"),
+        ):
+            cases = [(place, f"{function(purpose, item.name)}(data, numbers);\nbreak;") for place, item in found]
+            result.append(
+                _switch(f"static void {name}_numbers({parameters})", "request data numbers", "request", cases, "")
+            )
     return result
 
 
@@ -369,7 +404,11 @@ def _replies(layout: Layout) -> list[list[str]]:
 def _names(layout: Layout) -> list[list[str]]:
     result = []
     named = {"event": layout.events, "communication": layout.communications, "topic": layout.topics}
-    for kind, names in (named | ({"source": layout.received_topics} if layout.is_layer else {})).items():
+    if layout.is_layer:
+        named["source"] = layout.received_topics
+        if layout.numbers:
+            named["number"] = {f"{name}: {'.'.join(path)}": word for (name, path), word in layout.numbers.items()}
+    for kind, names in named.items():
         body = [f"(void){kind};", "return NULL;"]
         if names:
             entries = (f"    {string_literal(name)}," for name in names)

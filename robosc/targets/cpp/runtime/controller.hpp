@@ -96,6 +96,10 @@ public:
     virtual ~Middleware() = default;
 
 #if ROBOT_IS_LAYER
+#if ROBOT_LIMIT_COUNT > 0
+    /* Write a number into what was sent, before that goes out. */
+    virtual void set_number(const void* message, int number, double value) = 0;
+#endif
     /* The robot's side: a message goes out as it came. */
     virtual void publish(int topic, const void* message) = 0;
     virtual void call(std::uint32_t id, int service, const void* message) = 0;
@@ -168,6 +172,9 @@ public:
         callbacks.send_goal = on_send_goal;
         callbacks.cancel_goal = on_cancel_goal;
 #if ROBOT_IS_LAYER
+#if ROBOT_LIMIT_COUNT > 0
+        callbacks.set_number = on_set_number;
+#endif
         callbacks.pass_on = on_pass_on;
         callbacks.blocked = on_blocked;
         callbacks.answer = on_answer;
@@ -829,6 +836,14 @@ private:
             context, [&](Middleware& middleware) { middleware.send_goal(id, static_cast<int>(action), message); });
     }
 
+#if ROBOT_LIMIT_COUNT > 0
+    static bool on_set_number(void* context, const void* message, robot_number_t number, double value)
+    {
+        return attempted(context,
+            [&](Middleware& middleware) { middleware.set_number(message, static_cast<int>(number), value); });
+    }
+
+#endif
     static bool on_pass_on(void* context, robot_source_t source, const void* message)
     {
         return attempted(
@@ -919,6 +934,10 @@ private:
             return "a NaN or an infinity";
         case ROBOT_REFUSAL_NOT_KNOWN:
             return "no message of the model";
+#if ROBOT_LIMIT_COUNT > 0
+        case ROBOT_REFUSAL_NOT_WITHIN:
+            return "no number is within all limits";
+#endif
         case ROBOT_REFUSAL_STILL_RUNNING:
             return "its last goal may still be under way";
         case ROBOT_REFUSAL_NOT_STARTED:

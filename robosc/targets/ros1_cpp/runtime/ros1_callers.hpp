@@ -79,7 +79,7 @@ class CalledService {
 public:
     using Request = typename Service::Request;
     using Response = typename Service::Response;
-    using Ask = void (*)(robot_t*, std::uint64_t, std::uint32_t, const Request&, robot_sent_t);
+    using Ask = void (*)(robot_t*, std::uint64_t, std::uint32_t, const Request&, robot_sent_t, Notes&);
 
     CalledService(std::shared_ptr<Shared> shared, const std::string& name, Ask ask)
         : shared_(std::move(shared)), ask_(ask), spinner_(CALL_THREADS, &queue_)
@@ -144,8 +144,8 @@ private:
         const std::uint32_t number = ++count_;
         waiting_[number] = call;
         lock.unlock();
-        shared_->report([ask = ask_, number, call](robot_t* robot, std::uint64_t now, Notes&) {
-            ask(robot, now, number, call->request, sent_of(call->request));
+        shared_->report([ask = ask_, number, call](robot_t* robot, std::uint64_t now, Notes& notes) {
+            ask(robot, now, number, call->request, sent_of(call->request), notes);
         });
         lock.lock();
         changed_.wait(lock, [&] { return call->is_answered || is_closed_; });
@@ -176,7 +176,7 @@ class ServedAction {
 public:
     ACTION_DEFINITION(Action)
     using Handle = actionlib::ServerGoalHandle<Action>;
-    using Ask = void (*)(robot_t*, std::uint64_t, std::uint32_t, const Goal&, robot_sent_t);
+    using Ask = void (*)(robot_t*, std::uint64_t, std::uint32_t, const Goal&, robot_sent_t, Notes&);
     using Cancel = void (*)(robot_t*, std::uint64_t, std::uint32_t);
 
     ServedAction(const std::shared_ptr<Shared>& shared, const std::string& name, Ask ask, Cancel cancel)
@@ -255,8 +255,8 @@ private:
             return;
         }
         const GoalConstPtr message = goal.getGoal();
-        controller_->judge([ask = ask_, number, message](robot_t* robot, std::uint64_t now, Notes&) {
-            ask(robot, now, number, *message, sent_of(*message));
+        controller_->judge([ask = ask_, number, message](robot_t* robot, std::uint64_t now, Notes& notes) {
+            ask(robot, now, number, *message, sent_of(*message), notes);
         });
     }
 

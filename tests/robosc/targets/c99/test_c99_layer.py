@@ -139,7 +139,7 @@ def test_requests_of_every_kind_behave_as_the_reference(everything: Path) -> Non
         assert seen[f"log {what}"] > 5, seen
     for what in "publish default call goal cancel pass blocked answer no_answer accept reject feedback end".split():
         assert seen[what] > 5, seen
-    for reason in range(len(REFUSALS)):
+    for reason in range(len(refusals_of(make_layout(layer_of(EVERYTHING))))):
         assert seen[f"log blocked {reason}"] > 2, (reason, seen)
     for end in range(3):
         assert seen[f"end {end}"] > 5, (end, seen)

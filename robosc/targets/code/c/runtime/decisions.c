@@ -55,10 +55,25 @@ static bool issue(robot_t *r, int request, bool *is_issued)
     *is_issued = false;
     memset(&data, 0, sizeof data);
     data.communication = REQUESTS[request].communication;
-    if (!get_data(&r->state, request, &data)
-        || (r->callbacks.fits != NULL && !r->callbacks.fits(r->callbacks.context, &data))) {
+    if (!get_data(&r->state, request, &data)) {
         return withhold(r, request);
     }
+#if ROBOT_LIMIT_COUNT > 0
+    get_numbers(request, &data, r->numbers);
+    r->moved = limit_numbers(&r->state, request, r->numbers);
+    if (r->moved < 0) {
+        return withhold(r, request);
+    }
+    if (r->moved > 0) {
+        set_numbers(request, &data, r->numbers);
+    }
+#endif
+    if ((r->callbacks.fits != NULL && !r->callbacks.fits(r->callbacks.context, &data))) {
+        return withhold(r, request);
+    }
+#if ROBOT_LIMIT_COUNT > 0
+    limited(r, request);
+#endif
 #if ROBOT_TOPIC_COUNT > 0
     const bool is_acting = keeps_acting(r, request);
     if (is_acting && !is_unchanging && r->acting[REQUESTS[request].topic].is_waiting) {

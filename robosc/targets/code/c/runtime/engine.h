@@ -41,6 +41,9 @@ typedef enum {
     ROBOT_LOG_EVENT,      /* an event was taken: the event */
     ROBOT_LOG_UNEXPECTED, /* the event that the state does not accept; ROBOT_NO_EVENT: a reply to nothing */
     ROBOT_LOG_UNKNOWN,    /* something was unknown at this event, or the data of this request was */
+#if ROBOT_LIMIT_COUNT > 0
+    ROBOT_LOG_LIMITED,    /* numbers of this request were moved into the bounds of limits: its event */
+#endif
     ROBOT_LOG_RELEASE,    /* the default message went out: the topic */
     ROBOT_LOG_FAULT,      /* the robot_fault_t */
     ROBOT_LOG_STOP,       /* the communication that is stale, or -1: `robot_stop` */
@@ -89,7 +92,10 @@ typedef enum {
 typedef enum {
     ROBOT_REFUSAL_NOT_ALLOWED,   /* by the supervisor, in this state */
     ROBOT_REFUSAL_NOT_FINITE,    /* a NaN or an infinity is in it */
-    ROBOT_REFUSAL_NOT_KNOWN,     /* it is no message of the model */
+    ROBOT_REFUSAL_NOT_KNOWN,     /* it is no request of the model */
+#if ROBOT_LIMIT_COUNT > 0
+    ROBOT_REFUSAL_NOT_WITHIN,    /* no number is within all limits */
+#endif
     ROBOT_REFUSAL_STILL_RUNNING, /* the last goal of the action may still be under way */
     ROBOT_REFUSAL_NOT_STARTED,
     ROBOT_REFUSAL_WAITING,       /* for the first message of a sensor with a maximum age */
@@ -110,7 +116,7 @@ typedef enum {
 typedef struct {
     const void *message; /* the message itself, for the callback that sends it on; the layer does not look at it */
     bool is_finite;      /* there is no NaN and no infinity in it, nor in fields that the model does not know */
-    bool is_default;     /* all of it but a header is zero, false or empty; looked at for messages only */
+    bool is_default;     /* all of it but a header is zero, false or empty; looked at for messages, and for `when: default` */
 } robot_sent_t;
 #endif
 
@@ -145,6 +151,10 @@ typedef struct {
     void *context; /* first argument of all */
 
     /* The robot's side. */
+#if ROBOT_LIMIT_COUNT > 0
+    /* A number is moved into the bounds of limits: write it into what was sent, before that goes out. */
+    bool (*set_number)(void *context, const void *message, robot_number_t number, double value);
+#endif
     bool (*publish)(void *context, robot_topic_t topic, const void *message);
     bool (*publish_default)(void *context, robot_topic_t topic); /* the all-default message */
     bool (*call)(void *context, uint32_t id, robot_communication_t service, const void *message);
@@ -184,6 +194,9 @@ typedef struct {
     uint32_t unknown;
     uint32_t unexpected;
     uint32_t faults;
+#if ROBOT_LIMIT_COUNT > 0
+    uint32_t limited; /* numbers */
+#endif
 } robot_counters_t;
 
 #if ROBOT_HAS_STRATEGY
@@ -223,6 +236,9 @@ typedef struct {
     bool is_waiting;
 #endif
     bool held[ROBOT_CONJUNCT_COUNT + 1];
+#if ROBOT_LIMIT_COUNT > 0
+    double numbers[ROBOT_NUMBER_COUNT];
+#endif
 } robot_acting_t;
 
 typedef struct {
@@ -321,6 +337,10 @@ typedef struct {
     int candidate;
 #endif
     robot_acting_t acting[ROBOT_TOPIC_COUNT + 1];
+#if ROBOT_LIMIT_COUNT > 0
+    double numbers[ROBOT_NUMBER_COUNT]; /* of the request under way */
+    int moved;
+#endif
     bool is_restless[ROBOT_TOPIC_COUNT + 1];
     robot_call_t calls[ROBOT_SERVICE_COUNT + 1];
 #if ROBOT_ACTION_COUNT > 0
@@ -390,6 +410,9 @@ const char *robot_communication_name(int communication);
 const char *robot_topic_name(int topic);
 #if ROBOT_IS_LAYER
 const char *robot_source_name(int source);
+#if ROBOT_LIMIT_COUNT > 0
+const char *robot_number_name(int number); /* of the request and its property: "drive: linear.x" */
+#endif
 #endif
 #if ROBOT_SERVICE_COUNT > 0
 

@@ -30,13 +30,51 @@ static int refusal(const robot_t *r, const robot_sent_t *sent_by_caller)
     return (int)ROBOT_REFUSAL_WAITING;
 }
 
+/* A callback failed while something was let through. */
+static int failed(robot_t *r)
+{
+    r->why = ROBOT_FAULT_CALLBACK;
+    return (int)ROBOT_REFUSAL_FAULT;
+}
+
+#if ROBOT_LIMIT_COUNT > 0
+/* Numbers are moved into the bounds that apply now; the program writes them into its message. */
+static int limit_request(robot_t *r, int request, const robot_sent_t *sent_by_caller)
+{
+    double given[ROBOT_NUMBER_COUNT];
+    memcpy(given, r->numbers, sizeof given);
+    r->moved = limit_numbers(&r->state, request, r->numbers);
+    if (r->moved < 0) {
+        return (int)ROBOT_REFUSAL_NOT_WITHIN;
+    }
+    for (int place = 0; r->moved > 0 && place < ROBOT_NUMBER_COUNT; place++) {
+        if ((r->numbers[place] < given[place] || r->numbers[place] > given[place])
+            && !r->callbacks.set_number(r->callbacks.context, sent_by_caller->message,
+                                        (robot_number_t)(FIRST_NUMBERS[request] + place), r->numbers[place])) {
+            return failed(r);
+        }
+    }
+    limited(r, request);
+    return LET_THROUGH;
+}
+#endif
+
 /* The request happens, if it is allowed, with all that follows from it, before its message goes out. */
-static int take_request(robot_t *r, int request)
+static int take_request(robot_t *r, int request, const robot_sent_t *sent_by_caller)
 {
     bool has_changed = false;
+    (void)sent_by_caller;
     if (!is_allowed(&r->state, REQUESTS[request].event)) {
         return (int)ROBOT_REFUSAL_NOT_ALLOWED;
     }
+#if ROBOT_LIMIT_COUNT > 0
+    {
+        const int why = limit_request(r, request, sent_by_caller);
+        if (why != LET_THROUGH) {
+            return why;
+        }
+    }
+#endif
     if (!take(r, REQUESTS[request].event) || !settle(r, request, &has_changed)) {
         return (int)ROBOT_REFUSAL_FAULT;
     }
@@ -63,13 +101,6 @@ static int judge_notes(robot_t *r, robot_event_t event, const notes_t *notes)
     return LET_THROUGH;
 }
 #endif
-
-/* A callback failed while something was let through. */
-static int failed(robot_t *r)
-{
-    r->why = ROBOT_FAULT_CALLBACK;
-    return (int)ROBOT_REFUSAL_FAULT;
-}
 #endif
 
 #if ROBOT_TOPIC_COUNT > 0
@@ -85,11 +116,16 @@ static int message_refusal(robot_t *r, uint64_t now_us, int topic, const robot_s
 static void let_message_through(robot_t *r, int topic, int request, int why, const robot_sent_t *sent_by_caller)
 {
     if (why == LET_THROUGH) {
-        why = take_request(r, request);
+        why = take_request(r, request, sent_by_caller);
     }
     if (why == LET_THROUGH) {
         if (keeps_acting(r, request)) {
+#if ROBOT_LIMIT_COUNT > 0
+            /* What was moved counts as acting, whatever it is: a release too many does no harm. */
+            sent(r, request, sent_by_caller->is_default && r->moved == 0);
+#else
             sent(r, request, sent_by_caller->is_default);
+#endif
         }
         if (!r->callbacks.publish(r->callbacks.context, (robot_topic_t)topic, sent_by_caller->message)) {
             why = failed(r);
@@ -103,19 +139,25 @@ static void let_message_through(robot_t *r, int topic, int request, int why, con
 }
 #endif
 
+#if ROBOT_SERVICE_COUNT + ROBOT_ACTION_COUNT > 0
+/* A call or a goal came from the caller. */
+static int request_refusal(robot_t *r, uint64_t now_us, const robot_sent_t *sent_by_caller)
+{
+    look_at_clock(r, now_us);
+    return refusal(r, sent_by_caller);
+}
+#endif
+
 #if ROBOT_SERVICE_COUNT > 0
-/* The caller called a service. */
-static void let_call_through(robot_t *r, uint64_t now_us, int request, uint32_t caller_id,
+/* The caller called a service: it is the one of the model, unless `why` says otherwise. */
+static void let_call_through(robot_t *r, int request, int why, uint32_t caller_id,
                              const robot_sent_t *sent_by_caller)
 {
     const robot_callbacks_t *callbacks = &r->callbacks;
     const robot_communication_t service = REQUESTS[request].communication;
     robot_call_t *call = &r->calls[REQUESTS[request].service];
-    int why = LET_THROUGH;
-    look_at_clock(r, now_us);
-    why = refusal(r, sent_by_caller);
     if (why == LET_THROUGH) {
-        why = take_request(r, request);
+        why = take_request(r, request, sent_by_caller);
     }
     if (why == LET_THROUGH) {
         call->is_open = true;
@@ -167,19 +209,16 @@ static int send_goal(robot_t *r, int request, uint32_t caller_id, const void *me
     return LET_THROUGH;
 }
 
-/* The caller sent a goal. */
-static void let_goal_through(robot_t *r, uint64_t now_us, int request, uint32_t caller_id,
+/* The caller sent a goal: it is one of this action, unless `why` says otherwise. */
+static void let_goal_through(robot_t *r, int request, int why, uint32_t caller_id,
                              const robot_sent_t *sent_by_caller)
 {
     const robot_callbacks_t *callbacks = &r->callbacks;
-    int why = LET_THROUGH;
-    look_at_clock(r, now_us);
-    why = refusal(r, sent_by_caller);
     if (why == LET_THROUGH && r->goals[REQUESTS[request].action].is_open) {
         why = (int)ROBOT_REFUSAL_STILL_RUNNING;
     }
     if (why == LET_THROUGH) {
-        why = take_request(r, request);
+        why = take_request(r, request, sent_by_caller);
     }
     if (why == LET_THROUGH) {
         why = send_goal(r, request, caller_id, sent_by_caller->message);

@@ -111,6 +111,11 @@ bool robot_init(robot_t *r, const robot_settings_t *settings, const robot_callba
     if (callbacks->blocked == NULL) {
         return false;
     }
+#if ROBOT_LIMIT_COUNT > 0
+    if (callbacks->set_number == NULL) {
+        return false;
+    }
+#endif
 #endif
 #if ROBOT_SENSOR_COUNT > 0
     if (callbacks->pass_on == NULL) {

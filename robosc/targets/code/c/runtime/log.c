@@ -35,6 +35,17 @@ static void unknown(robot_t *r, int event)
 }
 #endif
 
+#if ROBOT_LIMIT_COUNT > 0
+/* Numbers of a request that goes out were moved, as `moved` says. */
+static void limited(robot_t *r, int request)
+{
+    if (r->moved > 0) {
+        r->counters.limited += (uint32_t)r->moved;
+        note(r, ROBOT_LOG_LIMITED, (int)REQUESTS[request].event);
+    }
+}
+#endif
+
 static uint64_t later(uint64_t now_us, uint64_t span_us)
 {
     return span_us > FOREVER - now_us ? FOREVER : now_us + span_us;

@@ -37,17 +37,32 @@ static bool another_is_enabled(const robot_t *r, int topic)
 }
 
 #endif
+/* What allows a message to go on acting, apart from its request: how many conditions that is. */
+static int get_held(const robot_t *r, const robot_acting_t *acting, bool *holds)
+{
+    int count = REQUESTS[acting->request].conjuncts;
+    get_conjuncts(&r->state, acting->request, holds);
+#if ROBOT_LIMIT_COUNT > 0
+    {
+        double numbers[ROBOT_NUMBER_COUNT];
+        memcpy(numbers, acting->numbers, sizeof numbers);
+        holds[count++] = limit_numbers(&r->state, acting->request, numbers) == 0;
+    }
+#endif
+    return count;
+}
+
 /* Judge one message in a stable state. */
 static void observe_acting(robot_t *r, int topic)
 {
     robot_acting_t *acting = &r->acting[topic];
     bool holds[ROBOT_CONJUNCT_COUNT + 1] = {false};
+    const int count = get_held(r, acting, holds);
     const bool is_enabled = is_allowed(&r->state, REQUESTS[acting->request].event);
-    get_conjuncts(&r->state, acting->request, holds);
     if (acting->was_enabled && !is_enabled) {
         acting->is_due = true;
     }
-    for (int place = 0; place < REQUESTS[acting->request].conjuncts; place++) {
+    for (int place = 0; place < count; place++) {
         if (acting->held[place] && !holds[place]) {
             acting->is_due = true;
         }
@@ -138,7 +153,10 @@ static void sent(robot_t *r, int request, bool is_default)
         acting->is_due = false;
         acting->sent = r->sent_count++;
         acting->was_enabled = is_allowed(&r->state, REQUESTS[request].event);
-        get_conjuncts(&r->state, request, acting->held);
+#if ROBOT_LIMIT_COUNT > 0
+        memcpy(acting->numbers, r->numbers, sizeof acting->numbers);
+#endif
+        (void)get_held(r, acting, acting->held);
     }
 }
 #endif

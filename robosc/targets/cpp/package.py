@@ -190,6 +190,7 @@ def _context(
         **_layered(found, asked, options, middleware),
         "deployment": str(supervisor.deployment),
         "is_layer": layout.is_layer,
+        "node_class": "LayerNode" if layout.is_layer else "ControllerNode",
         "numbers": _numbers(layout, found, asked, middleware) if layout.is_layer else [],
         "text_type": middleware.type_name("msg", _OWN_TYPES[1]),
         "release_identifiers": released,

@@ -4,6 +4,7 @@ from robosc.model.structure import Interface
 from robosc.targets.cpp.naming import file_name
 from robosc.targets.cpp.package import Middleware
 from robosc.targets.ros.runtime.parameters import AUTOSTART, STATE_MESSAGE, USE_SIM_TIME
+from robosc.targets.ros2.runtime.remapping import remapped
 
 _PARTS = {
     "goal": ("action", "::Goal"),
@@ -47,5 +48,9 @@ MIDDLEWARE = Middleware(
     without=frozenset({USE_SIM_TIME}),
     parameters=(AUTOSTART, _STATE_MESSAGE),
     packages=("lifecycle_msgs", "rcl_interfaces"),
+    of_a_layer=("ros2_callers.hpp",),
+    launch=".launch.py",
+    remapped=remapped,
+    python="robosc.targets.ros2",
     typed_state=Interface("SupervisorState", "robosc_msgs"),
 )

@@ -197,7 +197,12 @@ private:
             });
         } else {
             const bool is_cancelled = result.code == rclcpp_action::ResultCode::CANCELED;
-            end(id, is_cancelled ? ROBOT_OUTCOME_CANCELLED : ROBOT_OUTCOME_ABORTED);
+            const robot_outcome_t outcome = is_cancelled ? ROBOT_OUTCOME_CANCELLED : ROBOT_OUTCOME_ABORTED;
+#if ROBOT_IS_LAYER
+            end(id, outcome, result.result);
+#else
+            end(id, outcome);
+#endif
         }
     }
 
@@ -224,12 +229,21 @@ private:
         });
     }
 
+#if ROBOT_IS_LAYER
+    void end(std::uint32_t id, robot_outcome_t outcome, const std::shared_ptr<const Result>& result = nullptr)
+    {
+        reports_.add([id, outcome, result](robot_t* robot, std::uint64_t now, Notes&) {
+            robot_goal_ended(robot, now, id, outcome, result.get());
+        });
+    }
+#else
     void end(std::uint32_t id, robot_outcome_t outcome)
     {
         reports_.add([id, outcome](robot_t* robot, std::uint64_t now, Notes&) {
             robot_goal_ended(robot, now, id, outcome);
         });
     }
+#endif
 
     NodeTime& time_;
     Reports& reports_;

@@ -16,8 +16,9 @@ from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
 from robosc.targets import generate
+from robosc.targets.code.c.layout import make_layout
 from support.c99 import GCC, SANITIZERS, WARNINGS, lonely_end, replay
-from support.c99_layer import REFUSALS, LayerReference, compare_layer, compiled_layer
+from support.c99_layer import LayerReference, compare_layer, compiled_layer, refusals_of
 from support.c99_main import events_back
 from support.effort import examples
 from support.execution import supervisor_of

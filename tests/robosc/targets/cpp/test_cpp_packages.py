@@ -17,7 +17,7 @@ from robosc.targets.cpp.naming import file_name
 from robosc.targets.ros.runtime.parameters import declarations
 from support.generated import example_supervisor
 from support.launch_stub import launch_actions
-from support.models import bundle_of
+from support.models import EXAMPLES, bundle_of
 
 TARGETS = ("ros1-cpp", "ros2-cpp")
 
@@ -71,6 +71,18 @@ def test_the_actions_client_library_is_needed_for_actions_only() -> None:
             files = generate(example_supervisor(name), target)
             assert (f"<depend>{library}</depend>" in files["package.xml"]) is is_needed
             assert (library in files["CMakeLists.txt"]) is is_needed
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_no_package_is_needed_twice(target: str) -> None:
+    """An action of the package of the client library itself: catkin refuses a package that is named twice."""
+    texts = ("use NavigateToPose from robosc_example_interfaces", "use Test from actionlib")
+    body = (EXAMPLES / f"{NAVIGATION}.rscd").read_text(encoding="utf-8")
+    assert texts[0] in body
+    files = generate(supervisor_of(body.replace(*texts)), target)
+    needed = [item.text for item in ElementTree.fromstring(files["package.xml"]).findall("depend")]
+    assert "actionlib" in needed
+    assert len(needed) == len(set(needed))
 
 
 @pytest.mark.parametrize("target", TARGETS)

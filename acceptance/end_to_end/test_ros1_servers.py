@@ -284,16 +284,17 @@ def test_a_goal_that_runs_and_does_not_succeed(courier: Courier, options: dict[s
 def test_the_supervisor_cancels_a_goal_that_is_no_longer_allowed(courier: Courier) -> None:
     host = start_counting(courier, ends_on_cancel=False)
     courier.allow(False)
-    courier.reaches("Counter", "cancelled")
     courier.until(lambda: host.cancels["/count"] == 1, "the cancel")
-    # The old goal may be running, so there is no new one.
-    courier.allow(True)
-    courier.order("count", lambda: courier.state("Counter") == "wanted")
+    # Asking for the cancel ends nothing.
+    courier.until(lambda: courier.cancelling() == ["count"], "the state")
     count = len(courier.peer.values("/state"))
     courier.until(lambda: len(courier.peer.values("/state")) > count + 20, "some decisions")
-    assert len(host.goals["/count"]) == 1
+    assert courier.state("Counter") == "counting"
     host.do("end", name="/count", how="canceled")
-    courier.until(lambda: len(host.goals["/count"]) == 2, "the next goal")
+    courier.reaches("Counter", "cancelled")
+    courier.until(lambda: courier.cancelling() == [], "the state")
+    courier.allow(True)
+    courier.order("count", lambda: len(host.goals["/count"]) == 2)
 
 
 def test_a_goal_is_cancelled_before_its_server_accepts_it(courier: Courier) -> None:

@@ -258,15 +258,28 @@ def test_the_supervisor_cancels_a_goal_that_is_no_longer_allowed(courier: Courie
     server = counter_server(courier, ends_on_cancel=False)
     start_counting(courier, server)
     courier.allow(False)
-    courier.reaches("Counter", "cancelled")
     courier.until(lambda: server.cancels == 1, "the cancel")
-    # The old goal may be running, so there is no new one.
-    courier.allow(True)
-    courier.order("count", lambda: courier.state("Counter") == "wanted")
+    # Asking for the cancel ends nothing.
+    courier.until(lambda: courier.cancelling() == ["count"], "the state")
+    assert courier.state("Counter") == "counting"
     courier.peer.spin_for(0.3)
-    assert len(server.handles) == 1
     server.end(End.CANCEL)
-    courier.until(lambda: len(server.handles) == 2, "the next goal")
+    courier.reaches("Counter", "cancelled")
+    assert courier.cancelling() == []
+    courier.allow(True)
+    courier.order("count", lambda: len(server.handles) == 2)
+
+
+def test_a_goal_that_does_not_end_after_its_cancel_is_an_error_until_it_does(courier: Courier) -> None:
+    server = counter_server(courier, ends_on_cancel=False)
+    start_counting(courier, server, "cancel_timeout:=0.5")
+    courier.allow(False)
+    overdue = "the goal of count has not ended although its cancel was asked for"
+    courier.until(lambda: (courier.health() or ())[:2] == (2, overdue), "the error")
+    assert courier.state("Counter") == "counting"
+    server.end(End.SUCCEED)
+    courier.until(lambda: courier.state("Counter") != "counting", "the end")
+    courier.until(lambda: (courier.health() or ())[:2] == (0, "running"), "no error")
 
 
 def test_a_goal_that_somebody_else_cancels(courier: Courier) -> None:

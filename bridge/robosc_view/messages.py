@@ -27,6 +27,7 @@ NOT_KNOWN = "the executor does not allow it; why is not known here"
 _MAXIMUM_DEPTH = 20
 """Maximum depth of the values in an entry; deeper ones are not reported."""
 
+_WORDS = ("identifier", "action", "what")
 _SHOWN_APART = ("time", "kind", "event", "controllable", "state", "decision_us", "transitions")
 
 
@@ -85,6 +86,7 @@ class MessageBuilder:
             "devices": dict(status.devices),
             "components": plain(dict(status.components)),
             "communications": dict(status.communications),
+            "cancelling": list(status.cancelling),
             "enabled": enabled,
             "disabled": disabled,
             "drive": None
@@ -249,8 +251,8 @@ def _states(components: Any) -> dict[str, str | None]:
 
 def entry_text(entry: Entry) -> str:
     """Return the text of an entry beside its event, for a person."""
-    words = [_word(entry[name]) for name in ("identifier", "what") if name in entry]
-    rest = {name: value for name, value in entry.items() if name not in (*_SHOWN_APART, "identifier", "what")}
+    words = [_word(entry[name]) for name in _WORDS if name in entry]
+    rest = {name: value for name, value in entry.items() if name not in (*_SHOWN_APART, *_WORDS)}
     words += [
         _word(value) if name == "data" else f"{name}: {_word(value)}"
         for name, value in sorted(rest.items())
@@ -330,8 +332,17 @@ def run_text(run: "ManualRun", entries: int, report: RunReport, beginning: int =
             "choice": None if report.choice is None else asdict(report.choice),
             "beginning": beginning,
             "opposition": opposition,
+            "ends": [] if isinstance(run, CounterRun) else [_ends(run, action) for action in run.cancelling],
         }
     )
+
+
+def _ends(run: "ManualRun", action: str) -> dict[str, Any]:
+    """Return the ends that the goal of an action can have that is being cancelled, each with its event."""
+    cancel, error = f"{action}.cancel", f"{action}.error"
+    ended = cancel if cancel in run.enabled else error
+    ways = [["as cancelled", ended], ["succeeded in spite of it", f"{action}.response"], ["with an error", error]]
+    return {"action": action, "ways": ways}
 
 
 def saved_text(name: str, text: str) -> str:

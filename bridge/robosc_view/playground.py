@@ -427,6 +427,7 @@ class Playground:
                 warnings=(Notice(_CODE, warning),) if warning else (),
                 components=state_by_component(run.state),
                 communications=run.locations,
+                cancelling=run.cancelling,
                 last=LastTaken(self._tracker, everything).after(len(everything)),
             )
         )

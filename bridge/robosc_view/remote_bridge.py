@@ -307,6 +307,7 @@ def status_of(snapshot: Snapshot) -> Status:
             if item.count
         ],
         progress=_progress(snapshot.progress) if snapshot.HasField("progress") else None,
+        cancelling=list(snapshot.cancelling),
     )
 
 

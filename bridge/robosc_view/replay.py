@@ -7,7 +7,7 @@ each event leads to one location of the protocol, whatever the location before.
 import asyncio
 from bisect import bisect_right
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import accumulate
 from typing import Any
 
@@ -15,7 +15,7 @@ from robosc.automata.plants import communication_plant
 from robosc.event_logs import LoggedRun
 from robosc.event_logs.entries import is_ended
 from robosc.execution.runtime.progress import Progress
-from robosc.model.structure import CommunicationKind, Model
+from robosc.model.structure import CommunicationKind, EventKind, Model
 from robosc.supervisor import Supervisor
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.definition import robot_of
@@ -49,12 +49,14 @@ class Frame:
         communications: Location of each service and action.
         problem: The fault that was reported last, until a restart.
         stops: Reasons why nothing was requested, each until it ended.
+        cancelling: Actions whose goal was to be cancelled and had not ended.
     """
 
     components: Mapping[str, Any]
     communications: Mapping[str, str]
     problem: str = ""
     stops: tuple[str, ...] = ()
+    cancelling: tuple[str, ...] = ()
 
 
 class Recording:
@@ -154,6 +156,12 @@ def _frames(run: LoggedRun, model: Model) -> list[Frame]:
         if item.kind in _CALLED
         for edge in communication_plant(item).edges
     }
+    ends = {
+        f"{item.name}.{kind}": item.name
+        for item in model.communications
+        if item.kind is CommunicationKind.ACTION
+        for kind in (EventKind.REQUEST, EventKind.RESPONSE, EventKind.ERROR, EventKind.CANCEL)
+    }
     names = {component.name for component in model.components if component.behaviour}
     first = first_frame(model)
     frames, frame = [first], first
@@ -168,18 +176,27 @@ def _frames(run: LoggedRun, model: Model) -> list[Frame]:
                 if entry.event in leads_to:
                     name, location = leads_to[entry.event]
                     places = places if places[name] == location else {**places, name: location}
-                frame = Frame(entry.state, places, frame.problem, frame.stops)
+                # The end of a goal that took too long, or from before a restart, is no event: the next request shows it.
+                cancelling = frame.cancelling
+                if entry.event in ends:
+                    cancelling = tuple(item for item in cancelling if item != ends[entry.event])
+                frame = replace(frame, components=entry.state, communications=places, cancelling=cancelling)
+            case "cancelling":
+                action = entry.text("action")
+                if action not in frame.cancelling:
+                    frame = replace(frame, cancelling=(*frame.cancelling, action))
             case "restart":
-                frame = first
+                # A goal of the old run goes on until it has ended.
+                frame = replace(first, cancelling=frame.cancelling)
             case "fault":
-                frame = Frame(frame.components, frame.communications, entry.text("what"), frame.stops)
+                frame = replace(frame, problem=entry.text("what"))
             case "stop":
                 what = entry.text("what")
                 stops = (*(item for item in frame.stops if item != what), what)[-MAXIMUM_STOPS:]
-                frame = Frame(frame.components, frame.communications, frame.problem, stops)
+                frame = replace(frame, stops=stops)
             case "resume":
                 stops = tuple(item for item in frame.stops if not is_ended(item, entry.text("what")))
-                frame = Frame(frame.components, frame.communications, frame.problem, stops)
+                frame = replace(frame, stops=stops)
         frames.append(frame)
     return frames
 
@@ -327,5 +344,6 @@ class Replay:
             communications=frame.communications,
             last=self._recording.last(count),
             progress=self._recording.progress(count, self._player.time_s),
+            cancelling=frame.cancelling,
             drive=None if motion is None else motion.drive(self._player.time_s),
         )

@@ -101,6 +101,7 @@ class Status:
             it follows from the entries.
         latencies: Times that the bridge measures of itself: name, 50th and 99th percentile and maximum in milliseconds.
         progress: State of what the strategy aims at and assumes; None: there is no strategy, or it is not reported.
+        cancelling: Actions whose goal was to be cancelled and has not ended.
     """
 
     time_s: float
@@ -118,6 +119,7 @@ class Status:
     last: Mapping[str, int] | None = None
     latencies: Sequence[tuple[str, float, float, float]] = ()
     progress: Progress | None = None
+    cancelling: Sequence[str] = ()
 
 
 @dataclass(frozen=True, slots=True)

@@ -21,6 +21,7 @@ import msgspec
 
 from robosc.automata.plants import PLANT_LOCATIONS
 from robosc.execution.runtime.progress import MissionStanding, Progress, Standing
+from robosc.model.structure import CommunicationKind
 from robosc.supervisor import Supervisor
 from robosc_bridge.daemon.states import OperatorCommand
 from robosc_view.definition import (
@@ -115,6 +116,7 @@ class StateReader:
             components=_components(document.get("current")),
             communications=_communications(document.get("communications"), robot),
             progress=_progress(document.get("progress")),
+            cancelling=_cancelling(document.get("cancelling"), robot),
         )
         return robot, status, list(self._entries(document.get("transitions"), time_s))
 
@@ -235,6 +237,16 @@ def _communications(locations: object, robot: Robot) -> Mapping[str, str]:
         if place not in places.get(name, ()):
             raise DefinitionError(f"where '{name[:100]}' is makes no sense on /state")
     return locations
+
+
+def _cancelling(names: object, robot: Robot) -> tuple[str, ...]:
+    """Return the actions whose goal is being cancelled; empty for a node that does not report them."""
+    if names is None:
+        return ()
+    actions = {info.name for info in robot.communications if info.kind == CommunicationKind.ACTION}
+    if not isinstance(names, list) or not all(isinstance(name, str) and name in actions for name in names):
+        raise DefinitionError("the actions that are being cancelled make no sense on /state")
+    return tuple(names)
 
 
 _Text = Annotated[str, msgspec.Meta(max_length=100_000)]

@@ -155,6 +155,7 @@ def status_of(snapshot: Snapshot) -> Status:
         age_s=max(time.time() - snapshot.time_s, 0.0),
         latencies=shown(snapshot.timing.latencies),
         progress=snapshot.progress,
+        cancelling=snapshot.cancelling,
     )
 
 

@@ -374,6 +374,7 @@ class _JsonReport:
                 "unknown": list(step.unknown),
                 "reached": list(step.reached),
                 "visits": list(step.visits),
+                "cancelling": list(step.cancelling),
                 "strategy": step.chosen,
                 "state": state_json(step.state),
             }
@@ -392,6 +393,7 @@ class _JsonReport:
                 "marked": run_.is_marked,
                 "goals": list(run_.reached),
                 "missions": [mission_json(item) for item in run_.missions],
+                "cancelling": list(run_.cancelling),
                 "strategy": run_.chosen,
                 **opposition_json(run_),
                 "enabled": list(run_.enabled),

@@ -77,6 +77,9 @@ def step_lines(number: int, step: "Step", before: "StateInWords", actor: str = "
     goals = [f"goal {', '.join(map(str, step.reached))}"] if step.reached else []
     if goals or step.visits:
         lines.append(f"      reached: {', '.join([*goals, *step.visits])}")
+    lines += [
+        f"      {action} is being cancelled: an executor asks for it, and awaits the end" for action in step.cancelling
+    ]
     lines += [f"      unknown: {item}" for item in step.unknown]
     lines += [f"      unknown: {item} keeps its value" for item in step.skipped]
     return lines
@@ -90,6 +93,7 @@ def state_lines(run_: "ManualRun") -> list[str]:
     can_come = [] if isinstance(run_, CounterRun) else [f"can come  {', '.join(others) or 'nothing'}"]
     return [
         f"now       {run_.state}{' (marked)' if run_.is_marked else ''}",
+        *([f"cancelled {', '.join(run_.cancelling)}, not ended yet"] if run_.cancelling else []),
         *_strategy_lines(run_),
         f"allowed   {', '.join(run_.enabled) or 'nothing'}",
         *can_come,

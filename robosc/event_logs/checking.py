@@ -5,6 +5,9 @@ plants, ranges, requirements and the conditions of the supervisor. Each other ev
 state must be the state that the events lead to. Resets, cancels and tau transitions are logged like other events. A
 request is wrong if an enabled reset or tau was not taken before it, because the executor takes these first. After a
 violation, the replay continues from the logged state.
+
+The cancel of a goal is an event when the goal has ended. Earlier versions logged it when it was asked for, without an
+entry `cancelling`, and possibly with an unexpected response after it: both kinds of logs are right.
 """
 
 import json
@@ -24,7 +27,7 @@ MAXIMUM_VIOLATIONS = 1000
 KINDS = frozenset(
     (
         *("event", "unexpected", "unknown", "release", "blocked", "fault", "stop", "resume", "restart", "dropped"),
-        *("reached", "approach", "owed", "met"),
+        *("reached", "approach", "owed", "met", "cancelling", "cancel_overdue"),
     )
 )
 """Kinds of entries."""
@@ -134,6 +137,7 @@ class _Checking:
         # record every message of a later run.
         self._awaited = {item.identifier for item in model.communications if item.max_age is not None}
         self._identifiers = {event: item.identifier for item in model.communications for event in item.events}
+        self._actions = {item.name for item in model.communications if item.kind is CommunicationKind.ACTION}
         self._unknown_kinds: set[str] = set()
         self._others = 0
 
@@ -172,6 +176,8 @@ class _Checking:
                 self._note_arrival(entry.event)
             case "blocked":
                 self._held_back(entry)
+            case "cancelling" | "cancel_overdue":
+                self._cancelled(entry)
             case "restart":
                 self._restarts += 1
                 self._replay.restart()
@@ -235,6 +241,14 @@ class _Checking:
     def _unexpected(self, entry: LogEntry) -> None:
         if self._replay.has(entry.event) and self._replay.is_possible(entry.event):
             self._wrong(entry, f"{entry.event} is logged as unexpected, but could happen")
+
+    def _cancelled(self, entry: LogEntry) -> None:
+        """Check whether there can be a goal whose cancel was asked for."""
+        action = entry.text("action")
+        if action not in self._actions:
+            self._wrong(entry, f"'{action[:_KIND_SHOWN]}' is not an action of the model")
+        elif action not in self._requested:
+            self._wrong(entry, f"the cancel of a goal of {action} was asked for, but {action}.request never happened")
 
     def _held_back(self, entry: LogEntry) -> None:
         """Check whether a layer held a request back with reason."""

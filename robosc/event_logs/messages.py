@@ -50,9 +50,9 @@ _SECONDS_END = 1 << 31
 _LONGEST_TOKEN = 80
 _MOST_POSES = 2000
 _INFO, _WARN, _ERROR = 20, 30, 40
-_TOLD = ("event", "release", "resume", "restart", "reached", "approach", "met")
-_LEVELS = {"fault": _ERROR, **dict.fromkeys(_TOLD, _INFO)}
-_WORDS = ("identifier", "aim", "assumption", "what", "why", "unknown", "count")
+_TOLD = ("event", "release", "resume", "restart", "reached", "approach", "met", "cancelling")
+_LEVELS = {"fault": _ERROR, "cancel_overdue": _ERROR, **dict.fromkeys(_TOLD, _INFO)}
+_WORDS = ("identifier", "action", "aim", "assumption", "what", "why", "unknown", "count")
 
 
 class Message(NamedTuple):

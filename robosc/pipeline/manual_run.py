@@ -78,6 +78,11 @@ class ManualRun(ABC):
         return ()
 
     @property
+    def cancelling(self) -> tuple[str, ...]:
+        """Actions whose goal an executor would be cancelling: it has not ended yet. Automata have none."""
+        return ()
+
+    @property
     @abstractmethod
     def state(self) -> StateInWords:
         """The current state."""

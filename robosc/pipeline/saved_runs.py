@@ -84,6 +84,9 @@ def entries_of(step: Step, number: int) -> Iterator[dict[str, Any]]:
     }
     if step.skipped:
         yield {"time": float(number), "kind": "unknown", "event": step.event, "unknown": list(step.skipped)}
+    for action in step.cancelling:
+        why = "a requirement no longer holds"
+        yield {"time": float(number), "kind": "cancelling", "action": action, "why": why}
 
 
 def state_by_component(state: StateInWords) -> dict[str, dict[str, Any]]:

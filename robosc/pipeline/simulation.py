@@ -16,7 +16,8 @@ from robosc.execution.runtime.protocol import Reading
 from robosc.explanation.blocked import Requests
 from robosc.expressions import Value
 from robosc.expressions.text import automaton_text, expression_text
-from robosc.model.structure import CommunicationKind, EventKind, Model, is_tau
+from robosc.model.structure import CommunicationKind, Deployment, EventKind, Model, is_tau
+from robosc.pipeline.cancelled_goals import NONE, GoalWatch, WatchedGoals, cancelling
 from robosc.pipeline.conditions import unknown_event
 from robosc.pipeline.files import FileAccessError, FileName, given_path, write_whole
 from robosc.pipeline.manual_run import ManualRun, UnknownEventError
@@ -72,6 +73,8 @@ class Run(ManualRun):
         # The request that the strategy chooses, and which goals are true, as of the last stable state.
         self._chosen: str | None = None
         self._reached: tuple[bool, ...] = ()
+        self._watch = GoalWatch(self._system, given.model)
+        self._goals_watched: WatchedGoals = NONE
         super().__init__(
             given.model.name, {event.name: event.is_controllable for event in given.executable.automata.events}
         )
@@ -104,6 +107,14 @@ class Run(ManualRun):
     def missions(self) -> tuple[MissionProgress, ...]:
         """Progress of each mission as of the last stable state; nothing without a strategy."""
         return tuple(map(progress, self._model.missions, self._system.missions()))
+
+    @property
+    def cancelling(self) -> tuple[str, ...]:
+        """Actions whose goal an executor would be cancelling: it has asked for that, and the goal has not ended.
+
+        The world chooses the end: as cancelled, where the supervisor allows that event, succeeded, or with an error.
+        """
+        return cancelling(self._goals_watched)
 
     @property
     def is_marked(self) -> bool:
@@ -193,8 +204,12 @@ class Run(ManualRun):
         skipped = self._system.step(event, reading) or ()
         data_seen = {} if reading is None else dict(reading.data)
         reached, visits = self._observe()
+        asked, self._goals_watched = self.cancelling, self._watch.after(self._goals_watched)
+        new = tuple(action for action in self.cancelling if action not in asked)
         state, is_own = self.state, self._events[event]
-        step = Step(event, data_seen, state, provided, skipped, unknown, is_own, given, reached, self._chosen, visits)
+        step = Step(
+            event, data_seen, state, provided, skipped, unknown, is_own, given, reached, self._chosen, visits, new
+        )
         return self._take(step, before)
 
     def again(self) -> "Run":
@@ -232,15 +247,16 @@ class Run(ManualRun):
         return tuple(self._explained(event))
 
     def _snapshot(self) -> Any:
-        return self._system.snapshot(), self._reached, self._chosen
+        return self._system.snapshot(), self._reached, self._chosen, self._goals_watched
 
     def _restore(self, snapshot: Any) -> None:
-        system, self._reached, self._chosen = snapshot
+        system, self._reached, self._chosen, self._goals_watched = snapshot
         self._system.restore(system)
 
     def _begin(self) -> None:
         self._system.restart()
         self._reached = ()
+        self._goals_watched = NONE
         self._observe()
 
     def _observe(self) -> tuple[tuple[int, ...], tuple[str, ...]]:
@@ -345,8 +361,14 @@ class ModelWalker(Walker):
                 possible += (self._run.chosen,) * max(1, len(possible))
         is_deaf = self._is_deaf()
         for event in possible:
-            if not (is_deaf and _is_request(event)):
+            if not (is_deaf and _is_request(event)) and self._may_end(event):
                 yield event
+
+    def _may_end(self, event: str) -> bool:
+        """Return False for a cancel that no controller has asked for; the caller of a layer may ask at any time."""
+        name, _, kind = event.rpartition(".")
+        is_own = self._run.supervisor.deployment is Deployment.CONTROLLER
+        return not is_own or is_tau(event) or kind != EventKind.CANCEL or name in self._run.cancelling
 
     def _is_deaf(self) -> bool:
         """Return True if a sensor with a `max_age` has sent no message yet."""

@@ -25,6 +25,7 @@ class Step:
         reached: Numbers of the goals that have come true with it, from 1 on.
         chosen: Request that the strategy chooses in the state that it led to; None: it waits, or there is none.
         visits: Names of the visits of missions that were made with it, such as `visit 2 of mission rounds`.
+        cancelling: Actions whose goal an executor asks with it to be cancelled.
     """
 
     event: str
@@ -38,6 +39,7 @@ class Step:
     reached: tuple[int, ...] = ()
     chosen: str | None = None
     visits: tuple[str, ...] = ()
+    cancelling: tuple[str, ...] = ()
 
     def __str__(self) -> str:
         return f"{self.event}: {self.state}"

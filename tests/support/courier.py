@@ -56,6 +56,11 @@ class CourierSide(ABC):
             lambda: self.publish_allowed(is_allowed),
         )
 
+    def cancelling(self) -> list[str]:
+        """Return the actions whose goal is being cancelled, as the node says."""
+        text = self.last_state()
+        return [] if text is None else list(json.loads(text)["cancelling"])
+
     def _current(self, component: str) -> Any:
         text = self.last_state()
         return None if text is None else json.loads(text)["current"][component]

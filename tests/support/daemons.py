@@ -16,7 +16,7 @@ from robosc_bridge.daemon.feed import Feed
 from robosc_bridge.daemon.loop import Daemon
 from robosc_bridge.daemon.programs.items import Attached, Detached, FromProgram, Program, ToProgram
 from robosc_bridge.daemon.threads.reports import Device, DeviceUp, ResetDone
-from robosc_bridge.devices.interface import BINS, STANDSTILL, DriveReading, Pose, RawScan, Scan
+from robosc_bridge.devices.interface import BINS, STANDSTILL, DriveReading, Pose, RawScan, Scan, Velocity
 from robosc_bridge.safety import SafetyLayer, SafetyLimits
 from robosc_bridge.skills import EmergencyStop, Rotate
 from support.models import bundle_of
@@ -151,9 +151,13 @@ class Scene:
             self.out.linear_m_s - self.out.angular_rad_s * 0.08,
             self.out.linear_m_s + self.out.angular_rad_s * 0.08,
         )
-        reading = DriveReading(now_s, pose, self.out, wheels, self.torque, buttons=dict(self.buttons))
+        reading = DriveReading(now_s, pose, self.measured(), wheels, self.torque, buttons=dict(self.buttons))
         self.safety.on_drive_reading(reading)
         self.daemon.post(reading)
+
+    def measured(self) -> Velocity:
+        """The velocity that the wheels measure: the commanded one."""
+        return self.out
 
     def scan(self, distance_m: float) -> None:
         now_s = self.clock.monotonic()

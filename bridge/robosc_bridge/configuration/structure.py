@@ -117,6 +117,15 @@ class Execution(_Section, frozen=True):
         Annotated[float, Meta(gt=0, le=86400)] | None,
         Meta(description="Seconds after which a goal without a result fails; null: never."),
     ] = None
+    cancel_timeout_s: Annotated[
+        float,
+        Meta(
+            ge=0,
+            le=86400,
+            description="Seconds after a cancel was asked for until it is reported that its goal has not ended; 0: "
+            "never.",
+        ),
+    ] = 5.0
     on_unknown: Annotated[
         Literal["default", "keep", "fault"],
         Meta(

@@ -146,6 +146,16 @@ class Execution:
         """State of what the strategy aims at and assumes; None: there is no strategy, or nothing is executed."""
         return None if self.executor is None else self.executor.progress
 
+    @property
+    def cancelling(self) -> tuple[str, ...]:
+        """Actions whose goal was to be cancelled and has not ended."""
+        return () if self.executor is None else self.executor.cancelling
+
+    @property
+    def overdue_cancels(self) -> tuple[str, ...]:
+        """Those of them whose goal should have ended by now."""
+        return () if self.executor is None else self.executor.overdue_cancels
+
     def components(self) -> Mapping[str, Mapping[str, Any]]:
         """State and variables of each component with a behaviour; empty: nothing is executed."""
         return {} if self._system is None else self._system.state()

@@ -44,6 +44,8 @@ class Snapshot:
         communications: Location of each service and action, by name; empty: nothing is executed.
         timing: The bridge's own times, and the counts of its lines.
         progress: State of what the strategy aims at and assumes; None: there is no strategy, or nothing is executed.
+        cancelling: Actions whose goal was to be cancelled and has not ended, in the model's order.
+        overdue_cancels: Those of them whose goal should have ended by now.
     """
 
     number: int
@@ -62,6 +64,8 @@ class Snapshot:
     communications: Mapping[str, str] = field(default_factory=dict)
     timing: TimingFigures = field(default_factory=TimingFigures)
     progress: Progress | None = None
+    cancelling: tuple[str, ...] = ()
+    overdue_cancels: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -137,6 +137,14 @@ def _metrics(snapshot: Snapshot) -> Iterator[Metric]:
     reading = snapshot.reading
     if reading is not None and reading.battery_v is not None:
         yield GaugeMetricFamily("robosc_bridge_battery_volts", "Voltage of the battery.", reading.battery_v)
+    cancelling = GaugeMetricFamily(
+        "robosc_bridge_cancelling",
+        "Actions whose goal was to be cancelled and has not ended: 1 in time, 2 overdue.",
+        labels=["action"],
+    )
+    for action in snapshot.cancelling:
+        cancelling.add_metric([action], 2.0 if action in snapshot.overdue_cancels else 1.0)
+    yield cancelling
     if snapshot.progress is not None:
         yield from _progress(snapshot.progress)
     latencies = HistogramMetricFamily(

@@ -32,6 +32,14 @@ class ExecutionState(Protocol):
     def progress(self) -> Progress | None:
         """State of what the strategy aims at and assumes, if there is one."""
 
+    @property
+    def cancelling(self) -> tuple[str, ...]:
+        """Actions whose goal was to be cancelled and has not ended."""
+
+    @property
+    def overdue_cancels(self) -> tuple[str, ...]:
+        """Those of them whose goal should have ended by now."""
+
     def components(self) -> Mapping[str, Mapping[str, Any]]:
         """State and variables of each component."""
 
@@ -87,7 +95,9 @@ class Snapshots:
             self._components = self._execution.components()
             self._enabled = self._execution.enabled()
             self._communications = self._execution.communications()
-        seen = (state, problem, notice, stops, self._readiness.devices, self._components, self._communications)
+        cancels = self._execution.cancelling, self._execution.overdue_cancels
+        devices = self._readiness.devices
+        seen = (state, problem, notice, stops, devices, self._components, self._communications, *cancels)
         now_s = self._clock.monotonic()
         if seen == self._shown and now_s < self._due_s:
             return
@@ -105,7 +115,7 @@ class Snapshots:
                 notice.reasons,
                 notice.warnings,
                 stops,
-                self._readiness.devices,
+                devices,
                 self._components,
                 self._enabled,
                 self._readiness.reading,
@@ -114,5 +124,6 @@ class Snapshots:
                 self._communications,
                 self._timing(),
                 self._execution.progress,
+                *cancels,
             )
         )

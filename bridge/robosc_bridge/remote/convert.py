@@ -184,6 +184,8 @@ def _snapshot(snapshot: Snapshot) -> pb.Snapshot:
         ],
         has_scan=snapshot.scan is not None,
         overruns=snapshot.overruns,
+        cancelling=snapshot.cancelling,
+        overdue_cancels=snapshot.overdue_cancels,
     )
     if snapshot.progress is not None:
         made.progress.CopyFrom(_progress(snapshot.progress))

@@ -114,8 +114,12 @@ def _safety(snapshot: Snapshot) -> Entry:
 def _supervisor(snapshot: Snapshot) -> Entry:
     values = {item.name: item.state for item in snapshot.components}
     values["allowed now"] = ", ".join(snapshot.enabled)
+    values["cancelling"] = ", ".join(snapshot.cancelling)
     if not snapshot.components:
         return Entry(SUPERVISOR, Level.OK, "Nothing is executed.")
+    if snapshot.overdue_cancels:
+        names = ", ".join(snapshot.overdue_cancels)
+        return Entry(SUPERVISOR, Level.ERROR, f"Goals do not end although they were cancelled: {names}.", values)
     if snapshot.stops:
         return Entry(SUPERVISOR, Level.WARN, f"Nothing is requested: {'; '.join(snapshot.stops)}", values)
     return Entry(SUPERVISOR, Level.OK, "The supervisor is executed.", values)

@@ -19,7 +19,8 @@ from robosc_bridge.terminal.client import (
 STALE_S = 2.0
 """A snapshot that is older comes from a loop that hangs."""
 
-_MARKED = ("blocked", "fault", "owed")
+_MARKED = ("blocked", "fault", "owed", "cancel_overdue")
+_WORDS = ("event", "identifier", "action", "what")
 _SHOWN_APART = ("time", "kind", "state", "controllable", "decision_us")
 
 
@@ -52,6 +53,9 @@ def status_lines(snapshot: Snapshot) -> Iterator[str]:
     for item in snapshot.components:
         variables = " ".join(f"{name}={_word(value)}" for name, value in sorted(item.variables.items()))
         yield printable(f"  {item.name:{width}}  {item.state} {variables}".rstrip())
+    for action in snapshot.cancelling:
+        mark = "warning: " if action in snapshot.overdue_cancels else ""
+        yield printable(f"  {mark}the goal of {action} is being cancelled and has not ended")
     if snapshot.HasField("progress"):
         yield from map(printable, _progress_lines(snapshot.progress))
     if snapshot.enabled:
@@ -152,8 +156,8 @@ class Lines:
 def event_line(entry: Mapping[str, Any]) -> str:
     """Return a line for an entry of the event log: time, a mark if it was held back or failed, kind, subject."""
     kind = str(entry.get("kind"))
-    words = [_word(entry[name]) for name in ("event", "identifier", "what") if name in entry]
-    rest = {name: value for name, value in entry.items() if name not in (*_SHOWN_APART, "event", "identifier", "what")}
+    words = [_word(entry[name]) for name in _WORDS if name in entry]
+    rest = {name: value for name, value in entry.items() if name not in (*_SHOWN_APART, *_WORDS)}
     words += [f"{name}={_word(value)}" for name, value in sorted(rest.items()) if value not in (None, {}, [])]
     time_s = entry.get("time")
     at = _clock(time_s if isinstance(time_s, float) else 0.0)

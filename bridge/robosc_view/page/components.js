@@ -64,14 +64,15 @@ class Card {
     return list;
   }
 
-  paint(shown, places) {
+  paint(shown, places, cancelling) {
     const state = shown?.state ?? null;
     say(this.state, state ?? (this.graph ? "not known" : ""));
     if (this.graph && state !== this.graph.active) this.setActive(state);
     if (this.note) say(this.note, state === null ? NO_BEHAVIOUR : this.component.is_left_out ? LEFT_OUT : TOO_LARGE);
     this.paintVariables(shown?.variables ?? {});
     for (const [name, place] of this.places) {
-      const location = under(places, name) ?? "not known";
+      // Asking for a cancel ends nothing: the action is executing until its goal has ended.
+      const location = cancelling.has(name) ? "cancelling" : under(places, name) ?? "not known";
       say(place, location);
       mark(place, "data-place", location);
     }
@@ -151,9 +152,10 @@ export function startComponents() {
     paint() {
       const components = received.update?.components ?? {};
       const places = received.update?.communications ?? {};
+      const cancelling = new Set(received.update?.cancelling);
       const last = received.update?.last ?? null;
       for (const [name, card] of cards) {
-        card.paint(under(components, name), places);
+        card.paint(under(components, name), places, cancelling);
         if (isLastForgotten) card.graph?.setLast();
         if (taken.has(name)) card.graph?.take(taken.get(name));
         // After a jump, a recorded run may be anywhere, and the entries in between were not sent.

@@ -171,6 +171,25 @@ export function startPlay(send, token) {
     want({ type });
   });
 
+  /** Goals that are being cancelled: asking ends nothing, and the world chooses how each ends. */
+  let ends = "";
+  const paintEnds = (found) => {
+    const place = byId("play-ends");
+    show(place, found.length > 0);
+    // Buttons stay, and the focus with them, as long as they say the same.
+    if (JSON.stringify(found) === ends) return;
+    ends = JSON.stringify(found);
+    place.replaceChildren(...found.map(({ action, ways }) => {
+      const buttons = ways.map(([label, event]) => {
+        const button = make("button", { type: "button", class: "plain", title: event }, label);
+        button.addEventListener("click", () => want({ type: "event", line: event }));
+        return button;
+      });
+      return make("div", { class: "play-ways buttons", role: "group", "aria-label": `How the cancelled goal of ${action} ends` },
+        make("span", {}, "The goal of ", quoted(action), " is being cancelled. It ends"), ...buttons);
+    }));
+  };
+
   let isLinkOpened = false;
   /** Number of the state that the run has begun in, as the server sent it; a person's later choice stays. */
   let begun = null;
@@ -229,6 +248,7 @@ export function startPlay(send, token) {
         button.disabled = run[type] === "";
         mark(button, "title", run[type]);
       }
+      paintEnds(run.ends ?? []);
       if (run.opposition) {
         const { goals, denied, denied_next: next, assumptions } = run.opposition;
         const kept = assumptions.map((times, i) => `assumption ${i + 1} came true ${count(times, "time", "times")}`);

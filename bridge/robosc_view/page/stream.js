@@ -8,7 +8,7 @@ import { isModel, isReplay } from "./received.js";
 
 const OVERSCAN = 6;
 const FIRST_KINDS = ["controllable", "uncontrollable"];
-const SIGNS = { __proto__: null, controllable: "◆", uncontrollable: "○", fault: "✕", blocked: "■", stop: "■", lost: "▲", connection: "▲" };
+const SIGNS = { __proto__: null, controllable: "◆", uncontrollable: "○", fault: "✕", blocked: "■", stop: "■", cancel_overdue: "▲", lost: "▲", connection: "▲" };
 
 /** @returns {object} Functions that main.js calls. */
 export function startStream() {

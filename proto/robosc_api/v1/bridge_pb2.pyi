@@ -134,7 +134,7 @@ class GetStatusResponse(_message.Message):
     def __init__(self, snapshot: _Optional[_Union[Snapshot, _Mapping]] = ...) -> None: ...
 
 class Snapshot(_message.Message):
-    __slots__ = ("number", "time", "age_s", "state", "problem", "reasons", "warnings", "stops", "devices", "components", "enabled", "drive", "has_scan", "overruns", "communications", "latencies", "lines", "progress")
+    __slots__ = ("number", "time", "age_s", "state", "problem", "reasons", "warnings", "stops", "devices", "components", "enabled", "drive", "has_scan", "overruns", "communications", "latencies", "lines", "progress", "cancelling", "overdue_cancels")
     NUMBER_FIELD_NUMBER: _ClassVar[int]
     TIME_FIELD_NUMBER: _ClassVar[int]
     AGE_S_FIELD_NUMBER: _ClassVar[int]
@@ -153,6 +153,8 @@ class Snapshot(_message.Message):
     LATENCIES_FIELD_NUMBER: _ClassVar[int]
     LINES_FIELD_NUMBER: _ClassVar[int]
     PROGRESS_FIELD_NUMBER: _ClassVar[int]
+    CANCELLING_FIELD_NUMBER: _ClassVar[int]
+    OVERDUE_CANCELS_FIELD_NUMBER: _ClassVar[int]
     number: int
     time: _timestamp_pb2.Timestamp
     age_s: float
@@ -171,7 +173,9 @@ class Snapshot(_message.Message):
     latencies: _containers.RepeatedCompositeFieldContainer[Latency]
     lines: _containers.RepeatedCompositeFieldContainer[LineCounts]
     progress: StrategyProgress
-    def __init__(self, number: _Optional[int] = ..., time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., age_s: _Optional[float] = ..., state: _Optional[_Union[BridgeState, str]] = ..., problem: _Optional[str] = ..., reasons: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., warnings: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., stops: _Optional[_Iterable[str]] = ..., devices: _Optional[_Iterable[_Union[DeviceState, _Mapping]]] = ..., components: _Optional[_Iterable[_Union[ComponentState, _Mapping]]] = ..., enabled: _Optional[_Iterable[str]] = ..., drive: _Optional[_Union[DriveState, _Mapping]] = ..., has_scan: _Optional[bool] = ..., overruns: _Optional[int] = ..., communications: _Optional[_Iterable[_Union[CommunicationState, _Mapping]]] = ..., latencies: _Optional[_Iterable[_Union[Latency, _Mapping]]] = ..., lines: _Optional[_Iterable[_Union[LineCounts, _Mapping]]] = ..., progress: _Optional[_Union[StrategyProgress, _Mapping]] = ...) -> None: ...
+    cancelling: _containers.RepeatedScalarFieldContainer[str]
+    overdue_cancels: _containers.RepeatedScalarFieldContainer[str]
+    def __init__(self, number: _Optional[int] = ..., time: _Optional[_Union[datetime.datetime, _timestamp_pb2.Timestamp, _Mapping]] = ..., age_s: _Optional[float] = ..., state: _Optional[_Union[BridgeState, str]] = ..., problem: _Optional[str] = ..., reasons: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., warnings: _Optional[_Iterable[_Union[Notice, _Mapping]]] = ..., stops: _Optional[_Iterable[str]] = ..., devices: _Optional[_Iterable[_Union[DeviceState, _Mapping]]] = ..., components: _Optional[_Iterable[_Union[ComponentState, _Mapping]]] = ..., enabled: _Optional[_Iterable[str]] = ..., drive: _Optional[_Union[DriveState, _Mapping]] = ..., has_scan: _Optional[bool] = ..., overruns: _Optional[int] = ..., communications: _Optional[_Iterable[_Union[CommunicationState, _Mapping]]] = ..., latencies: _Optional[_Iterable[_Union[Latency, _Mapping]]] = ..., lines: _Optional[_Iterable[_Union[LineCounts, _Mapping]]] = ..., progress: _Optional[_Union[StrategyProgress, _Mapping]] = ..., cancelling: _Optional[_Iterable[str]] = ..., overdue_cancels: _Optional[_Iterable[str]] = ...) -> None: ...
 
 class StrategyProgress(_message.Message):
     __slots__ = ("aims", "assumptions", "overdue", "is_followed", "approached", "chosen", "missions")

@@ -29,7 +29,7 @@ def test_a_robot_that_is_well() -> None:
         "address": "robot:50061", "robot": "Porter", "version": "1.2", "state": "running", "age_s": "0.1",
         "decisions left out": "0",
     }  # fmt: skip
-    assert found["supervisor"].values == {"Desk": "idle", "allowed now": "drive, show"}
+    assert found["supervisor"].values == {"Desk": "idle", "allowed now": "drive, show", "cancelling": ""}
 
 
 @pytest.mark.parametrize(

@@ -31,7 +31,9 @@ from robosc_view.reports import SourceKind
 from robosc_view.requests import ROBOSC, parse_request
 from robosc_view.sources import Pause, RefusedError
 from robosc_view.watched_model import NoSupervisorError, SynthesizedModel, WatchedModel, file_digest, read, synthesized
+from support.execution import unsupervised
 from support.live import large_model, supervisor_without_synthesis
+from support.loaders import MODEL as LOADER
 from support.models import EXAMPLES
 from support.pages_open import opened, token_of
 from support.view_servers import served
@@ -350,6 +352,42 @@ async def test_events_happen_with_their_data_and_are_taken_back() -> None:
         assert answer["lines"][1] == "Sensor.people keeps its value, since what it was to take is unknown"
         answer = await done(page, "restart")
         assert (answer["entries"], answer["steps"], answer["redo"]) == (0, 0, "")
+
+
+class Loading(Files):
+    """The loader, whose drive takes its time to stop."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        supervisor = unsupervised(LOADER.read_text(encoding="utf-8"))
+        self.watched = WatchedModel(SynthesizedModel(supervisor), "first", self._digest, self._make, pause=self._pause)
+        self.robot = playable(self.watched.made)
+
+
+@pytest.mark.parametrize("way", range(3))
+async def test_one_chooses_how_a_goal_ends_that_is_being_cancelled(way: int) -> None:
+    async with looking(Loading()) as page:
+        await page.receive("definition")
+        assert (await page.receive("run"))["ends"] == []
+        await done(page, "event", line="travel")
+        answer = await done(page, "event", line="stop true")
+        (ends,) = answer["ends"]
+        assert ends["action"] == "travel"
+        assert [event for _, event in ends["ways"]] == ["travel.cancel", "travel.response", "travel.error"]
+        update = await page.until(lambda message: message["type"] == "update" and message["cancelling"] == ["travel"])
+        assert update["communications"]["travel"] == "executing"
+        assert [entry["kind"] for entry in page.entries()][-1] == "cancelling"
+        assert "reach.request" in answer["blocked"]
+        answer = await done(page, "event", line=ends["ways"][way][1])
+        assert (answer["kind"], answer["ends"]) == ("step", [])
+
+
+async def test_a_cancelled_goal_whose_requirements_hold_again_ends_with_an_error() -> None:
+    async with looking(Loading()) as page:
+        await page.receive("definition")
+        for line in ("travel", "stop true", "stop false"):
+            answer = await done(page, "event", line=line)
+        assert [event for _, event in answer["ends"][0]["ways"]] == ["travel.error", "travel.response", "travel.error"]
 
 
 async def test_chance_and_findings() -> None:

@@ -21,9 +21,10 @@ from robosc_view.messages import events_text
 from robosc_view.replay import HISTORY, MAXIMUM_STOPS, Player, Recording, Replay
 from robosc_view.sources import Pause, Play, Seek
 from support.effort import examples
-from support.execution import Bench
+from support.execution import Bench, unsupervised
 from support.goal_porter import porter_supervisor
 from support.live import LiveRobot, large_model, supervisor_without_synthesis
+from support.loaders import MODEL as LOADER
 from support.pages_open import opened
 from support.rounds import rounds_supervisor
 from support.view_servers import served
@@ -401,3 +402,20 @@ def _recording() -> Recording:
 
 
 RECORDING = _recording()
+
+
+def test_goals_that_are_being_cancelled_are_shown_until_they_have_ended(tmp_path: Path) -> None:
+    supervisor = unsupervised(LOADER.read_text(encoding="utf-8"))
+    bench = Bench(InterpretedSystem(supervisor), cancel_timeout_s=1.0)
+    bench.tick()
+    bench.executor.on_goal_accepted(1)
+    bench.receive("/stop", True)
+    bench.tick(20)
+    bench.executor.on_goal_ended(1, "cancelled")
+    path = tmp_path / "run.jsonl"
+    path.write_text("".join(map(json_line, bench.log.entries)))
+    recording = Recording(read_log(path), supervisor)
+    kinds = [document.get("event", document["kind"]) for document in recording.documents]
+    assert kinds[:5] == ["travel.request", "stop.response", "cancelling", "cancel_overdue", "travel.cancel"]
+    shown = [recording.frame(number).cancelling for number in range(6)]
+    assert shown == [(), (), (), ("travel",), ("travel",), ()]

@@ -11,6 +11,7 @@ from robosc_view.definition import DefinitionError
 from robosc_view.messages import MessageBuilder, PreparedRobot
 from robosc_view.ros2_topic import MAXIMUM_CHARACTERS, StateReader
 from support.execution import Bench
+from support.generated import example_supervisor
 from support.goal_porter import porter_supervisor
 from support.live import large_model, supervisor_without_synthesis
 from support.rounds import rounds_supervisor
@@ -74,7 +75,7 @@ def test_a_node_of_before_does_not_report_where_services_are(large: Supervisor, 
     text = Node(large, tmp_path).system.report()
     state = json.loads(text)
     # The words are the same in C++: the test of those nodes has this list, too.
-    assert list(state) == ["current", "communications", "transitions", "definition"]
+    assert list(state) == ["current", "communications", "transitions", "cancelling", "definition"]
     assert state.pop("communications") == {"hold2": "idle", "hold5": "idle"}
     reader = StateReader(large)
     robot, status, _ = reader.read(json.dumps(state), 1.0)
@@ -106,6 +107,9 @@ def test_what_makes_no_sense_is_reported_in_a_sentence(large: Supervisor, tmp_pa
         json.dumps({**good, "communications": {"hold2": ["idle"]}}),
         json.dumps({**good, "communications": {"seen0": "idle"}}),
         json.dumps({**good, "communications": {"nothing": "idle"}}),
+        json.dumps({**good, "cancelling": "navigate"}),
+        json.dumps({**good, "cancelling": ["hold2"]}),
+        json.dumps({**good, "cancelling": [["navigate"]]}),
     ]
     for text in wrong:
         with pytest.raises(DefinitionError) as error:
@@ -117,6 +121,18 @@ def test_what_makes_no_sense_is_reported_in_a_sentence(large: Supervisor, tmp_pa
     other = supervisor_without_synthesis(large_model(3))
     with pytest.raises(DefinitionError, match="another model"):
         StateReader(other).read(json.dumps(good), 1.0)
+
+
+def test_goals_that_are_being_cancelled_are_shown(tmp_path: Path) -> None:
+    supervisor = example_supervisor("navigation/navigation")
+    node, reader = Node(supervisor, tmp_path), StateReader(supervisor)
+    robot, status, _ = reader.read(node.system.report(cancelling=("navigate",)), 1.0)
+    assert status.cancelling == ("navigate",)
+    assert json.loads(MessageBuilder(PreparedRobot(robot)).update(status, 1, 0.0))["cancelling"] == ["navigate"]
+    # A node of an earlier version does not report them.
+    state = json.loads(node.system.report())
+    assert state.pop("cancelling") == []
+    assert reader.read(json.dumps(state), 1.0)[1].cancelling == ()
 
 
 def test_the_progress_of_a_strategy_is_read_as_the_node_writes_it(tmp_path: Path) -> None:

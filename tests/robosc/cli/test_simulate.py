@@ -107,6 +107,7 @@ def test_for_machines(capsys: pytest.CaptureFixture[str]) -> None:
         "unknown": [],
         "reached": [],
         "visits": [],
+        "cancelling": [],
         "strategy": None,
         "state": {
             "components": {"Sensor": "sensing", "Base": "moving"},

@@ -3,14 +3,18 @@
 from collections import Counter
 from pathlib import Path
 from random import Random
+from typing import Any
 
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from robosc.event_logs import check_log
+from robosc.execution.interpreter import InterpretedSystem
 from robosc.supervisor import Supervisor
 from support.effort import examples
+from support.execution import Bench
+from support.generated import example_supervisor
 from support.random_controllers import random_controller, random_robot
 from support.random_layers import random_layer
 from support.random_logs import Entry, World, faults, mutated, read, walked
@@ -103,3 +107,54 @@ def test_variables_that_synthesis_leaves_out_are_followed_too(
     variables[name] = {"str": 7, "bool": "no"}.get(type(variables[name]).__name__, "other")
     lines = [item.line for item in check_log(read(folder, entries), supervisor).violations]
     assert lines[:1] == [number + 1]
+
+
+def driven() -> list[Entry]:
+    """Return a log of the navigation robot whose goal is being cancelled."""
+    bench = Bench(InterpretedSystem(example_supervisor("navigation/navigation")))
+    bench.tick()
+    bench.executor.on_reply(1, {"success": True})
+    bench.receive("/person/distance", 3.0)
+    bench.tick()
+    bench.receive("/person/distance", 0.5)
+    return bench.log.entries
+
+
+def log_of_the_drive(folder: Path, entries: list[Entry]) -> tuple[str, ...]:
+    """Return what is wrong with a log of the navigation robot."""
+    found = check_log(read(folder, entries), example_supervisor("navigation/navigation"))
+    return tuple(item.sentence for item in found.violations)
+
+
+def _cancelled(state: dict[str, Any]) -> Entry:
+    after = {**state, "Navigator": {**state["Navigator"], "state": "ready"}}
+    return {
+        "time": 1.0,
+        "kind": "event",
+        "event": "navigate.cancel",
+        "controllable": True,
+        "data": None,
+        "state": after,
+    }
+
+
+def test_a_log_in_which_a_cancel_is_an_event_when_it_has_happened(tmp_path: Path) -> None:
+    entries = driven()
+    asked = next(place for place, entry in enumerate(entries) if entry["kind"] == "cancelling")
+    assert log_of_the_drive(tmp_path, [*entries, _cancelled(entries[asked - 1]["state"])]) == ()
+
+
+def test_a_log_of_an_earlier_version_in_which_it_was_an_event_when_it_was_asked_for(tmp_path: Path) -> None:
+    entries = [entry for entry in driven() if entry["kind"] != "cancelling"]
+    late = {"time": 2.0, "kind": "unexpected", "event": "navigate.response"}
+    assert log_of_the_drive(tmp_path, [*entries, _cancelled(entries[-1]["state"]), late]) == ()
+
+
+def test_a_goal_that_never_was_cannot_be_cancelled(tmp_path: Path) -> None:
+    wrong = [
+        {"time": 0.0, "kind": "cancelling", "action": "navigate", "why": "stop"},
+        {"time": 0.0, "kind": "cancel_overdue", "action": "fly", "asked_s": 5.0},
+    ]
+    never, unknown = log_of_the_drive(tmp_path, [*wrong, *driven()])
+    assert never == "the cancel of a goal of navigate was asked for, but navigate.request never happened"
+    assert unknown == "'fly' is not an action of the model"

@@ -1,5 +1,7 @@
 """Runs that are stepped by hand: against the reference interpreter's own interface, and what is refused."""
 
+import json
+from pathlib import Path
 from random import Random
 from typing import Any
 
@@ -9,6 +11,7 @@ import robosc
 from robosc.automata import to_automata
 from robosc.automata.state import subjects
 from robosc.controller_properties import StrategyRun
+from robosc.event_logs import check_log, read_log
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.expressions import (
     ArrayType,
@@ -22,7 +25,9 @@ from robosc.expressions import (
 )
 from robosc.model.structure import EventKind, Model, is_tau
 from support.effort import seeds
+from support.execution import unsupervised
 from support.lift import LIFT
+from support.loaders import MODEL as LOADER
 from support.models import EXAMPLES
 from support.random_goals import strategic_controller
 from support.random_supervisors import random_data, random_supervisor
@@ -370,3 +375,78 @@ def test_what_no_message_leads_to_gets_no_request_that_is_not_allowed() -> None:
     for seed in range(20):
         run.restart()
         run.walk(20, seed, strategy=True)
+
+
+def loading() -> robosc.Run:
+    """Return a run of the loader, which drives while its button is pressed."""
+    made = robosc.synthesize(LOADER).supervisor
+    assert made is not None
+    run = robosc.simulate(made)
+    run.step("travel.request")
+    assert run.cancelling == ()
+    step = run.step("stop.response", True)
+    assert step.cancelling == run.cancelling == ("travel",)
+    return run
+
+
+@pytest.mark.parametrize("end", ["cancel", "response", "error"])
+def test_the_world_chooses_how_a_cancelled_goal_ends(end: str) -> None:
+    run = loading()
+    assert "reach.request" not in run.enabled
+    assert run.step("travel.feedback").cancelling == ()
+    run.step("stop.response", False)
+    run.step("stop.response", True)
+    # It was asked for once, and is not taken back.
+    assert run.cancelling == ("travel",)
+    run.step(f"travel.{end}")
+    assert run.cancelling == ()
+    if end != "cancel":
+        run.step("travel.reset")
+    assert "reach.request" in run.enabled
+    while run.cancelling == ():
+        run.undo()
+    assert [step.event for step in run.history][-1] == "stop.response"
+
+
+def test_a_cancelled_goal_whose_requirements_hold_again_does_not_end_as_cancelled() -> None:
+    run = loading()
+    run.step("stop.response", False)
+    assert run.cancelling == ("travel",)
+    assert "travel.cancel" not in run.enabled
+    run.restart()
+    assert run.cancelling == ()
+
+
+def test_a_walk_cancels_only_what_an_executor_has_asked_to_cancel() -> None:
+    made = robosc.synthesize(LOADER).supervisor
+    assert made is not None
+    cancels = 0
+    for seed in range(20):
+        run = robosc.simulate(made)
+        asked: set[str] = set()
+        for step in run.walk(200, seed):
+            name, _, kind = step.event.rpartition(".")
+            if kind == "cancel":
+                assert name in asked
+                cancels += 1
+            if kind in ("cancel", "response", "error"):
+                asked.discard(name)
+            asked |= set(step.cancelling)
+    assert cancels > 20
+
+
+def test_a_walk_of_an_action_without_requirements_never_cancels_it() -> None:
+    text = LOADER.read_text().replace("requirement travel needs !Button.is_pressed and Arm.folded", "")
+    run = robosc.simulate(unsupervised(text))
+    assert "travel.cancel" not in {step.event for step in run.walk(500, 1)}
+
+
+def test_a_saved_run_says_what_was_asked_to_be_cancelled(tmp_path: Path) -> None:
+    run = loading()
+    run.step("travel.cancel")
+    file = run.save(tmp_path / "run.jsonl")
+    entries = [json.loads(line) for line in file.read_text().splitlines()]
+    assert [entry.get("event", entry["kind"]) for entry in entries] == [
+        *("travel.request", "stop.response", "cancelling", "travel.cancel")
+    ]
+    assert check_log(read_log(file), run.supervisor).violations == ()

@@ -66,14 +66,14 @@ def test_a_node_publishes_its_state_in_the_form_that_is_asked_for(
         "transitions": [3, 1],
     }
     executor = SimpleNamespace(
-        status=SimpleNamespace(value="stopped"), reasons=("scan is stale",), cancelling=("navigate",)
+        status=SimpleNamespace(value="stopped"), reasons=("scan is stale",), progress=None, cancelling=("navigate",)
     )
     with imported(generate(example_supervisor(MAZE), "ros2"), tmp_path, f"{PACKAGE}.state_publisher") as generated:
         generated.StatePublisher(node, "/r", form).publish(
-            executor, look, lambda given, executor: f"text of {len(given)}, {executor.cancelling}"
+            executor, look, lambda given, progress, cancelling: f"text of {len(given)}, {progress}, {cancelling}"
         )
     assert [item.data for item in node.published.get("/r/state", [])] == (
-        [] if form == "typed" else ["text of 3, ('navigate',)"]
+        [] if form == "typed" else ["text of 3, None, ('navigate',)"]
     )
     typed = node.published.get("~/state", [])
     assert len(typed) == (form != "json")

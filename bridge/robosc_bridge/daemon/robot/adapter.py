@@ -69,6 +69,8 @@ class RobotAdapter:
         self._by_name = {item.name: item for item in mapping.communications}
         self._by_identifier = {item.identifier: item for item in reversed(mapping.communications)}
         self._pending: deque[Callable[[Supervised], None]] = deque()
+        # Calls to stop, which are answered when the wheels stand.
+        self._stops: list[int] = []
         self._rotations = Rotations(
             motion, listeners, self._pending.append, on_failed_rotation, service_timeout_s, clock
         )
@@ -77,6 +79,7 @@ class RobotAdapter:
     def forget(self) -> None:
         """Forget the requests of the last run, when a run of the executor ends or a new one begins."""
         self._pending.clear()
+        self._stops.clear()
         self._rotations.forget()
         self._program_channel.forget()
 
@@ -99,12 +102,12 @@ class RobotAdapter:
         item = self._by_name[communication]
         match self._channels[communication]:
             case channels.DriveChannel():
-                self._rotations.end("another motion was asked for", is_own=True)
+                self._rotations.end("another motion was asked for", is_own=True, at_once=True)
                 self._motion.drive(velocity_of(message), self._clock())
             case channels.StopChannel():
                 self._stop()
             case channels.RotateChannel() as channel:
-                self._rotations.end("another rotation was asked for", is_own=True)
+                self._rotations.end("another rotation was asked for", is_own=True, at_once=True)
                 self._rotations.begin(item, channel, None, message)
             case channels.GrpcChannel():
                 self._program_channel.send(item, message)
@@ -135,7 +138,7 @@ class RobotAdapter:
         match self._channels[communication]:
             case channels.StopChannel():
                 self._stop()
-                self._pending.append(lambda executor: executor.on_reply(request_id, service_response("")))
+                self._stops.append(request_id)
             case channels.RotateChannel() as channel if not self._rotations.is_under_way:
                 self._rotations.begin(item, channel, request_id, message)
             case channels.GrpcChannel():
@@ -221,7 +224,7 @@ class RobotAdapter:
             if channel.event == event and channel.device in (str(device), "any"):
                 executor.receive(identifier, shaped(self._by_identifier[identifier], text))
         if is_lost and device is Device.DRIVE:
-            self._rotations.end("the drive base is lost")
+            self._rotations.end("the drive base is lost", at_once=True)
 
     def on_key(self, key: str, executor: Supervised) -> None:
         """Handle a key that was typed in the terminal."""
@@ -233,6 +236,10 @@ class RobotAdapter:
     def deliver_pending(self, executor: Supervised) -> None:
         """Report the outcomes of its requests to the executor."""
         self._rotations.poll()
+        if not self._motion.is_braking:
+            stops, self._stops = self._stops, []
+            for number in stops:
+                executor.on_reply(number, service_response(""))
         while self._pending:
             self._pending.popleft()(executor)
             self._rotations.poll()

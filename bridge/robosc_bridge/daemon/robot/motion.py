@@ -9,6 +9,9 @@ from collections.abc import Callable
 from robosc_bridge.devices.interface import STANDSTILL, DriveReading, Velocity
 from robosc_bridge.skills import Rotate, RotateState
 
+STILL_M_S, STILL_RAD_S = 0.01, 0.03
+"""Measured speeds up to which the robot counts as standing."""
+
 
 class MotionTarget:
     """Target of the motion: a velocity, a rotation or a standstill; the last one that was set counts.
@@ -23,6 +26,14 @@ class MotionTarget:
         self._command = command
         self._wish = STANDSTILL
         self._is_paused = False
+        # Since when a standstill is wanted, and True if it was measured since then.
+        self._since_s = 0.0
+        self._is_still = False
+
+    @property
+    def is_braking(self) -> bool:
+        """True if a standstill is wanted and was not measured since then: the wheels may still turn."""
+        return self._wish == STANDSTILL and not self._is_still
 
     @property
     def is_rotating(self) -> bool:
@@ -65,7 +76,10 @@ class MotionTarget:
             self._pass(self._wish, now_s)
 
     def on_drive_reading(self, reading: DriveReading) -> None:
-        """Go on with a rotation from a new reading of the drive base."""
+        """Note how fast the robot moves, and go on with a rotation from a new reading of the drive base."""
+        velocity = reading.velocity
+        if reading.time_s >= self._since_s:
+            self._is_still = abs(velocity.linear_m_s) <= STILL_M_S and abs(velocity.angular_rad_s) <= STILL_RAD_S
         if self._rotate.is_rotating:
             self._pass(self._rotate.update(reading.pose.heading_rad, reading.time_s), reading.time_s)
 
@@ -84,5 +98,7 @@ class MotionTarget:
         return self._rotate.state is RotateState.DONE
 
     def _pass(self, velocity: Velocity, now_s: float) -> None:
+        if velocity == STANDSTILL != self._wish:
+            self._since_s, self._is_still = now_s, False
         self._wish = velocity
         self._command(STANDSTILL if self._is_paused else velocity, now_s)

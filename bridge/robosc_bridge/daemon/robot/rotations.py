@@ -1,4 +1,7 @@
-"""Rotations by an angle on request of the model, one at a time, and the report of their end."""
+"""Rotations by an angle on request of the model, one at a time, and the report of their end.
+
+The end of a call or goal is reported when the wheels stand: to command a standstill does not end the motion.
+"""
 
 import logging
 import math
@@ -25,6 +28,7 @@ class _Rotation:
         self.channel = channel
         self.number = number
         self.end_s = end_s
+        self.is_cancelled = False
 
 
 class Rotations:
@@ -86,36 +90,44 @@ class Rotations:
         self._rotation = _Rotation(asked, channel, number, end_s)
         self._motion.rotate(math.radians(angle) if channel.unit == "degrees" else angle, self._clock())
 
-    def end(self, reason: str, *, is_own: bool = False) -> None:
-        """End the rotation under way as failed; `is_own`: because the model requested another motion."""
+    def end(self, reason: str, *, is_own: bool = False, at_once: bool = False) -> None:
+        """End the rotation under way as failed.
+
+        Args:
+            reason: Reason.
+            is_own: True if the model requested another motion.
+            at_once: True if no standstill is awaited: another motion follows, or nobody measures it.
+        """
         if self._rotation is not None:
             self._motion.stop(self._clock(), reason)
-            self.poll(is_own=is_own)
+            self.poll(is_own=is_own, at_once=at_once)
 
     def cancel(self, communication: str, number: int) -> None:
-        """End a rotation that an action requested."""
+        """End a rotation that an action requested; that it was cancelled is reported when the wheels stand."""
         rotation = self._rotation
         if rotation is not None and rotation.number == number and rotation.asked.name == communication:
-            self._rotation = None
+            rotation.is_cancelled = self._motion.is_rotating
             self._motion.stop(self._clock(), "it was cancelled")
-            self._owe(lambda executor: executor.on_goal_ended(number, "cancelled"))
 
-    def poll(self, *, is_own: bool = False) -> None:
+    def poll(self, *, is_own: bool = False, at_once: bool = False) -> None:
         """Check whether a rotation has ended; if so, its end is reported later to its requester."""
         rotation = self._rotation
         if rotation is not None and self._motion.is_rotating and self._clock() >= rotation.end_s:
             self._motion.stop(self._clock(), "the rotation takes longer than a call may")
         if rotation is None or self._motion.is_rotating:
             return
+        if rotation.number is not None and self._motion.is_braking and not at_once:
+            return
         self._rotation = None
         has_arrived, reason, number = self._motion.has_arrived, self._motion.reason, rotation.number
-        if not has_arrived:
+        if not has_arrived and not rotation.is_cancelled:
             _log.warning("the rotation asked for by %s has failed: %s", rotation.asked.identifier, reason)
         if number is None:
             self._report_end(reason, has_arrived=has_arrived, is_own=is_own)
         elif rotation.asked.kind is CommunicationKind.ACTION:
-            outcome = "succeeded" if has_arrived else "aborted"
-            self._owe(lambda executor: executor.on_goal_ended(number, outcome, service_response(reason)))
+            outcome = "succeeded" if has_arrived else "cancelled" if rotation.is_cancelled else "aborted"
+            result = None if outcome == "cancelled" else service_response(reason)
+            self._owe(lambda executor: executor.on_goal_ended(number, outcome, result))
         elif has_arrived:
             self._owe(lambda executor: executor.on_reply(number, service_response("")))
         else:

@@ -53,6 +53,10 @@
      1 'font-lock-keyword-face))
   "Words of missions and preferences, where they are no names.")
 
+(defconst robosc-mode-limit-words
+  '(("^[ \t]*\\(limit\\)[ \t]+\\^?[a-zA-Z_][a-zA-Z_0-9]*[ \t]+to\\_>" 1 'font-lock-keyword-face))
+  "The word of a limit, where it is no name.")
+
 (defconst robosc-mode-indentation 4 "Columns for each brace, as `eglot-format' has them.")
 
 (defun robosc-mode-indent-line ()
@@ -73,7 +77,7 @@
   (setq-local indent-tabs-mode nil)
   (setq-local indent-line-function #'robosc-mode-indent-line)
   (setq-local electric-indent-chars (append ")]}" electric-indent-chars))
-  (setq-local font-lock-defaults `(((,robosc-mode-keywords 0 'font-lock-keyword-face) ,@robosc-mode-goal-words ,@robosc-mode-mission-words))))
+  (setq-local font-lock-defaults `(((,robosc-mode-keywords 0 'font-lock-keyword-face) ,@robosc-mode-goal-words ,@robosc-mode-mission-words ,@robosc-mode-limit-words))))
 
 ;;;###autoload
 (add-to-list 'auto-mode-alist '("\\.rscd\\'" . robosc-mode))

@@ -12,6 +12,7 @@ from robosc.documentation.sentences import (
     enum_sentences,
     goal_sentence,
     invariant_sentence,
+    limit_sentence,
     mission_sentences,
     preference_sentence,
     provide_sentences,
@@ -79,6 +80,7 @@ def _overview(model: Model) -> str:
         ("requirements", len(model.requirements) + len(model.invariants), _invariant_count(model)),
         *_goal_rows(model),
         ("provide statements", len(model.provides), ""),
+        *([("limits", len(model.limits), "")] if model.limits else []),
     ]
     return blocks(
         heading(2, "Overview"),
@@ -234,9 +236,15 @@ _COLUMNS: dict[str, Callable[[Model, Communication], str]] = {
     "QoS": lambda _, item: _quality_cell(item),
     "stale after": lambda _, item: _age_cell(item),
     "stamped with frame": lambda _, item: "" if item.frame is None else code(quoted(item.frame)),
-    "when": lambda _, item: "" if item.when is None else code(expression_text(item.when)),
+    "when": lambda _, item: _when_cell(item),
 }
 """The table of communications: each column's head and cells; a column without any content is left out."""
+
+
+def _when_cell(item: Communication) -> str:
+    if item.is_when_default:
+        return code("default")
+    return "" if item.when is None else code(expression_text(item.when))
 
 
 def _data_types(model: Model) -> str:
@@ -278,9 +286,10 @@ def _goals(model: Model) -> str:
 
 def _provides(model: Model) -> str:
     names = dict.fromkeys(item.communication for item in model.provides)
-    if not names:
+    if not names and not model.limits:
         return ""
     sentences = [provide_sentences(name, model.provides_for(name)) for name in names]
+    sentences += map(limit_sentence, model.limits)
     return blocks(heading(2, "Data of requests"), bullets(sentences))
 
 

@@ -11,6 +11,7 @@ from robosc.model.structure import (
     Goal,
     GoalForm,
     Invariant,
+    Limit,
     Mission,
     ObjectValue,
     Preference,
@@ -126,6 +127,15 @@ def provide_sentences(communication: str, provides: Sequence[Provide]) -> str:
     if final is None:
         cases.append("otherwise the default of the middleware")
     return f"{code(communication)} is sent with the first of these that applies:\n{bullets(cases, depth=1)}"
+
+
+def limit_sentence(limit: Limit) -> str:
+    """Describe a limit: the bounds of each number, and when they apply."""
+    bounds = ", ".join(
+        code(f"{'.'.join((limit.communication, *item.path))}: {item.low}..{item.high}") for item in limit.bounds
+    )
+    condition = "" if limit.condition is None else f" if {code(expression_text(limit.condition))}"
+    return f"numbers of {code(limit.communication)} are moved into {bounds}{condition}"
 
 
 def _data(value: ProvidedValue) -> str:

@@ -184,7 +184,7 @@ class _Names:
         # Behind `requirement {` the item of the brace is the requirement itself.
         opened = self._place.open[-1] if self._place.open else ()
         return any(
-            words in (("requirement",), ("provide",), ("prefer",))
+            words in (("requirement",), ("provide",), ("limit",), ("prefer",))
             or words[-1:] == ("disables",)
             # Behind the braces of its first side, an item begins anew with `over`.
             or (words[:1] in (("prefer",), ("over",)) and words[-1:] == ("over",))
@@ -198,7 +198,7 @@ class _Names:
         return self._is_in_value() and is_whole and self._place.last() in ("{", ",")
 
     def _is_in_value(self) -> bool:
-        return any(item[:1] == ("provide",) for item in self._place.open)
+        return any(item[:1] in (("provide",), ("limit",)) for item in self._place.open)
 
     def _is_target_wanted(self) -> bool:
         item = self._place.item
@@ -387,12 +387,13 @@ class _Names:
             communication = self._inspected.communications.get(name_of(item[3]))
             if communication is not None and item[1] in EVENT_KINDS[communication.kind]:
                 return communication.received_type(EventKind(item[1]))
-        if item[:2] == ("incoming", "message") and len(item) > 2:
-            communication = self._inspected.communications.get(name_of(item[2]))
+        if "when" in item and item[:1] in (("incoming",), ("service",), ("action",)) and len(item) > 2:
+            communication = self._inspected.communications.get(name_of(item[2 if item[1:2] == ("message",) else 1]))
             if communication is not None:
                 return communication.request
             # The declaration is incomplete while it is being typed.
-            return self._named(name_of(item[item.index("type") + 2])) if "type" in item[:-2] else None
+            key = "type" if item[0] == "incoming" else "request"
+            return self._named(name_of(item[item.index(key) + 2])) if key in item[:-2] else None
         return None
 
     def _named(self, name: str) -> Type | None:
@@ -427,7 +428,7 @@ class _Names:
     def _provided(self) -> Type | None:
         """The type of the object value that is open."""
         opened = self._place.open
-        start = next(index for index, item in enumerate(opened) if item[:1] == ("provide",))
+        start = next(index for index, item in enumerate(opened) if item[:1] in (("provide",), ("limit",)))
         type_ = self._request(opened[start])
         # Each further brace stands behind `property:`.
         return self._below(type_, [name_of(item[-2]) for item in opened[start + 1 :] if len(item) > 1])

@@ -103,6 +103,8 @@ def holder_of(parsed: Parsed, offset: int) -> str:
             return f"preference (line {item.location.line})"
         case syntax.Provide():
             return f"provide (line {item.location.line})"
+        case syntax.Limit():
+            return f"limit (line {item.location.line})"
         case syntax.Component():
             return f"component `{item.name.text}`"
         case syntax.ObjectDefinition() | syntax.EnumDefinition():

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 from robosc.errors import RoboscError
 from robosc.event_logs.data import is_provided
 from robosc.event_logs.entries import LogEntry, LoggedRun, is_ended
-from robosc.event_logs.replay import Replay
+from robosc.event_logs.replay import Replay, part
 from robosc.model.structure import CommunicationKind, Deployment, EventKind
 from robosc.supervisor import Supervisor
 
@@ -27,7 +27,7 @@ MAXIMUM_VIOLATIONS = 1000
 KINDS = frozenset(
     (
         *("event", "unexpected", "unknown", "release", "blocked", "fault", "stop", "resume", "restart", "dropped"),
-        *("reached", "approach", "owed", "met", "cancelling", "cancel_overdue"),
+        *("reached", "approach", "owed", "met", "limited", "cancelling", "cancel_overdue"),
     )
 )
 """Kinds of entries."""
@@ -218,6 +218,8 @@ class _Checking:
             problems.append(f"{event} was not allowed: {why}")
         elif kind == EventKind.REQUEST and self._deployment is Deployment.CONTROLLER:
             problems += self._provided_otherwise(event, entry.data)
+        elif kind == EventKind.REQUEST:
+            problems += self._outside(event, entry.data)
         if why and not replay.is_possible(event):
             replay.adopt(event, entry.state)
         else:
@@ -237,6 +239,14 @@ class _Checking:
             yield f"{event} happened although the data that the model provides for it was not known"
         elif not is_provided(data, provided):
             yield f"{event} carries {_data_text(data)}, where the model provides {_data_text(provided)}"
+
+    def _outside(self, event: str, data: object) -> Iterator[str]:
+        """Yield the numbers of a layer's request that are outside a limit."""
+        for path, low, high in self._replay.limits(event):
+            value = part(data, path)
+            if isinstance(value, int | float) and not low <= value <= high:
+                name = ".".join(path) or "its number"
+                yield f"{event} went through with {name} = {value}, which a limit keeps within {low}..{high}"
 
     def _unexpected(self, entry: LogEntry) -> None:
         if self._replay.has(entry.event) and self._replay.is_possible(entry.event):

@@ -146,12 +146,29 @@ class Replay:
         return None
 
     def provided(self, request: str) -> tuple[bool, Any]:
-        """The data that the model provides for a request in this state: (is known, data)."""
+        """The data that the model provides for a request in this state, within its limits: (is known, data)."""
         name, _, _ = request.rpartition(".")
+        is_known, data = True, None
         for statement in self.model.provides_for(name):
             if statement.condition is None or self._value(statement.condition, "", None) is True:
-                return self._provided_value(statement.value)
-        return True, None
+                is_known, data = self._provided_value(statement.value)
+                break
+        limits = self.limits(request) if is_known else ()
+        # Where the bounds have a number in common, the one that is found so is within all of them.
+        for path, low, high in reversed(limits):
+            value = part(data, path) or 0
+            if not low <= value <= high:
+                data = _with_part(data, path, low if value < low else high)
+        return is_known and all(low <= (part(data, path) or 0) <= high for path, low, high in limits), data
+
+    def limits(self, request: str) -> tuple[tuple[tuple[str, ...], float, float], ...]:
+        """The bounds of numbers of a request that apply in this state."""
+        return tuple(
+            (bound.path, bound.low, bound.high)
+            for limit in self.model.limits_for(request.rpartition(".")[0])
+            if limit.condition is None or self._value(limit.condition, "", None) is not False
+            for bound in limit.bounds
+        )
 
     def _provided_value(self, provided: ProvidedValue) -> tuple[bool, Any]:
         if not isinstance(provided, ObjectValue):
@@ -313,3 +330,17 @@ def _requests(model: Model) -> dict[str, tuple[Communication, ...]]:
         if item.kind is not CommunicationKind.OUTGOING_MESSAGE:
             found[item.identifier] = (*found.get(item.identifier, ()), item)
     return found
+
+
+def part(data: Any, path: tuple[str, ...]) -> Any:
+    """The part of a request's data at a path; None where it is not given."""
+    for name in path:
+        data = data.get(name) if isinstance(data, dict) else None
+    return data
+
+
+def _with_part(data: Any, path: tuple[str, ...], value: float) -> Any:
+    if not path:
+        return value
+    given = data if isinstance(data, dict) else {}
+    return {**given, path[0]: _with_part(given.get(path[0]), path[1:], value)}

@@ -32,7 +32,7 @@ NAME = re.compile(r"variable\.other|entity\.name")
 NUMBER = re.compile(r"constant\.numeric")
 STRING = re.compile(r"string\.")
 COMMENT = re.compile(r"comment\.")
-ITEMS = ("goal", "assume", "mission", "prefer")
+ITEMS = ("goal", "assume", "limit", "mission", "prefer")
 FUNCTIONS = frozenset({"abs", "all", "any", "clamp", "length", "max", "min"})
 
 RobotScopes = list[list[str]]
@@ -108,7 +108,7 @@ def check_names(text: str, found: RobotScopes) -> None:
                 functions.add((word.location.line, word.location.column))
             case syntax.Quantifier(word=word):
                 functions.add((word.location.line, word.location.column))
-            case syntax.Option(key="qos", value=syntax.Name() as word):
+            case syntax.Option(key="qos" | "when", value=syntax.Name() as word):
                 words.add((word.location.line, word.location.column))
     places = Places(file)
     texts, kinds, starts = tokenize(text)
@@ -158,9 +158,13 @@ def is_unseen(text: str, texts: Sequence[str], starts: Sequence[int], index: int
             following, 1
         )
         return following == "if" or "\n" in text[starts[index] : starts[min(last, len(starts) - 1)]]
+    if texts[index - 1] == "limit" and is_unseen(text, texts, starts, index - 1):
+        return True
+    if texts[index] == "limit":
+        return "\n" in text[starts[index] : starts[min(index + 2, len(starts) - 1)]]
     if texts[index - 1 : index + 1] == ["from", "anywhere"]:
         return is_split or "\n" in text[starts[index - 1] : starts[index]]
-    if texts[index - 1] == "not" and texts[index] in FUNCTIONS and is_unseen(text, texts, starts, index - 1):
+    if texts[index - 1] == "not" and texts[index] in (*FUNCTIONS, *ITEMS) and is_unseen(text, texts, starts, index - 1):
         return True
     return is_split and texts[index] in FUNCTIONS and texts[index + 1] == "("
 

@@ -18,7 +18,7 @@ WORDS = tuple(
     """
     a b x far always never any all in then else min max length abs clamp qos depth max_age stamped when constant
     not identifier type reliable sensor latched until _x9 Value order androids ifs ^a ^state ^always ^value ^in ^then x1
-    goal assume eventually leads once allow ^once ^allow mission while visit anywhere prefer over ^then
+    goal assume eventually leads once allow ^once ^allow mission while visit anywhere prefer over ^then limit ^limit
     """.split()
 )
 """Free names; most of them are words of part B, or nearly a word."""

@@ -92,7 +92,7 @@ def evaluated(item: Any, arguments: Mapping[str, str]) -> str:
     first = item.positional[0]
     match type(item).__name__:
         case "LaunchConfiguration":
-            return arguments[first]
+            return arguments[first] if first in arguments else evaluated(item.named["default"], arguments)
         case "EqualsSubstitution":
             return str(evaluated(first, arguments) == evaluated(item.positional[1], arguments)).lower()
         case "NotEqualsSubstitution":

@@ -1,7 +1,7 @@
 """The text of a model: what an author would write for a checked model that tests made without one."""
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import msgspec
 
@@ -23,6 +23,7 @@ from robosc.language.words import RESERVED_WORDS, spelled
 from robosc.model.structure import (
     Assumption,
     Behaviour,
+    Bound,
     Communication,
     CommunicationKind,
     Component,
@@ -102,6 +103,9 @@ class _Writer:
         for item_ in model.provides:
             condition = "" if item_.condition is None else f" if {self._expression(item_.condition)}"
             yield f"provide {spelled(item_.communication)} with {self._provided(item_.value)}{condition}"
+        for limit in model.limits:
+            condition = "" if limit.condition is None else f" if {self._expression(limit.condition)}"
+            yield f"limit {spelled(limit.communication)} to {self._range(limit.bounds)}{condition}"
 
     def _enum(self, item: EnumDefinition) -> str:
         rules = "\n".join(f"{self._expression(rule.condition)} -> {spelled(rule.value)}" for rule in item.rules)
@@ -125,8 +129,8 @@ class _Writer:
         given += [f"{word}: {value}" for word, value in options.items() if value is not None]
         if item.frame is not None:
             given.append(f"stamped: {self._expression(Constant(item.frame))}")
-        if item.when is not None:
-            given.append(f"when: {self._expression(item.when)}")
+        if item.has_condition:
+            given.append("when: default" if item.when is None else f"when: {self._expression(item.when)}")
         links = ""
         if item.interface is not None:
             links = f" links {self._interfaces[item.interface]}"
@@ -186,6 +190,16 @@ class _Writer:
 
     def _visits(self, visits: Iterable[Expression]) -> str:
         return "visit " + " then ".join(f"({self._expression(visit)})" for visit in visits)
+
+    def _range(self, bounds: Sequence[Bound], depth: int = 0) -> str:
+        if len(bounds[0].path) == depth:
+            return f"{bounds[0].low}..{bounds[0].high}"
+        parts: dict[str, list[Bound]] = {}
+        for bound in bounds:
+            parts.setdefault(bound.path[depth], []).append(bound)
+        return (
+            "{ " + ", ".join(f"{spelled(name)}: {self._range(part, depth + 1)}" for name, part in parts.items()) + " }"
+        )
 
     def _provided(self, value: ProvidedValue) -> str:
         if not isinstance(value, ObjectValue):

@@ -7,7 +7,20 @@ from robosc.language.tokens import tokenize
 from robosc.language.words import RESERVED_WORDS
 
 WORDS = (*sorted(RESERVED_WORDS), "constant", "always", "never", "then", "else", "in", "qos", "depth", "max_age")
-GOALS = ("goal", "assume", "eventually", "leads", "once", "mission", "while", "visit", "anywhere", "prefer", "over")
+GOALS = (
+    "goal",
+    "assume",
+    "eventually",
+    "leads",
+    "once",
+    "mission",
+    "while",
+    "visit",
+    "anywhere",
+    "prefer",
+    "over",
+    "limit",
+)
 PIECES = (
     *("{", "}", "(", ")", "[", "]", '"', "'", "/*", "*/", "//", "->", "..", ":=", "=>", "!=", "<=", "-", "!", ",", ":"),
     *("min(", "any(x in value: ", "if ", "array(", "integer(", "{a: ", "value", "value.x[0..3]", "^", "\\", ";", "&&"),

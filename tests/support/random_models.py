@@ -381,8 +381,10 @@ class _Author:
                 shapes = [f"requirement {name} needs {condition}", f"requirement {condition} disables {{{name}}}"]
                 if requests[name] == "double":
                     shapes.append(f"provide {name} with {self._number_of('double', {}, 2, {})} if {condition}")
+                    shapes.append(f"limit {name} to -1.5..clamp(1, 2, 3) if {condition}")
                 elif requests[name] == "object":
                     shapes.append(f"provide {name} with {{ x: {self._number_of('double', {}, 1, {})}, ^value: -3 }}")
+                    shapes.append(f"limit {name} to {{ x: 0.5..2.0, ^value: -3..-1 }}")
                 found.append(self._dice.choice(shapes))
             if states and self._extra(0.2):
                 found.append(f"requirement {self._dice.choice(('always', 'never'))} {self._condition(2, states, {})}")

@@ -22,6 +22,8 @@ syntax match roboscWord "\%(^\s*\|{\s*\|\<anywhere\s\+\)\@<=visit\>\ze\s\+[[:aln
 syntax match roboscWord "\%(\<from\s\+\)\@<=anywhere\>\ze\s*\%(visit\>\|$\)"
 syntax match roboscWord "^\s*\zsprefer\>\ze\s\+\%({\|\^\?\h\w*\s*\%(over\>\|$\)\)"
 syntax match roboscWord "\%(^\s*\%(prefer\s\+\%({[^}]*}\|\^\?\h\w*\)\s\+\)\?\)\@<=over\>\ze\s\+[[:alpha:]_{^]"
+" A limit, where the word is no name.
+syntax match roboscWord "^\s*\zslimit\>\ze\s\+\^\?\h\w*\s\+to\>"
 " A word of the language as a name.
 syntax match roboscName "\^\h\w*"
 syntax match roboscNumber "\<\d\+\%(\.\d\+\)\?\>"

@@ -8,6 +8,7 @@ An entry is a dict with `time` (seconds since 1970-01-01 UTC), `kind` and, by ki
     event       an event of the model: event, controllable, data, state after it, decision_us
     unexpected  something that the state could not accept: event or what
     unknown     event and what was unknown; a request of this kind was not issued
+    limited     numbers of a request were moved into the bounds of limits: event, limited
     release     the default message went out: identifier
     blocked     a supervision layer held a request back: identifier, why
     cancelling  the cancel of a goal was decided, and its end is awaited: action, why

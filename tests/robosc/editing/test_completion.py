@@ -309,3 +309,39 @@ def test_fields_of_a_message_are_offered_in_its_object_type() -> None:
     found = offered(battery)
     assert {"percentage: double", "present: boolean", "cell_voltage: array(double)", "header:"} <= found.keys()
     assert "percentage: double" not in offered(battery.replace("Battery links i", "none links i"))
+
+
+LIMITED = """robot R {{
+    interface twist use Twist from geometry_msgs
+    interface power use SetBool from std_srvs
+    datatype object Vector {{ x: double y: double }}
+    datatype object Twist {{ linear: Vector angular: Vector }}
+    datatype object Power {{ data: boolean }}
+    component Base {{
+        incoming message walk with type: Twist links twist
+        outgoing message bump with type: none
+        service up with identifier: "/arm", request: Power, response: none{option} links power
+    }}
+    {item}
+}}
+"""
+
+
+@pytest.mark.parametrize(
+    ("item", "names"),
+    [
+        ("limit |", ["walk", "up"]),
+        ("limit walk to { |", ["linear:", "angular:"]),
+        ("limit walk to { linear: { x: 0.0..1.0, |", ["y:"]),
+        ("limit walk to { linear: { x: 0.0..1.0 } } if |", ["Base"]),
+    ],
+)
+def test_names_in_limits(item: str, names: list[str]) -> None:
+    found = offered(LIMITED.format(option="", item=item))
+    assert [name for name, candidate in found.items() if candidate.kind is not None][: len(names)] == names
+    assert "bump" not in found
+
+
+def test_the_condition_of_a_request_reads_its_data_or_is_the_word_default() -> None:
+    assert {"default", "value"} <= offered(LIMITED.format(option=", when: |", item="")).keys()
+    assert "data" in offered(LIMITED.format(option=", when: value.|", item=""))

@@ -74,10 +74,11 @@ def test_the_launch_file_starts_the_layer_and_an_existing_controller(folder: Pat
     assert controller["executable"].positional == ("controller_executable",)
     assert type(layer["on_exit"]).__name__ == type(controller["on_exit"]).__name__ == "Shutdown"
     (group,) = found["GroupAction"]
-    pushed, simulated, *remaps, included = group.positional[0]
-    assert pushed.positional[0].positional == ("namespace",)
-    condition = pushed.named["condition"].positional[0]
-    assert [evaluated(condition, {"namespace": name}) for name in ("", "n")] == ["false", "true"]
+    outer, pushed, simulated, *remaps, included = group.positional[0]
+    for item in (outer, pushed):
+        (name,) = item.positional[0].positional
+        condition = item.named["condition"].positional[0]
+        assert [evaluated(condition, {name: value}) for value in ("", "n")] == ["false", "true"]
     assert (simulated.positional[0], simulated.positional[1].positional) == ("use_sim_time", ("use_sim_time",))
     topics, services = ["/allowed", "/scan", "/cmd_vel", "volume"], ["/power"]
     for prefix in ("", "/r"):
@@ -91,9 +92,24 @@ def test_the_launch_file_starts_the_layer_and_an_existing_controller(folder: Pat
         others = {("volume", "supervised/volume"), ("/volume", "/supervised/volume")}
         assert set(rules) - set(expected) <= others
         assert [tuple(evaluated(item.named[name], given) for name in ("src", "dst")) for item in remaps] == rules
-    (path,) = included.positional[0].positional
-    given = {"controller_package": "drives", "controller_launch_file": "drive.launch.py"}
-    assert evaluated(path, given) == "share of drives/launch/drive.launch.py"
+    # It gets what is given to it, and nothing else of the layer's: no parameter file, log level, namespace argument.
+    assert (group.named["scoped"], group.named["forwarding"]) == (True, False)
+    given = {"controller_package": "drives", "controller_launch_file": "drive.launch.py", "namespace": "n"}
+    given |= {"use_sim_time": "true", "topic_prefix": "/r", "params_file": "own", "log_level": "debug"}
+    passed = {name: evaluated(value, given) for name, value in group.named["launch_configurations"].items()}
+    path, around, inside = (names for item in (included.positional[0], outer, pushed) for names in [_name(item)])
+    assert passed == {
+        "use_sim_time": "true",
+        "topic_prefix": "/r",
+        path: "share of drives/launch/drive.launch.py",
+        around: "",
+        inside: "n",
+    }
+
+
+def _name(item: Any) -> str:
+    """The launch configuration that something reads."""
+    return str(item.positional[0].positional[0])
 
 
 @pytest.mark.parametrize(

@@ -16,6 +16,7 @@ from robosc.targets.code.expressions import (
     FALSE_CODE,
     TRUE_CODE,
     Code,
+    Kind,
     Language,
     Shape,
     Sort,
@@ -69,14 +70,18 @@ PYTHON = Language(
         "div": _arithmetic("//", Precedence.PRODUCT),
         "mod": _arithmetic("%", Precedence.PRODUCT),
         "=": _comparison("=="),
-        **{operator: _comparison(operator) for operator in ("!=", "<", "<=", ">", ">=", "in", "not in", "is")},
+        **{
+            operator: _comparison(operator) for operator in ("!=", "<", "<=", ">", ">=", "in", "not in", "is", "is not")
+        },
         "between": Shape("{} <= {} <= {}", Precedence.COMPARISON, (Precedence.SUM,) * 3),
         "is None": Shape("{} is None", Precedence.COMPARISON, (Precedence.SUM,)),
         "is true": Shape("{} is True", Precedence.COMPARISON, (Precedence.SUM,)),
         "is false": Shape("{} is False", Precedence.COMPARISON, (Precedence.SUM,)),
+        "is not None": Shape("{} is not None", Precedence.COMPARISON, (Precedence.SUM,)),
+        "is not true": Shape("{} is not True", Precedence.COMPARISON, (Precedence.SUM,)),
+        "is not false": Shape("{} is not False", Precedence.COMPARISON, (Precedence.SUM,)),
         "if": Shape("({1} if {0} else {2})", Precedence.ATOM, (Precedence.LAMBDA,) * 3),
         "if not NaN": Shape("{0} if {0} == {0} else {1}", Precedence.LAMBDA, (Precedence.SUM, Precedence.OR)),
-        "not all": Shape("not ({})", Precedence.NOT, (Precedence.LAMBDA,)),
         "lambda": Shape("lambda {}: {}", Precedence.LAMBDA, (Precedence.LAMBDA,) * 2),
         "list": Shape(", ", Precedence.LAMBDA, (Precedence.LAMBDA,)),
         "tuple": Shape("({},)", Precedence.ATOM, (Precedence.LAMBDA,)),
@@ -120,6 +125,19 @@ _FUNCTIONS = {
     "double": "to_double",
 }
 """Functions of `values` that are not called like the operator or function of RoboSC."""
+
+_OPPOSITE = {
+    word: opposite
+    for pair in (
+        ("in", "not in"),
+        ("is", "is not"),
+        ("is None", "is not None"),
+        ("is true", "is not true"),
+        ("is false", "is not false"),
+    )
+    for word, opposite in (pair, pair[::-1])
+}
+"""Operators with `in` and `is`, before which a linter takes no `not`."""
 
 _REDUCTIONS = {"length": "array_length", "min": "least", "max": "greatest"}
 
@@ -177,6 +195,11 @@ class Scope(ExpressionWriter):
         if len(locations) == 1:
             return self.state_code(automaton, locations[0], is_in)
         return operation("in" if is_in else "not in", self.location_place(automaton), constant(locations))
+
+    def _negate_condition(self, code: Code) -> Code:
+        if code.kind is Kind.OPERATION and code.word in _OPPOSITE:
+            return operation(_OPPOSITE[code.word], *code.operands)
+        return operation("not", code)
 
     def _stays_in_range(self, code: Code, low: int, high: int) -> Code:
         if code.is_known:

@@ -194,7 +194,7 @@ class Reader(ReceivedReader):
     def _undecided(self, enum: EnumDefinition, test: Code) -> If:
         words = operation("+", variable("path"), constant(f" is {enum.default} by default: an earlier rule is unknown"))
         noted = _joined([*self.words, operation("tuple", words)])
-        return when(operation("not all", test), Return(operation("list", constant(enum.default), noted, TRUE_CODE)))
+        return when(self.scope.negated(test), Return(operation("list", constant(enum.default), noted, TRUE_CODE)))
 
 
 def _joined(words: list[Code]) -> Code:

@@ -590,6 +590,11 @@ private:
             {"unexpected", std::to_string(robot_.counters.unexpected)},
             {"faults", std::to_string(robot_.counters.faults)},
             {"dropped", std::to_string(dropped)},
+#if ROBOT_LIMIT_COUNT > 0
+            {"limited", std::to_string(robot_.counters.limited)},
+#else
+            {"limited", "0"},
+#endif
             {"cancelling", joined(cancelled(Stage::ASKED))},
             {"last decision (us)", decision_us_ < 0.0 ? "" : number_text(decision_us_)},
         };
@@ -1041,6 +1046,16 @@ private:
                 log_.write(line + "]}");
             }
             return;
+#if ROBOT_LIMIT_COUNT > 0
+        case ROBOT_LOG_LIMITED:
+            if (log_.is_active()) {
+                std::string line = head("limited");
+                line += ",\"event\":";
+                put_json(line, robot_event_name(what));
+                log_.write(line + ",\"limited\":[\"numbers that limits move\"]}");
+            }
+            return;
+#endif
         case ROBOT_LOG_RELEASE:
             write("release", "identifier", robot_topic_name(what));
             return;

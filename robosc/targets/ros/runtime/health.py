@@ -102,6 +102,8 @@ class HealthMonitor:
             for name, before, after in (
                 (name, getattr(self._before, name), getattr(counters, name))
                 for name in counters._fields
+                # What limits move is how the model wants it.
+                if name != 'limited'
             )
             if after > before
         ]

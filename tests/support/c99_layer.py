@@ -161,7 +161,7 @@ class LayerReference(Reference):
         """Remember."""
         self._send("pass", list(self.layout.received_topics).index(identifier), self.number(message))
 
-    def blocked(self, identifier: str) -> None:
+    def blocked(self, identifier: str, why: str) -> None:
         """Remember."""
         self._send("blocked", _hex(identifier), self.refusal)
 
@@ -169,7 +169,7 @@ class LayerReference(Reference):
         """Remember."""
         self._send("answer", self.numbers[communication], call_id, self.number(data))
 
-    def answer_default(self, communication: str, call_id: Any) -> None:
+    def answer_default(self, communication: str, call_id: Any, why: str) -> None:
         """Remember."""
         self._send("no_answer", self.numbers[communication], call_id)
 
@@ -177,7 +177,7 @@ class LayerReference(Reference):
         """Remember."""
         self._send("accept", self.numbers[communication], goal_id)
 
-    def reject_goal(self, communication: str, goal_id: Any) -> None:
+    def reject_goal(self, communication: str, goal_id: Any, why: str) -> None:
         """Remember."""
         self._send("reject", self.numbers[communication], goal_id)
 
@@ -185,7 +185,7 @@ class LayerReference(Reference):
         """Remember."""
         self._send("feedback", self.numbers[communication], goal_id, self.number(data))
 
-    def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any) -> None:
+    def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any, why: str) -> None:
         """Remember."""
         number = -1 if data is None and outcome != "succeeded" else self.number(data)
         self._send("end", self.numbers[communication], goal_id, _ENDS.index(outcome), number)

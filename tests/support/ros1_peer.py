@@ -8,7 +8,7 @@ Commands, by `do` (replies and reports are lines of JSON, too; `time` is seconds
     service   name, type          from then on {"service", "request"} for each call, which waits
     answer    name, message       the oldest waiting call is answered
     refuse    name                the oldest waiting call is refused
-    action    name, type, accepts, cancels, ends_on_cancel
+    action    name, type, accepts, cancels, ends_on_cancel, gives_results
                                   from then on {"action", "goal"} and {"action", "cancel"}
     accepts   name, accepts       the same option from now on
     accept    name                the oldest goal that waits for it (accepts: "later") is accepted
@@ -113,9 +113,16 @@ class Server(ActionServer):  # type: ignore[misc]
     """An action whose goals end when the test says so, or when they are cancelled."""
 
     def __init__(
-        self, name: str, type_name: str, accepts: Any = True, cancels: bool = True, ends_on_cancel: bool = True
+        self,
+        name: str,
+        type_name: str,
+        accepts: Any = True,
+        cancels: bool = True,
+        ends_on_cancel: bool = True,
+        gives_results: bool = True,
     ) -> None:
         self.name = name
+        self.gives_results = gives_results
         self.accepts = accepts
         self.cancels = cancels
         self.ends_on_cancel = ends_on_cancel
@@ -144,6 +151,12 @@ class Server(ActionServer):  # type: ignore[misc]
         if self.ends_on_cancel:
             (self.running if handle in self.running else self.pending).remove(handle)
             handle.set_canceled()
+
+    def publish_result(self, status: Any, result: Any) -> None:
+        if self.gives_results:
+            super().publish_result(status, result)
+        else:
+            self.publish_status()
 
     def internal_cancel_callback(self, goal_id: Any) -> None:
         if self.cancels:

@@ -19,7 +19,7 @@ MIDDLEWARE = Middleware(
         "rclpy",
         "std_msgs",
     ),
-    modules=("clients", "lifecycle", "node_time", "state"),
+    modules=("clients", "inquiry", "lifecycle", "node_time", "peers", "state"),
     files=(
         "setup.cfg",
         "test/test_copyright.py",

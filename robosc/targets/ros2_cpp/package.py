@@ -31,7 +31,7 @@ MIDDLEWARE = Middleware(
     target="ros2-cpp",
     include=lambda kind, type_: f"{type_.package}/{kind}/{file_name(type_.type)}.hpp",
     type_name=_type_name,
-    runtime=("ros2.hpp", "ros2_actions.hpp", "ros2_life.hpp"),
+    runtime=("ros2.hpp", "ros2_actions.hpp", "ros2_life.hpp", "ros2_peers.hpp"),
     module="robosc.targets.ros2_cpp",
     templates={
         "CMakeLists.txt": "CMakeLists.txt.j2",

@@ -15,10 +15,12 @@ from robosc.targets.ros.runtime.messages import Sender, SetupError, check_shape,
 from robosc.targets.ros.runtime.presence import LOST_S
 from robosc.targets.ros.runtime.reports import Reports
 from robosc.targets.ros1.runtime.goals import (
+    ANSWER_S,
     DONE,
     PREEMPTING,
     REFUSAL_S,
     SILENCE_S,
+    UNLISTED_S,
     WAITING_FOR_CANCEL_ACK,
     WAITING_FOR_RESULT,
     ActionGoals,
@@ -222,8 +224,15 @@ class Goals:
         self.waiting: list[Action] = []
         self.reports = Reports()
         self.executor: Any = ExecutorLog()
+        self.servers: dict[str, str] = {}
         self.goals = ActionGoals(
-            self, lambda: self.is_there, "/a", lambda action, kind: self.waiting.append(action), self.reports, self.now
+            self,
+            lambda: self.is_there,
+            lambda: self.servers,
+            "/a",
+            lambda action, kind: self.waiting.append(action),
+            self.reports,
+            self.now,
         )
 
     def now(self) -> float:
@@ -301,6 +310,8 @@ def test_a_server_that_is_lost_and_back_is_asked_to_cancel(goals: Goals) -> None
     assert goals.passes(LOST_S - 0.1) == []
     assert goals.passes(0.2) == [("on_goal_ended", 1, "lost", None)]
     assert goals.goals.has_abandoned and goals.handles[0].cancels == 0
+    # Its process is gone.
+    assert goals.goals.unsettled == []
     goals.is_there = True
     goals.passes(0.5)
     assert goals.handles[0].cancels == 1
@@ -319,9 +330,66 @@ def test_a_server_that_was_only_unseen_for_a_moment_is_not_lost(goals: Goals) ->
 def test_a_goal_that_nothing_is_heard_of_is_lost_and_cancelled(goals: Goals, state: int | None) -> None:
     if state is not None:
         goals.changes(state, SUCCEEDED)
-    assert goals.passes(SILENCE_S - 0.1) == []
-    assert goals.passes(0.2) == [("on_goal_ended", 1, "lost", None)]
+    assert goals.passes(SILENCE_S - 0.1, hears=state is not None) == []
+    waiting = "no server of /a has accepted or rejected a goal so far"
+    assert goals.goals.warnings() == [
+        waiting if state is None else "the server of /a gives no result of a goal that ended"
+    ]
+    assert goals.passes(0.2, hears=False) == [("on_goal_ended", 1, "lost", None)]
     assert goals.handles[0].cancels == 1
+    # Until its server has been heard, it may be running.
+    assert goals.goals.unsettled == ["a goal of /a may be running: its server has not answered it"]
+    goals.changes(DONE, LOST)
+    assert goals.goals.unsettled == []
+
+
+def test_a_server_that_reports_and_does_not_name_a_goal_does_not_have_it(goals: Goals) -> None:
+    assert goals.passes(UNLISTED_S) == []
+    assert goals.passes(0.1) == [("on_goal_ended", 1, "lost", None)]
+
+
+def test_another_process_of_the_same_name_is_another_server(goals: Goals) -> None:
+    goals.servers["http://a:1"] = "/server"
+    goals.goals.send(2, "goal")
+    goals.changes(ACTIVE, ACTIVE_STATUS, index=1)
+    goals.goals._goals.pop(1)
+    assert goals.passes(10.0) == []
+    goals.servers = {"http://a:2": "/server"}
+    assert goals.passes(LOST_S) == []
+    assert goals.passes(0.2) == [("on_goal_ended", 2, "lost", None)]
+    assert goals.handles[1].cancels == 1
+
+
+def test_what_keeps_an_action_from_being_of_use(goals: Goals) -> None:
+    goals.changes(ACTIVE, ACTIVE_STATUS)
+    assert goals.goals.warnings() == []
+    goals.passes(ANSWER_S + 0.1, hears=False)
+    assert goals.goals.warnings() == ["the server of /a reports nothing about a goal"]
+    goals.passes(0.1)
+    assert goals.goals.warnings() == []
+    goals.servers = {"http://a:1": "/b", "http://a:2": "/a"}
+    assert goals.goals.warnings() == ["2 servers of /a: /a, /b"]
+    goals.servers = {}
+    goals.changes(WAITING_FOR_RESULT, SUCCEEDED)
+    goals.passes(SILENCE_S + 0.1)
+    assert goals.goals.warnings() == ["the server of /a gave no result of a goal that ended"]
+    goals.goals.send(2, "goal")
+    goals.changes(DONE, SUCCEEDED, "all")
+    assert goals.goals.warnings() == []
+
+
+def test_what_a_stop_leaves(goals: Goals) -> None:
+    assert goals.goals.unsettled == ["a goal of /a may be running: its server has not answered it"]
+    goals.goals.cancel_unanswered()
+    assert goals.handles[0].cancels == 1
+    goals.changes(ACTIVE, ACTIVE_STATUS)
+    assert goals.goals.unsettled == []
+    goals.goals.cancel(1)
+    assert goals.goals.unsettled == ["a goal of /a may be running: its server has not answered its cancel"]
+    goals.changes(PREEMPTING, 6)
+    assert goals.goals.unsettled == []
+    goals.goals.cancel_unanswered()
+    assert goals.handles[0].cancels == 2
 
 
 def test_a_running_goal_may_take_as_long_as_it_likes(goals: Goals) -> None:

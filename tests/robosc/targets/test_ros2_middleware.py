@@ -45,7 +45,7 @@ class Client:
     def server_is_ready(self) -> bool:
         return True
 
-    def send_goal_async(self, goal: Any, feedback_callback: Any) -> Any:
+    def send_goal_async(self, goal: Any, feedback_callback: Any, goal_uuid: Any) -> Any:
         self.sent.append(goal)
         return SimpleNamespace(add_done_callback=lambda callback: None)
 
@@ -58,14 +58,23 @@ def test_every_stamped_field_of_a_goal_gets_time_and_frame(monkeypatch: pytest.M
     from builtin_interfaces.msg import Time
     from nav_msgs.srv import GetPlan
     from std_msgs.msg import Empty
+    from test_msgs.action import Fibonacci
 
     module: Any = types.ModuleType("plan_msgs.action")
-    module.Plan = SimpleNamespace(Goal=GetPlan.Request, Result=GetPlan.Response, Feedback=Empty)
+    # What asks after a goal is the same for all actions.
+    module.Plan = SimpleNamespace(Goal=GetPlan.Request, Result=GetPlan.Response, Feedback=Empty, Impl=Fibonacci.Impl)
     monkeypatch.setitem(sys.modules, "plan_msgs", types.ModuleType("plan_msgs"))
     monkeypatch.setitem(sys.modules, "plan_msgs.action", module)
     supervisor = unsupervised(MODEL)
     now = SimpleNamespace(to_msg=lambda: Time(sec=7))
-    node: Any = SimpleNamespace(clients=[], get_clock=lambda: SimpleNamespace(now=lambda: now))
+    node: Any = SimpleNamespace(
+        clients=[],
+        get_clock=lambda: SimpleNamespace(now=lambda: now),
+        get_publishers_info_by_topic=lambda name: [],
+        create_client=lambda type_, name: SimpleNamespace(
+            srv_type=type_, service_name=name, get_pending_request=lambda number: None
+        ),
+    )
     settings = SimpleNamespace(service_timeout_s=None)
     parameters = SimpleNamespace(topic_prefix="/r", resample_scans=False, settings=settings)
     with imported(generate(supervisor, "ros2"), tmp_path, "planner_controller.middleware") as generated:

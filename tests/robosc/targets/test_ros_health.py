@@ -8,7 +8,7 @@ from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.clock import ManualClock
 from robosc.execution.runtime.executor import Executor
 from robosc.execution.runtime.settings import Settings
-from robosc.targets.ros.runtime.health import HealthMonitor, Level
+from robosc.targets.ros.runtime.health import STILL_S, ClockWatch, HealthMonitor, Level
 from support.generated import example_supervisor
 from support.goal_porter import porter_supervisor
 
@@ -71,6 +71,27 @@ def test_what_goes_wrong_is_a_warning_once(clock: ManualClock) -> None:
     monitor.next_interval()
     assert monitor.report()[:2] == (Level.OK, "running")
     assert monitor.report().values["unexpected"] == "2"
+
+
+def test_troubles_with_others_are_warnings_as_long_as_they_last(clock: ManualClock) -> None:
+    executor, monitor = monitored(clock, max_age_s={"/scan": 1.0})
+    monitor.troubles = ("2 servers of /a", "no clock")
+    assert monitor.report()[:2] == (Level.WARN, "not started; 2 servers of /a; no clock")
+    executor.start()
+    waiting = "waiting for the first message of every sensor with a maximum age"
+    assert monitor.report()[:2] == (Level.WARN, f"{waiting}; 2 servers of /a; no clock")
+    executor.receive("/scan", {"ranges": [2.0] * 360})
+    for _ in range(2):
+        assert monitor.report()[:2] == (Level.WARN, "2 servers of /a; no clock")
+        monitor.next_interval()
+    executor.receive("/nobody/knows", None)
+    assert monitor.report().message == "2 servers of /a; no clock; since the last report: 1 unexpected"
+    monitor.next_interval()
+    monitor.troubles = ()
+    assert monitor.report()[:2] == (Level.OK, "running")
+    monitor.troubles = ("no clock",)
+    executor.stop("the sky falls", is_fault=True)
+    assert monitor.report()[:2] == (Level.ERROR, "stopped: the sky falls")
 
 
 def test_a_sensor_that_was_not_seen_or_is_stale(clock: ManualClock) -> None:
@@ -150,3 +171,17 @@ def test_an_assumption_that_is_owed_for_too_long_is_a_warning_until_it_is_met(cl
     monitor.next_interval()
     executor.receive("/door/opened", None)
     assert monitor.report()[:2] == (Level.OK, "running")
+
+
+def test_time_that_does_not_come_or_stands_still_is_worth_a_warning() -> None:
+    ros_ns = [0]
+    watch = ClockWatch(lambda: ros_ns[0])
+    assert watch.trouble(100.0) == watch.trouble(1000.0) == "use_sim_time is true, and no time has come on /clock"
+    ros_ns[0] = 5
+    assert watch.trouble(1000.0) == ""
+    assert watch.trouble(1000.0 + 0.9 * STILL_S) == ""
+    assert watch.trouble(1000.0 + STILL_S) == "use_sim_time is true, and the time of /clock stands still"
+    # Time that goes back moves.
+    ros_ns[0] = 4
+    assert watch.trouble(1000.0 + STILL_S) == ""
+    assert watch.trouble(1000.0 + 1.9 * STILL_S) == ""

@@ -4,6 +4,11 @@
 //
 //   message TOPIC DATA            a message comes
 //   server NAME 1                 a service or action has a server (0: it has none)
+//   shown NAME ENDPOINT...        the middleware shows these ends of others: of the topic NAME each is PROCESS:NODE:TYPE, with
+//                                 a best_effort or transient_local at its end where it is one
+//   asked NAME LIVING IGNORANT    from now on so many servers of an action answer at all, and do not know its goal
+//   status NAME NUMBER            the server of an action shows its last goal so
+//   offered NAME TYPE             a service of a type is in use
 //   answer NAME DATA              the oldest call of a service is answered
 //   accept NAME, reject NAME      the answer to the last goal of an action
 //   feedback NAME DATA
@@ -127,6 +132,11 @@ struct World {
     // By word and name.
     std::map<std::pair<std::string, std::string>, Handler> orders;
     std::map<std::string, bool> servers;
+    std::map<std::string, std::vector<std::string>> shown;
+    std::map<std::string, std::pair<int, int>> asked;
+    std::map<std::string, std::vector<std::string>> offered;
+    // Answers that are on their way to the node.
+    std::vector<std::function<void()>> answers;
     std::map<std::string, int> done;
     std::atomic<std::int64_t> clock_ns{0};
     std::string input;
@@ -160,6 +170,18 @@ inline void obey(const std::string& line)
         world().clock_ns = static_cast<std::int64_t>(std::stod(name) * 1e9);
     } else if (word == "server") {
         in >> world().servers[name];
+    } else if (word == "shown") {
+        std::vector<std::string>& ends = world().shown[name];
+        ends.clear();
+        for (std::string end; in >> end;) {
+            ends.push_back(end);
+        }
+    } else if (word == "asked") {
+        in >> world().asked[name].first >> world().asked[name].second;
+    } else if (word == "offered") {
+        std::string type;
+        in >> type;
+        world().offered[name].push_back(type);
     } else if (word == "signal") {
         std::raise(std::stoi(name));
     } else {
@@ -223,6 +245,11 @@ inline bool step(int timeout_ms, bool is_manager = false, bool takes_clock = tru
 {
     World& here = world();
     std::string line;
+    if (!is_manager) {
+        for (const auto& answer : std::exchange(here.answers, {})) {
+            answer();
+        }
+    }
     if (!take_line(is_manager, takes_clock, line)) {
         bool is_quiet = false;
         {

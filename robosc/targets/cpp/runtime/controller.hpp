@@ -38,6 +38,10 @@ inline std::uint64_t now_us()
 /* A server that was not seen for so long is lost. */
 constexpr std::uint64_t LOST_US = 1000000;
 constexpr std::uint64_t CANCEL_WAIT_US = 500000;
+/* Time for which it is awaited, at a stop, that a server answers a goal or its cancel. */
+constexpr std::uint64_t UNDO_US = 5000000;
+/* Time without an answer of a server after which that is worth a warning. */
+constexpr std::uint64_t ANSWER_US = 2000000;
 /* Maximum interval at which it is noticed that time has passed, in microseconds. */
 constexpr std::uint64_t WATCH_US = 50000;
 constexpr std::uint64_t DIAGNOSTICS_US = 1000000;
@@ -128,7 +132,13 @@ public:
 
     /* Names of services and actions without a server. */
     virtual Texts missing_servers() = 0;
+    /* `now` is of the steady clock: a server's end is noticed also where simulated time stands still. */
     virtual void check_servers(std::uint64_t now) = 0;
+    /* What keeps the node's surroundings from being of use to it, in words. */
+    virtual Texts troubles() { return {}; }
+    /* What may begin or run on although its cancel is wanted, in words; ask for the cancel of what may begin. */
+    virtual Texts unsettled() const = 0;
+    virtual void cancel_unanswered() = 0;
     /* Return true if a goal that was reported lost may be running; ask for the cancel of each. */
     virtual bool has_abandoned() const = 0;
     virtual void cancel_abandoned() = 0;
@@ -261,6 +271,7 @@ public:
         }
         if (now >= next_diagnosis_us_) {
             next_diagnosis_us_ = next_after(next_diagnosis_us_, DIAGNOSTICS_US, now);
+            look_around();
             publish_health();
             last_ = robot_.counters;
             last_dropped_ = log_.dropped();
@@ -319,6 +330,25 @@ public:
         for (const Take& report : reports_.take()) {
             take_in(report);
             report_reasons();
+        }
+    }
+
+    /* Notice what has become of servers, while it ends. */
+    void check()
+    {
+        middleware_.check_servers(now_us());
+        advance();
+    }
+
+    bool is_unsettled() const { return !middleware_.unsettled().empty(); }
+
+    /* Report as a fault what may begin or run on, and leave its cancel to its servers. */
+    void give_up()
+    {
+        const Texts found = middleware_.unsettled();
+        guarded("no cancel of a goal", [this] { middleware_.cancel_unanswered(); });
+        if (!found.empty()) {
+            stop(joined(found, "; "), true);
         }
     }
 
@@ -458,7 +488,7 @@ private:
         if (is_starting_) {
             start_if_ready();
         }
-        middleware_.check_servers(now());
+        middleware_.check_servers(now_us());
 #if ROBOT_IS_LAYER
         middleware_.check_callers();
 #endif
@@ -537,13 +567,26 @@ private:
         }
     }
 
-    static std::string joined(const Texts& texts)
+    static std::string joined(const Texts& texts, const std::string& between = ", ")
     {
         std::string result;
         for (const std::string& text : texts) {
-            result += (result.empty() ? "" : ", ") + text;
+            result += (result.empty() ? "" : between) + text;
         }
         return result;
+    }
+
+    /* Ask what keeps the surroundings from being of use, and log what is new of it. */
+    void look_around()
+    {
+        guarded("nothing is known of other nodes", [this] {
+            const Texts before = std::exchange(troubles_, middleware_.troubles());
+            for (const std::string& text : troubles_) {
+                if (std::find(before.begin(), before.end(), text) == before.end()) {
+                    middleware_.warn(text);
+                }
+            }
+        });
     }
 
     std::string reasons_text() const
@@ -624,22 +667,26 @@ private:
                 + " has not ended although its cancel was asked for";
         }
         const Texts old_goals = cancelled(Stage::OLD);
+        Texts warnings = troubles_;
         if (!faults.empty()) {
             result.level = Level::FAULTY;
-            result.message = faults;
+            warnings = {faults};
         } else if (status == ROBOT_STATUS_NEW) {
-            result.message = missing_.empty() ? "not started" : "waiting for servers: " + joined(missing_);
+            warnings.insert(
+                warnings.begin(), missing_.empty() ? "not started" : "waiting for servers: " + joined(missing_));
         } else if (status == ROBOT_STATUS_WAITING && !old_goals.empty()) {
-            result.message = "waiting for the end of goals from before the restart: " + joined(old_goals);
+            warnings.insert(
+                warnings.begin(), "waiting for the end of goals from before the restart: " + joined(old_goals));
         } else if (status == ROBOT_STATUS_WAITING) {
-            result.message = "waiting for the first message of every sensor with a maximum age";
+            warnings.insert(warnings.begin(), "waiting for the first message of every sensor with a maximum age");
         } else if (!news.empty()) {
-            result.message = news;
-        } else {
+            warnings.push_back(news);
+        } else if (warnings.empty()) {
             const Texts cancelling = cancelled(Stage::ASKED);
             result.level = Level::OK;
-            result.message = cancelling.empty() ? "running" : "running, cancelling " + joined(cancelling);
+            warnings = {cancelling.empty() ? "running" : "running, cancelling " + joined(cancelling)};
         }
+        result.message = joined(warnings, "; ");
         return result;
     }
 
@@ -1307,6 +1354,7 @@ private:
     std::string reason_;
     std::string failure_;
     Texts missing_;
+    Texts troubles_;
     std::deque<Held> held_;
     bool is_held_ = true;
     bool is_starting_ = false;

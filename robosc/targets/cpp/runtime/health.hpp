@@ -2,6 +2,7 @@
 
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <utility>
 #include <vector>
@@ -18,6 +19,30 @@ struct Health {
     Level level = Level::OK;
     std::string message;
     std::vector<std::pair<std::string, std::string>> values;
+};
+
+/* Simulated time that stands still for so long is worth a warning. */
+constexpr std::uint64_t STILL_US = 3000000;
+
+/* Watch of simulated time, without which stamps are zero and nothing may be decided. */
+class ClockWatch {
+public:
+    /* Why no time passes, in words; empty if it does. The time of ROS is 0 before the first message on /clock. */
+    std::string trouble(std::int64_t now_ns, std::uint64_t steady_us)
+    {
+        if (now_ns != seen_ns_) {
+            moved_us_ = steady_us;
+            seen_ns_ = now_ns;
+        }
+        if (now_ns == 0) {
+            return "use_sim_time is true, and no time has come on /clock";
+        }
+        return steady_us >= moved_us_ + STILL_US ? "use_sim_time is true, and the time of /clock stands still" : "";
+    }
+
+private:
+    std::int64_t seen_ns_ = 0;
+    std::uint64_t moved_us_ = 0;
 };
 
 /* Fill in a diagnostic_msgs/DiagnosticArray of either ROS, but for its stamp. */

@@ -24,16 +24,20 @@ inline void complain(const std::string& text)
 }
 
 /* Finish what was stopped: await the ends of cancelled goals, let `deliver` give what was sent last time to arrive, and
-   close the event log. */
+   close the event log. A goal that no server has answered may begin to run, and a server that has not answered a cancel
+   may go on: this is waited for longer, and is a fault in the end. */
 template <class Spin, class Deliver>
 void finish(Controller& controller, const Spin& spin, const Deliver& deliver)
 {
     try {
-        const std::uint64_t limit = now_us() + CANCEL_WAIT_US;
-        while (controller.is_stopping() && now_us() < limit) {
+        const std::uint64_t began = now_us();
+        while ((controller.is_stopping() && now_us() < began + CANCEL_WAIT_US)
+            || (controller.is_unsettled() && now_us() < began + UNDO_US)) {
             spin(20000);
             controller.advance();
+            controller.check();
         }
+        controller.give_up();
     } catch (const std::exception& failure) {
         controller.stop(failure.what(), true);
     }

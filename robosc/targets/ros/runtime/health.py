@@ -6,12 +6,16 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from enum import IntEnum
 from typing import NamedTuple
 
 from robosc.execution.runtime.progress import mission_texts, owed_texts, Progress, standing_text
 from robosc.execution.runtime.recorder import Counters
 from robosc.execution.runtime.runner import Runner, Status
+
+STILL_S = 3.0
+"""Simulated time that stands still for so long is worth a warning, in seconds."""
 
 
 class Level(IntEnum):
@@ -36,12 +40,41 @@ class Health(NamedTuple):
     values: dict[str, str]
 
 
+class ClockWatch:
+    """
+    Watch of simulated time, without which stamps are zero and nothing may be decided.
+
+    :param now_ns: Function that returns the time of ROS in nanoseconds; 0 before the first message
+        on `/clock`.
+    """
+
+    def __init__(self, now_ns: Callable[[], int]) -> None:
+        self._now_ns = now_ns
+        self._seen_ns = 0
+        self._moved_s = 0.0
+
+    def trouble(self, steady_s: float) -> str:
+        """
+        Return why no time passes, in words; empty if it does. To be called again and again.
+
+        :param steady_s: Reading of a steady clock.
+        """
+        now_ns = self._now_ns()
+        if now_ns != self._seen_ns:
+            self._moved_s, self._seen_ns = steady_s, now_ns
+        if now_ns == 0:
+            return 'use_sim_time is true, and no time has come on /clock'
+        is_still = steady_s >= self._moved_s + STILL_S
+        return 'use_sim_time is true, and the time of /clock stands still' if is_still else ''
+
+
 class HealthMonitor:
     """
     Judges an executor.
 
     :param executor: The executor.
     :ivar missing_servers: Servers that the start waits for.
+    :ivar troubles: What keeps the node's surroundings from being of use to it, in words.
     """
 
     def __init__(self, executor: Runner) -> None:
@@ -49,6 +82,7 @@ class HealthMonitor:
         self._before = executor.counters
         self._decision_us: float | None = None
         self.missing_servers: tuple[str, ...] = ()
+        self.troubles: tuple[str, ...] = ()
 
     def decided(self, took_s: float) -> None:
         """Note how long a decision took."""
@@ -89,14 +123,18 @@ class HealthMonitor:
             return Level.ERROR, '; '.join(['stopped: ' + '; '.join(reasons), *overdue])
         if overdue:
             return Level.ERROR, '; '.join(overdue)
+        warnings = list(self.troubles)
         if status is Status.NEW:
             names = ', '.join(self.missing_servers)
-            return Level.WARN, f'waiting for servers: {names}' if names else 'not started'
+            warnings.insert(0, f'waiting for servers: {names}' if names else 'not started')
+            return Level.WARN, '; '.join(warnings)
         if status is Status.WAITING and self._executor.old_goals:
             names = ', '.join(self._executor.old_goals)
-            return Level.WARN, f'waiting for the end of goals from before the restart: {names}'
+            warnings.insert(0, f'waiting for the end of goals from before the restart: {names}')
+            return Level.WARN, '; '.join(warnings)
         if status is Status.WAITING:
-            return Level.WARN, 'waiting for the first message of every sensor with a maximum age'
+            warnings.insert(0, 'waiting for the first message of every sensor with a maximum age')
+            return Level.WARN, '; '.join(warnings)
         new = [
             f'{after - before} {name}'
             for name, before, after in (
@@ -107,7 +145,8 @@ class HealthMonitor:
             )
             if after > before
         ]
-        warnings = [] if progress is None else owed_texts(progress)
+        if progress is not None:
+            warnings.extend(owed_texts(progress))
         if new:
             warnings.append('since the last report: ' + ', '.join(new))
         if warnings:

@@ -40,11 +40,13 @@ class AbandonedGoal:
     A goal that was reported lost although it may be running.
 
     :ivar handle: Handle by which its client refers to it.
+    :ivar is_served: True if its server may be there, and has only not been heard of.
     :ivar is_asked: True if its cancel was asked for since its server was seen.
     """
 
-    __slots__ = ('handle', 'is_asked')
+    __slots__ = ('handle', 'is_asked', 'is_served')
 
-    def __init__(self, handle: Any) -> None:
+    def __init__(self, handle: Any, is_served: bool = False) -> None:
         self.handle = handle
+        self.is_served = is_served
         self.is_asked = False

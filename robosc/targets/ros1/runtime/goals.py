@@ -11,7 +11,7 @@ A copy of this module stands in generated packages, which run on Python 3.8 and 
 
 from __future__ import annotations
 
-from typing import Any, Callable, Optional
+from typing import Any, Callable, FrozenSet, Optional
 
 from robosc.targets.ros.runtime.presence import Presence
 from robosc.targets.ros.runtime.reports import AbandonedGoal, Reports
@@ -22,6 +22,12 @@ REFUSAL_S = 1.0
 
 SILENCE_S = 5.0
 """A goal whose receipt, or whose result after its end, was not heard of for so long is lost."""
+
+UNLISTED_S = 2.5
+"""A server that reports for so long without naming a goal that was sent to it does not have it."""
+
+ANSWER_S = 2.0
+"""Time without a report of a server after which that is worth a warning, in seconds."""
 
 # actionlib_msgs/GoalStatus.
 ACTIVE = 1
@@ -66,11 +72,13 @@ class _Goal:
     :ivar is_accepted: True if its server has received it without refusing it.
     :ivar cancelled_s: Time at which its cancel was asked for, in seconds, until it is heard of; or
         None.
+    :ivar servers: URIs of the servers that it was sent to; empty if none are known.
     """
 
-    __slots__ = ('cancelled_s', 'handle', 'is_accepted', 'since_s', 'state')
+    __slots__ = ('cancelled_s', 'handle', 'is_accepted', 'servers', 'since_s', 'state')
 
-    def __init__(self, now_s: float) -> None:
+    def __init__(self, now_s: float, servers: FrozenSet[str]) -> None:
+        self.servers = servers
         self.handle: Any = None
         self.state = WAITING_FOR_GOAL_ACK
         self.since_s = now_s
@@ -84,6 +92,8 @@ class ActionGoals:
 
     :param client: Client with `send_goal` and `last_status_msg` as actionlib's `ActionClient`.
     :param is_ready: Function that returns True if its server is connected.
+    :param servers: Function that returns the name of the node of each server that is connected, by
+        its URI, which another process of the same name has not.
     :param name: The action's name on ROS.
     :param put: The inbox's method of that name.
     :param reports: Reports that take what is heard of goals.
@@ -94,6 +104,7 @@ class ActionGoals:
         self,
         client: Any,
         is_ready: Callable[[], bool],
+        servers: Callable[[], dict[str, str]],
         name: str,
         put: Put,
         reports: Reports,
@@ -105,7 +116,9 @@ class ActionGoals:
         self._put = put
         self._reports = reports
         self._monotonic = monotonic
-        self._presence = Presence(is_ready)
+        self._servers = servers
+        self._presence = Presence(self._is_served)
+        self._no_result = ''
         self._last_status: Any = None
         self._heard_s = 0.0
         self._goals: dict[int, _Goal] = {}
@@ -116,7 +129,7 @@ class ActionGoals:
         if not self.is_ready():
             self._end(goal_id, 'lost')
             return
-        goal = self._goals[goal_id] = _Goal(self._monotonic())
+        goal = self._goals[goal_id] = _Goal(self._monotonic(), frozenset(self._servers()))
         try:
             goal.handle = self._client.send_goal(
                 message, self._transition(goal_id), self._feedback(goal_id)
@@ -146,13 +159,72 @@ class ActionGoals:
             for goal_id in list(self._goals):
                 self._abandon(goal_id)
         for goal_id, goal in list(self._goals.items()):
-            if goal.state in _SILENT and now_s >= goal.since_s + SILENCE_S:
-                self._abandon(goal_id)
+            if self._is_silent(goal, now_s):
+                if goal.state == WAITING_FOR_RESULT:
+                    self._no_result = (
+                        f'the server of {self.name} gave no result of a goal that ended'
+                    )
+                self._abandon(goal_id, is_served=True)
             elif goal.cancelled_s is not None and self._heard_s >= goal.cancelled_s + REFUSAL_S:
                 goal.cancelled_s = None
                 self._refuse(goal_id)
         if self._abandoned:
             self._look_for_server()
+
+    def _is_served(self) -> bool:
+        """Return True if a server that some goal was sent to is there."""
+        found = self._servers()
+        return self.is_ready() and any(
+            not goal.servers or not goal.servers.isdisjoint(found) for goal in self._goals.values()
+        )
+
+    def _is_silent(self, goal: _Goal, now_s: float) -> bool:
+        """Return True if a server has not named a goal, or not given its result, for too long."""
+        if goal.state == WAITING_FOR_GOAL_ACK and self._heard_s >= goal.since_s + UNLISTED_S:
+            return True
+        return goal.state in _SILENT and now_s >= goal.since_s + SILENCE_S
+
+    def warnings(self) -> list[str]:
+        """Return what keeps the action from being of use, in words."""
+        nodes = sorted(self._servers().values())
+        found = (
+            [f'{len(nodes)} servers of {self.name}: {", ".join(nodes)}'] if len(nodes) > 1 else []
+        )
+        if self._no_result:
+            found.append(self._no_result)
+        limit_s = self._monotonic() - ANSWER_S
+        for goal in self._goals.values():
+            if goal.state == WAITING_FOR_GOAL_ACK and goal.since_s <= limit_s:
+                found.append(f'no server of {self.name} has accepted or rejected a goal so far')
+            elif goal.state == WAITING_FOR_RESULT and goal.since_s <= limit_s:
+                found.append(f'the server of {self.name} gives no result of a goal that ended')
+            elif max(goal.since_s, self._heard_s) <= limit_s:
+                found.append(f'the server of {self.name} reports nothing about a goal')
+        return found
+
+    @property
+    def unsettled(self) -> list[str]:
+        """
+        Return what may begin or run on, in words, although its cancel is wanted.
+
+        A goal that its server has not named, and one whose cancel it has not heard.
+        """
+        answers = [
+            'its cancel' if goal.is_accepted else 'it'
+            for goal in self._goals.values()
+            if goal.state == WAITING_FOR_GOAL_ACK or goal.cancelled_s is not None
+        ]
+        answers += ['it' for abandoned in self._abandoned.values() if abandoned.is_served]
+        return [
+            f'a goal of {self.name} may be running: its server has not answered {answer}'
+            for answer in answers
+        ]
+
+    def cancel_unanswered(self) -> None:
+        """Ask for the cancel of goals that may still be accepted: a server remembers it."""
+        for goal in self._goals.values():
+            if goal.state == WAITING_FOR_GOAL_ACK:
+                goal.handle.cancel()
 
     @property
     def has_abandoned(self) -> bool:
@@ -169,9 +241,9 @@ class ActionGoals:
             abandoned.is_asked = True
             abandoned.handle.cancel()
 
-    def _abandon(self, goal_id: int) -> None:
+    def _abandon(self, goal_id: int, is_served: bool = False) -> None:
         """Report a goal as lost, and keep it: it may be running, or on its way to the server."""
-        self._abandoned[goal_id] = AbandonedGoal(self._goals[goal_id].handle)
+        self._abandoned[goal_id] = AbandonedGoal(self._goals[goal_id].handle, is_served)
         self._end(goal_id, 'lost')
 
     def _look_for_server(self) -> None:
@@ -218,6 +290,7 @@ class ActionGoals:
         if state == DONE:
             # Any other status means that the server does not know the goal: it was started anew.
             outcome = _OUTCOMES.get(status, 'lost')
+            self._no_result = ''
             self._end(goal_id, outcome, None if outcome == 'lost' else result)
         elif (
             not goal.is_accepted

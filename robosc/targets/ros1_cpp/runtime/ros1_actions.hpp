@@ -2,14 +2,19 @@
 
 #pragma once
 
+#include <algorithm>
 #include <list>
 #include <map>
 #include <memory>
+#include <set>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include <actionlib/client/action_client.h>
+#include <actionlib/client/client_helpers.h>
+#include <actionlib/client/connection_monitor.h>
+#include <actionlib/destruction_guard.h>
+#include <actionlib_msgs/GoalID.h>
 #include <actionlib_msgs/GoalStatusArray.h>
 
 #include "ros1.hpp"
@@ -20,6 +25,123 @@ namespace robosc {
 constexpr std::uint64_t REFUSAL_US = 1000000;
 /* A goal whose receipt, or whose result after its end, was not heard of for so long is lost. */
 constexpr std::uint64_t SILENCE_US = 5000000;
+/* A server that reports for so long without naming a goal that was sent to it does not have it. */
+constexpr std::uint64_t UNLISTED_US = 2500000;
+
+/* A client of an action as actionlib's, made of its parts: it does not take a goal for lost as soon as another server
+   of that name reports without it, and does not wait for simulated time. */
+template <class Action>
+class ActionClient {
+public:
+    ACTION_DEFINITION(Action)
+    using Handle = actionlib::ClientGoalHandle<Action>;
+    using Transition = boost::function<void(Handle)>;
+    using TakeFeedback = boost::function<void(Handle, const FeedbackConstPtr&)>;
+
+    ActionClient(const ros::NodeHandle& node, const std::string& name, ros::CallbackQueue* queue)
+        : node_(node, name), guard_(boost::make_shared<actionlib::DestructionGuard>()), manager_(guard_)
+    {
+        node_.setCallbackQueue(queue);
+        statuses_ = listen<actionlib_msgs::GoalStatusArray>(
+            "status", [this](const ros::MessageEvent<const actionlib_msgs::GoalStatusArray>& event) {
+                take_status(event.getConstMessage(), event.getPublisherName());
+            });
+        feedbacks_ = listen<ActionFeedback>("feedback", [this](const ros::MessageEvent<const ActionFeedback>& event) {
+            manager_.updateFeedbacks(event.getConstMessage());
+        });
+        results_ = listen<ActionResult>("result", [this](const ros::MessageEvent<const ActionResult>& event) {
+            manager_.updateResults(event.getConstMessage());
+        });
+        using Monitor = actionlib::ConnectionMonitor;
+        monitor_ = boost::make_shared<Monitor>(feedbacks_, results_);
+        goals_ = advertise<ActionGoal>("goal", &Monitor::goalConnectCallback, &Monitor::goalDisconnectCallback);
+        cancels_ = advertise<actionlib_msgs::GoalID>(
+            "cancel", &Monitor::cancelConnectCallback, &Monitor::cancelDisconnectCallback);
+        manager_.registerSendGoalFunc([this](const ActionGoalConstPtr& goal) {
+            sent_ = goal->goal_id.id;
+            goals_.publish(goal);
+        });
+        manager_.registerCancelFunc([this](const actionlib_msgs::GoalID& goal) { cancels_.publish(goal); });
+    }
+
+    ActionClient(const ActionClient&) = delete;
+    ActionClient& operator=(const ActionClient&) = delete;
+
+    ~ActionClient() { guard_->destruct(); }
+
+    bool is_ready() const { return monitor_->isServerConnected(); }
+
+    Handle send(const Goal& goal, const Transition& changed, const TakeFeedback& feedback)
+    {
+        owner_.clear();
+        return manager_.initGoal(goal, changed, feedback);
+    }
+
+    /* Names of the nodes that have reported since a time. */
+    std::set<std::string> reporters(std::uint64_t since_us) const
+    {
+        std::set<std::string> found;
+        for (const auto& [name, heard_us] : heard_us_) {
+            if (heard_us >= since_us) {
+                found.insert(name);
+            }
+        }
+        return found;
+    }
+
+    /* Time of the last report that the goals of this client were told of. */
+    std::uint64_t heard_us() const { return told_us_; }
+
+private:
+    void take_status(const actionlib_msgs::GoalStatusArrayConstPtr& statuses, const std::string& reporter)
+    {
+        const std::uint64_t now = now_us();
+        heard_us_[reporter] = now;
+        const auto is_own
+            = [this](const actionlib_msgs::GoalStatus& status) { return !sent_.empty() && status.goal_id.id == sent_; };
+        if (std::any_of(statuses->status_list.begin(), statuses->status_list.end(), is_own)) {
+            owner_ = reporter;
+        } else if (!owner_.empty() && owner_ != reporter && now < heard_us_[owner_] + LOST_US) {
+            return;
+        }
+        monitor_->processStatus(statuses, reporter);
+        manager_.updateStatuses(statuses);
+        told_us_ = now;
+    }
+
+    template <class Message, class Take>
+    ros::Subscriber listen(const std::string& topic, const Take& take)
+    {
+        const boost::function<void(const ros::MessageEvent<const Message>&)> callback = take;
+        return node_.subscribe<Message>(topic, 0, callback);
+    }
+
+    using Change = void (actionlib::ConnectionMonitor::*)(const ros::SingleSubscriberPublisher&);
+
+    template <class Message>
+    ros::Publisher advertise(const std::string& topic, Change joins, Change leaves)
+    {
+        const auto call = [this](Change change) -> ros::SubscriberStatusCallback {
+            return [this, change](const ros::SingleSubscriberPublisher& peer) { ((*monitor_).*change)(peer); };
+        };
+        return node_.advertise<Message>(topic, 10, call(joins), call(leaves));
+    }
+
+    ros::NodeHandle node_;
+    boost::shared_ptr<actionlib::DestructionGuard> guard_;
+    actionlib::GoalManager<Action> manager_;
+    ros::Subscriber feedbacks_;
+    ros::Subscriber results_;
+    boost::shared_ptr<actionlib::ConnectionMonitor> monitor_;
+    ros::Publisher goals_;
+    ros::Publisher cancels_;
+    ros::Subscriber statuses_;
+    /* Id of the last goal, and the node that named it last. */
+    std::string sent_;
+    std::string owner_;
+    std::map<std::string, std::uint64_t> heard_us_;
+    std::uint64_t told_us_ = 0;
+};
 
 template <class Action>
 class ActionGoals {
@@ -34,17 +156,12 @@ public:
     {
         const auto [handle, rest] = place(shared_, name);
         name_ = handle.resolveName(rest);
-        client_ = std::make_unique<actionlib::ActionClient<Action>>(handle, rest, &shared_->queue);
-        /* The client comes first: when a message counts as heard, it has reported what it says about goals. */
-        ros::NodeHandle listener = handle;
-        const boost::function<void(const actionlib_msgs::GoalStatusArray::ConstPtr&)> hear
-            = [this](const actionlib_msgs::GoalStatusArray::ConstPtr&) { heard_us_ = now_us(); };
-        statuses_ = listener.subscribe<actionlib_msgs::GoalStatusArray>(rest + "/status", 100, hear);
+        client_ = std::make_unique<ActionClient<Action>>(handle, rest, &shared_->queue);
     }
 
     const std::string& name() const { return name_; }
 
-    bool is_ready() const { return client_->isServerConnected(); }
+    bool is_ready() const { return client_->is_ready(); }
 
     void send(std::uint32_t id, const Goal& goal)
     {
@@ -52,7 +169,7 @@ public:
             end(id, ROBOT_OUTCOME_LOST);
             return;
         }
-        Handle handle = client_->sendGoal(
+        Handle handle = client_->send(
             goal, [this, id](Handle handle) { changed(id, handle); },
             [this, id](Handle, const FeedbackConstPtr& feedback) { on_feedback(id, feedback); });
         goals_[id] = Sent{handle, now_us()};
@@ -81,11 +198,15 @@ public:
             }
         }
         for (const std::uint32_t id : silent(now)) {
+            if (goals_.at(id).handle.getCommState() == actionlib::CommState::WAITING_FOR_RESULT) {
+                no_result_ = "the server of " + name_ + " gave no result of a goal that ended";
+            }
+            unheard_.emplace(id, goals_.at(id).handle);
             abandon(id);
         }
         for (auto& [id, goal] : goals_) {
             /* Its server goes on to report, and has not taken notice of the cancel. */
-            if (goal.is_cancelled && heard_us_ >= goal.cancelled_us + REFUSAL_US) {
+            if (goal.is_cancelled && client_->heard_us() >= goal.cancelled_us + REFUSAL_US) {
                 goal.is_cancelled = false;
                 refuse(id);
             }
@@ -93,6 +214,56 @@ public:
         /* A lost goal that runs on would never be stopped otherwise. */
         if (!abandoned_.empty() && is_ready()) {
             cancel_abandoned();
+        }
+    }
+
+    void add_troubles(Texts& found) const
+    {
+        const std::uint64_t now = now_us();
+        const std::set<std::string> nodes = client_->reporters(now < ANSWER_US ? 0 : now - ANSWER_US);
+        if (nodes.size() > 1) {
+            std::string text = std::to_string(nodes.size()) + " servers of " + name_;
+            for (const std::string& node : nodes) {
+                text += (node == *nodes.begin() ? ": " : ", ") + node;
+            }
+            found.push_back(text);
+        }
+        if (!no_result_.empty()) {
+            found.push_back(no_result_);
+        }
+        for (const auto& [id, goal] : goals_) {
+            const actionlib::CommState state = goal.handle.getCommState();
+            if (state == actionlib::CommState::WAITING_FOR_GOAL_ACK && now >= goal.since_us + ANSWER_US) {
+                found.push_back("no server of " + name_ + " has accepted or rejected a goal so far");
+            } else if (state == actionlib::CommState::WAITING_FOR_RESULT && now >= goal.since_us + ANSWER_US) {
+                found.push_back("the server of " + name_ + " gives no result of a goal that ended");
+            } else if (now >= std::max(goal.since_us, client_->heard_us()) + ANSWER_US) {
+                found.push_back("the server of " + name_ + " reports nothing about a goal");
+            }
+        }
+    }
+
+    /* A goal that its server has not named, and one whose cancel it has not heard. */
+    void add_unsettled(Texts& found) const
+    {
+        for (const auto& [id, goal] : goals_) {
+            if (goal.handle.getCommState() == actionlib::CommState::WAITING_FOR_GOAL_ACK || goal.is_cancelled) {
+                found.push_back("a goal of " + name_ + " may be running: its server has not answered "
+                    + (goal.is_accepted ? "its cancel" : "it"));
+            }
+        }
+        for (std::size_t k = 0; k < unheard_.size(); k++) {
+            found.push_back("a goal of " + name_ + " may be running: its server has not answered it");
+        }
+    }
+
+    /* Ask for the cancel of goals that may still be accepted: a server remembers it. */
+    void cancel_unanswered()
+    {
+        for (auto& [id, goal] : goals_) {
+            if (goal.handle.getCommState() == actionlib::CommState::WAITING_FOR_GOAL_ACK) {
+                goal.handle.cancel();
+            }
         }
     }
 
@@ -136,9 +307,10 @@ private:
         std::vector<std::uint32_t> found;
         for (const auto& [id, goal] : goals_) {
             const actionlib::CommState state = goal.handle.getCommState();
-            if ((state == actionlib::CommState::WAITING_FOR_GOAL_ACK
-                    || state == actionlib::CommState::WAITING_FOR_RESULT)
-                && now >= goal.since_us + SILENCE_US) {
+            const bool is_unnamed = state == actionlib::CommState::WAITING_FOR_GOAL_ACK;
+            const bool is_silent = is_unnamed || state == actionlib::CommState::WAITING_FOR_RESULT;
+            if ((is_silent && now >= goal.since_us + SILENCE_US)
+                || (is_unnamed && client_->heard_us() >= goal.since_us + UNLISTED_US)) {
                 found.push_back(id);
             }
         }
@@ -158,7 +330,10 @@ private:
         const auto found = goals_.find(id);
         if (found == goals_.end()) {
             if (handle.getCommState() == actionlib::CommState::DONE) {
-                forget_abandoned(id);
+                forget(id, abandoned_);
+            }
+            if (has_heard_cancel(handle.getCommState())) {
+                forget(id, unheard_);
             }
             return;
         }
@@ -168,6 +343,7 @@ private:
             found->second.is_cancelled = false;
         }
         if (state == actionlib::CommState::DONE) {
+            no_result_.clear();
             finish(id, handle);
             /* A handle must not be let go of in its own callback. */
             ended_.push_back(found->second.handle);
@@ -218,12 +394,13 @@ private:
         }
     }
 
-    void forget_abandoned(std::uint32_t id)
+    /* A handle must not be let go of in its own callback. */
+    void forget(std::uint32_t id, std::map<std::uint32_t, Handle>& goals)
     {
-        const auto found = abandoned_.find(id);
-        if (found != abandoned_.end()) {
+        const auto found = goals.find(id);
+        if (found != goals.end()) {
             ended_.push_back(found->second);
-            abandoned_.erase(found);
+            goals.erase(found);
         }
     }
 
@@ -253,12 +430,13 @@ private:
     TakeResult result_;
     TakeFeedback feedback_;
     std::string name_;
-    std::unique_ptr<actionlib::ActionClient<Action>> client_;
+    std::unique_ptr<ActionClient<Action>> client_;
     std::map<std::uint32_t, Sent> goals_;
     std::map<std::uint32_t, Handle> abandoned_;
+    /* Those of them whose server may be there, and has only not been heard of. */
+    std::map<std::uint32_t, Handle> unheard_;
     std::list<Handle> ended_;
-    ros::Subscriber statuses_;
-    std::uint64_t heard_us_ = 0;
+    std::string no_result_;
     Presence presence_;
 };
 

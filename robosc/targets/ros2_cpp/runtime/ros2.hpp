@@ -13,6 +13,7 @@
 #include <rclcpp_lifecycle/lifecycle_node.hpp>
 
 #include "controller.hpp"
+#include "ros2_peers.hpp"
 
 namespace robosc {
 
@@ -117,6 +118,8 @@ public:
         , name_(prefixed(parameters.topic_prefix, name))
         , answer_(answer)
         , client_(node.create_client<Service>(name_, rclcpp::ServicesQoS(), group))
+        /* A service has the topic of its replies. */
+        , servers_(node, std::string("rr") + client_->get_service_name() + "Reply", true)
     {
     }
 
@@ -134,34 +137,69 @@ public:
             [this, id](typename rclcpp::Client<Service>::SharedFuture future) { answered(id, future.get()); });
         const std::uint64_t now = time_.us();
         const std::uint64_t deadline = timeout_us_ > UINT64_MAX - now ? UINT64_MAX : now + timeout_us_;
-        calls_[id] = {sent.request_id, deadline};
+        calls_[id] = {sent.request_id, deadline, servers_.look(), Presence()};
         if (calls_.size() > MAXIMUM_PENDING) {
             client_->remove_pending_request(calls_.begin()->second.number);
             calls_.erase(calls_.begin());
         }
     }
 
-    /* Notice a lost server: every call under way has failed. */
+    /* Notice a lost server: every call to it has failed. */
     void check(std::uint64_t now)
     {
-        if (calls_.empty()) {
-            presence_.forget();
-        } else if (presence_.is_lost(is_ready(), now)) {
-            for (const auto& [id, call] : std::exchange(calls_, {})) {
-                client_->remove_pending_request(call.number);
-                /* The engine has counted calls that are over by then as failed. */
-                if (now < call.deadline_us) {
-                    fail(id);
-                }
+        std::vector<std::uint32_t> lost;
+        for (auto& [id, call] : calls_) {
+            if (call.presence.is_lost(is_served(call), now)) {
+                lost.push_back(id);
             }
         }
+        for (const std::uint32_t id : lost) {
+            const Call call = calls_.at(id);
+            calls_.erase(id);
+            client_->remove_pending_request(call.number);
+            /* The engine has counted calls that are over by then as failed. */
+            if (time_.us() < call.deadline_us) {
+                fail(id);
+            }
+        }
+    }
+
+    void add_troubles(Texts& found, const std::map<std::string, std::vector<std::string>>& offered)
+    {
+        const char* const type = rosidl_generator_traits::name<Service>();
+        add_other_types(found, offered, name_, client_->get_service_name(), type);
+        servers_.add_several(name_, found);
     }
 
 private:
     struct Call {
         std::int64_t number;
         std::uint64_t deadline_us;
+        Endpoints::Nodes servers;
+        Presence presence;
     };
+
+    /* Whether a server that was called is there. It is not where the node that had its name is another process: a server
+       that works on a call need not answer questions, and names of nodes are unique. */
+    bool is_served(const Call& call)
+    {
+        if (!is_ready()) {
+            return false;
+        }
+        const Endpoints::Nodes& seen = servers_.seen();
+        if (call.servers.empty() || seen.empty()) {
+            return true;
+        }
+        std::set<std::string> taken;
+        for (const auto& [gid, node] : seen) {
+            if (call.servers.count(gid) == 0 && !node.empty()) {
+                taken.insert(node);
+            }
+        }
+        return std::any_of(call.servers.begin(), call.servers.end(), [&](const auto& server) {
+            return seen.count(server.first) > 0 && taken.count(server.second) == 0;
+        });
+    }
 
     void answered(std::uint32_t id, const std::shared_ptr<Response>& response)
     {
@@ -183,7 +221,7 @@ private:
     Answer answer_;
     typename rclcpp::Client<Service>::SharedPtr client_;
     std::map<std::uint32_t, Call> calls_;
-    Presence presence_;
+    Endpoints servers_;
 };
 #endif
 

@@ -2,6 +2,7 @@
 
 #pragma once
 
+#include <array>
 #include <atomic>
 #include <chrono>
 #include <cstdint>
@@ -165,12 +166,18 @@ struct KeepLast {
 
 enum class DurabilityPolicy { Volatile, TransientLocal };
 
+enum class ReliabilityPolicy { Reliable, BestEffort };
+
 class QoS {
 public:
     QoS(const KeepLast& history) : depth_(history.depth) {}  // NOLINT: it is implicit there, too
     QoS(size_t depth) : depth_(depth) {}                     // NOLINT
     QoS& reliable() { return *this; }
-    QoS& best_effort() { return *this; }
+    QoS& best_effort()
+    {
+        reliability_ = ReliabilityPolicy::BestEffort;
+        return *this;
+    }
     QoS& durability_volatile() { return *this; }
     QoS& transient_local()
     {
@@ -178,10 +185,13 @@ public:
         return *this;
     }
     DurabilityPolicy durability() const { return durability_; }
+    ReliabilityPolicy reliability() const { return reliability_; }
     size_t depth() const { return depth_; }
+    int get_rmw_qos_profile() const { return 0; }
 
 private:
     size_t depth_;
+    ReliabilityPolicy reliability_ = ReliabilityPolicy::Reliable;
     DurabilityPolicy durability_ = DurabilityPolicy::Volatile;
 };
 
@@ -220,6 +230,39 @@ struct SubscriptionOptions {
 
 class NodeOptions {};
 
+// An end of a topic, as the line `shown` gives it.
+class TopicEndpointInfo {
+public:
+    explicit TopicEndpointInfo(const std::string& given)
+    {
+        std::istringstream in(given);
+        std::string process;
+        std::string policy;
+        std::getline(in, process, ':');
+        std::getline(in, name_, ':');
+        std::getline(in, type_, ':');
+        std::getline(in, policy, ':');
+        gid_.fill(static_cast<uint8_t>(std::stoi(process)));
+        if (policy == "best_effort") {
+            quality_.best_effort();
+        } else if (policy == "transient_local") {
+            quality_.transient_local();
+        }
+    }
+    const std::string& node_name() const { return name_; }
+    const std::string& node_namespace() const { return namespace_; }
+    const std::string& topic_type() const { return type_; }
+    const std::array<uint8_t, 16>& endpoint_gid() const { return gid_; }
+    const QoS& qos_profile() const { return quality_; }
+
+private:
+    std::string name_;
+    std::string namespace_ = "/";
+    std::string type_;
+    std::array<uint8_t, 16> gid_{};
+    QoS quality_{1};
+};
+
 class PublisherBase {
 public:
     template <typename DurationRepT = int64_t, typename DurationT = std::milli>
@@ -235,7 +278,10 @@ class Publisher : public PublisherBase {
 public:
     using SharedPtr = std::shared_ptr<Publisher>;
 
-    explicit Publisher(std::string topic) : topic_(std::move(topic)) {}
+    Publisher(std::string topic, const QoS& qos) : topic_(std::move(topic)), qos_(qos) {}
+
+    const char* get_topic_name() const { return topic_.c_str(); }
+    QoS get_actual_qos() const { return qos_; }
 
     void publish(std::unique_ptr<MessageT> message) { publish(*message); }
 
@@ -243,6 +289,7 @@ public:
 
 private:
     std::string topic_;
+    QoS qos_;
 };
 
 class SubscriptionBase {
@@ -250,7 +297,9 @@ public:
     using SharedPtr = std::shared_ptr<SubscriptionBase>;
     virtual ~SubscriptionBase() = default;
     QoS get_actual_qos() const { return qos; }
+    const char* get_topic_name() const { return topic.c_str(); }
     QoS qos{10};
+    std::string topic;
 };
 
 template <typename MessageT>
@@ -259,8 +308,39 @@ public:
     using SharedPtr = std::shared_ptr<Subscription>;
 };
 
+}  // namespace rclcpp
+
+// Of rcl and rmw, what clients are made with.
+struct rmw_request_id_t {
+    int64_t sequence_number;
+};
+
+struct rcl_client_options_t {
+    int qos;
+};
+
+inline rcl_client_options_t rcl_client_get_default_options() { return {0}; }
+
+namespace rclcpp {
+
+namespace node_interfaces {
+
+class NodeBaseInterface;
+class NodeGraphInterface {
+public:
+    using SharedPtr = std::shared_ptr<NodeGraphInterface>;
+};
+
+}  // namespace node_interfaces
+
+class ClientBase {
+public:
+    virtual ~ClientBase() = default;
+    virtual void handle_response(std::shared_ptr<rmw_request_id_t> request_header, std::shared_ptr<void> response) = 0;
+};
+
 template <typename ServiceT>
-class Client {
+class Client : public ClientBase {
 public:
     using SharedPtr = std::shared_ptr<Client>;
     using SharedRequest = std::shared_ptr<typename ServiceT::Request>;
@@ -272,6 +352,13 @@ public:
         SharedFuture future;
         int64_t request_id;
     };
+
+    // Of an action's own services, as `asked` says, each server answers every request.
+    Client(node_interfaces::NodeBaseInterface*, node_interfaces::NodeGraphInterface::SharedPtr,
+        const std::string& service_name, rcl_client_options_t&)
+        : name_(service_name)
+    {
+    }
 
     explicit Client(const std::string& name) : name_(name)
     {
@@ -290,6 +377,31 @@ public:
     }
 
     bool service_is_ready() const { return stand_in::world().servers[name_]; }
+
+    const char* get_service_name() const { return name_.c_str(); }
+
+    struct FutureAndRequestId {
+        std::future<SharedResponse> future;
+        int64_t request_id;
+    };
+
+    FutureAndRequestId async_send_request(SharedRequest)
+    {
+        const int64_t number = ++last_;
+        const size_t mark = name_.find("/_action/");
+        const auto counts = stand_in::world().asked[name_.substr(0, mark)];
+        const int count = name_.substr(mark) == "/_action/cancel_goal" ? counts.first : counts.second;
+        for (int k = 0; k < count; k++) {
+            stand_in::world().answers.push_back([this, number] {
+                auto header = std::make_shared<rmw_request_id_t>();
+                header->sequence_number = number;
+                handle_response(header, std::make_shared<typename ServiceT::Response>());
+            });
+        }
+        return {{}, number};
+    }
+
+    void handle_response(std::shared_ptr<rmw_request_id_t>, std::shared_ptr<void>) override {}
 
     template <typename CallbackT>
     SharedFutureAndRequestId async_send_request(SharedRequest request, CallbackT&& callback)
@@ -401,6 +513,12 @@ struct OnSetParametersCallbackHandle {
     std::function<rcl_interfaces::msg::SetParametersResult(const std::vector<Parameter>&)> callback;
 };
 
+class NodeServicesInterface {
+public:
+    using SharedPtr = std::shared_ptr<NodeServicesInterface>;
+    void add_client(std::shared_ptr<ClientBase>, CallbackGroup::SharedPtr) {}
+};
+
 class NodeParametersInterface {
 public:
     using SharedPtr = std::shared_ptr<NodeParametersInterface>;
@@ -506,12 +624,40 @@ public:
 
     node_interfaces::NodeParametersInterface::SharedPtr get_node_parameters_interface() { return parameters_; }
 
+    node_interfaces::NodeGraphInterface::SharedPtr get_node_graph_interface() { return nullptr; }
+
+    node_interfaces::NodeServicesInterface::SharedPtr get_node_services_interface()
+    {
+        return std::make_shared<node_interfaces::NodeServicesInterface>();
+    }
+
+    std::vector<TopicEndpointInfo> get_publishers_info_by_topic(const std::string& topic_name, bool no_mangle = false) const
+    {
+        std::vector<TopicEndpointInfo> found;
+        for (const std::string& end : stand_in::world().shown[no_mangle ? topic_name : resolved(topic_name)]) {
+            found.emplace_back(end);
+        }
+        return found;
+    }
+
+    std::vector<TopicEndpointInfo> get_subscriptions_info_by_topic(
+        const std::string& topic_name, bool no_mangle = false) const
+    {
+        return get_publishers_info_by_topic(topic_name, no_mangle);
+    }
+
+    std::map<std::string, std::vector<std::string>> get_service_names_and_types() const
+    {
+        return stand_in::world().offered;
+    }
+
     template <typename MessageT, typename CallbackT>
     typename Subscription<MessageT>::SharedPtr create_subscription(
         const std::string& topic_name, const QoS& qos, CallbackT&& callback, const SubscriptionOptions& = {})
     {
         const auto made = std::make_shared<Subscription<MessageT>>();
         made->qos = qos;
+        made->topic = resolved(topic_name);
         stand_in::world().topics[resolved(topic_name)].push_back(
             [made = std::weak_ptr<Subscription<MessageT>>(made),
                 function = std::function<void(typename MessageT::ConstSharedPtr)>(callback)](std::istream& in) {
@@ -592,9 +738,9 @@ private:
 
 template <typename MessageT, typename NodeT>
 typename Publisher<MessageT>::SharedPtr create_publisher(
-    NodeT&& node, const std::string& topic_name, const QoS&, const PublisherOptions& = PublisherOptions())
+    NodeT&& node, const std::string& topic_name, const QoS& qos, const PublisherOptions& = PublisherOptions())
 {
-    return std::make_shared<Publisher<MessageT>>(node.resolved(topic_name));
+    return std::make_shared<Publisher<MessageT>>(node.resolved(topic_name), qos);
 }
 
 struct ExecutorOptions {

@@ -39,6 +39,10 @@ public:
         ResultCode code;
         typename ActionT::Result::SharedPtr result;
     };
+
+    std::array<uint8_t, 16> get_goal_id() const { return {}; }
+    int8_t get_status() { return status; }
+    int8_t status = 2;
 };
 
 template <typename ActionT>
@@ -68,6 +72,11 @@ public:
         orders[{"accept", name}] = [this](std::istream&) {
             handle_ = std::make_shared<GoalHandle>();
             options_.goal_response_callback(handle_);
+        };
+        orders[{"status", name}] = [this](std::istream& in) {
+            int status = 0;
+            in >> status;
+            handle_->status = static_cast<int8_t>(status);
         };
         orders[{"reject", name}] = [this](std::istream&) { options_.goal_response_callback(nullptr); };
         orders[{"feedback", name}] = [this](std::istream& in) {

@@ -22,7 +22,6 @@
 #include "rcl_interfaces/msg/parameter_descriptor.hpp"
 #include "rcl_interfaces/msg/set_parameters_result.hpp"
 #include "rosidl_runtime_cpp/traits.hpp"
-#include "rmw/types.h"
 #include "stand_in.hpp"
 
 #define RCLCPP_STAND_IN_LOG(level, logger, ...)                                                                        \

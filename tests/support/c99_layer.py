@@ -13,8 +13,8 @@ from robosc.execution.runtime.layer import (
     _NOT_ALLOWED,
     _NOT_FINITE,
     _NOT_KNOWN,
-    _OLD_GOALS,
     _NOT_WITHIN,
+    _OLD_GOALS,
     _STILL_RUNNING,
     Layer,
 )

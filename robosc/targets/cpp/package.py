@@ -279,9 +279,7 @@ def _topic(unit: Unit, topic: Topic, numbers: dict[str, int], middleware: Middle
     }
 
 
-def _server(
-    unit: Unit, number: int, asked_of: tuple[Communication, ...], middleware: Middleware
-) -> dict[str, object]:
+def _server(unit: Unit, number: int, asked_of: tuple[Communication, ...], middleware: Middleware) -> dict[str, object]:
     item = asked_of[number]
     layout, model = unit.layout, unit.layout.model
     if item.interface is None:

@@ -56,9 +56,7 @@ class StandInSurroundings:
     def start(self, scenario: Scenario, folder: Path) -> None:
         """Start the node; every server is there."""
         parameters = {
-            name: value
-            for name, value in node_parameters(scenario, folder, self._deployment).items()
-            if value != [""]
+            name: value for name, value in node_parameters(scenario, folder, self._deployment).items() if value != [""]
         } | dict(self._parameters)
         words = [word for name, value in parameters.items() for word in ("-p", f"{name}:={_parameter(value)}")]
         with self._output.open("wb") as output, self._errors.open("wb") as errors:
@@ -177,6 +175,12 @@ class LayerSurroundings(StandInSurroundings):
             self._order("ask_cancel", offered, str(self._callers.last(name)))
         else:
             self._order(action.do, offered, str(self._callers.next(name)), _line(data) or "0")
+
+    def stop(self) -> None:
+        """Stop by a signal; a goal whose server says nothing more makes the node end with 1."""
+        self._order("signal", str(int(signal.SIGTERM)))
+        errors = self._errors.read_text(errors="replace")
+        assert self._process.wait(LIMIT_S) == 0 or "may be running" in self._errors.read_text(errors="replace"), errors
 
     def _issued(self, line: str) -> Issued | None:
         kind, name, text = line.split(" ", 2)

@@ -3,6 +3,7 @@
 import json
 import re
 from pathlib import Path
+from types import ModuleType
 from xml.etree import ElementTree
 
 import pytest
@@ -15,6 +16,10 @@ from robosc.supervisor import Supervisor
 from robosc.targets import GenerateOptions, PackageMetadata, StateMessage, generate, write_files
 from robosc.targets.cpp.naming import file_name
 from robosc.targets.ros.runtime.parameters import declarations
+from robosc.targets.ros1 import package as ros1
+from robosc.targets.ros1_cpp import package as ros1_cpp
+from robosc.targets.ros2 import package as ros2
+from robosc.targets.ros2_cpp import package as ros2_cpp
 from support.generated import example_supervisor
 from support.launch_stub import launch_actions
 from support.models import EXAMPLES, bundle_of
@@ -291,6 +296,17 @@ def test_a_layer_tells_the_names_of_both_sides(target: str) -> None:
     (launch,) = (path for path in files if path.startswith("launch/layer.launch"))
     assert all(argument.removeprefix("/") in files[launch] for argument in arguments)
     assert ":=".join(arguments) in files["README.md"]
+
+
+@pytest.mark.parametrize(("target", "python"), [("ros1-cpp", ros1), ("ros2-cpp", ros2)])
+def test_names_on_the_side_of_the_existing_controller_are_those_of_the_python_node(
+    target: str, python: ModuleType
+) -> None:
+    middleware = {"ros1-cpp": ros1_cpp, "ros2-cpp": ros2_cpp}[target].MIDDLEWARE
+    names = (["/scan", "volume"], ["/count", "move"])
+    assert middleware.remapped is not None
+    assert middleware.remapped(*names) == python.MIDDLEWARE.remapped(*names)
+    assert middleware.parts_of_actions == python.MIDDLEWARE.parts_of_actions
 
 
 @pytest.mark.parametrize("target", TARGETS)

@@ -249,7 +249,7 @@ def test_a_cancel_that_is_ignored_is_a_fault(carrier: Carrier) -> None:
     ("end", "event"), [("canceled", "carry.cancel"), ("succeed", "carry.response"), ("abort", "carry.error")]
 )
 def test_a_cancelled_goal_is_executed_until_its_server_ends_it(carrier: Carrier, end: str, event: str) -> None:
-    """It brakes for longer than the parameter allows, and then ends in one way or another."""
+    """A robot brakes for longer than the parameter allows, and then ends in one way or another."""
     peer = carrier.peer
     peer.order("service", "/calibrate", "std_srvs/Trigger")
     peer.order("action", "/move_base", "move_base_msgs/MoveBase")
@@ -260,7 +260,7 @@ def test_a_cancelled_goal_is_executed_until_its_server_ends_it(carrier: Carrier,
     carrier.calibrate()
     carrier.drive()
     peer.order("accept", "/move_base")
-    # Nothing but the goal is in the way of `creep` now.
+    # The goal alone is in the way of `creep` now.
     wait_until(lambda: bool(peer.of("cancel", "/move_base")), "the cancel", repeat=lambda: carrier.say("stay"))
     creeps = len(peer.messages("/creep"))
 

@@ -189,7 +189,10 @@ class C99Target:
             ),
             locations=locations,
             status=(_STATUSES[int(named["status"])].value, named["fault"] == "1"),
-            cancelling=tuple(tuple(name for name in actions if cancelled[name] >= least) for least in (1, 2)),
+            cancelling=(
+                tuple(name for name in actions if cancelled[name] >= 1),
+                tuple(name for name in actions if cancelled[name] == 2),
+            ),
             progress=progress,
         )
 

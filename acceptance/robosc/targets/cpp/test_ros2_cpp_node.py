@@ -236,9 +236,9 @@ def test_a_lost_goal_is_cancelled_when_its_server_is_seen_again(courier_node: Pa
 def test_a_cancelled_goal_is_executed_until_its_server_ends_it(
     courier_node: Path, tmp_path: Path, end: str | None, event: str | None
 ) -> None:
-    """It brakes for longer than the parameter allows, and then ends in one way or another, or never."""
+    """A robot brakes for longer than the parameter allows, and then ends in one way or another, or never."""
     braking = ["message /allowed 0", "wait cancel /count", "refuse /count 0", *A_WHILE]
-    # It could count again, but for the goal.
+    # The goal alone is in the way of another one.
     braking += ["message /allowed 1", "feedback /count 3 5", "message /order/count", *STATES]
     # The cancel is allowed only where the requirement does not hold.
     ending = [] if end is None else ["message /allowed 0", f"result /count {end}", *STATES]

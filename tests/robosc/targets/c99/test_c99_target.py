@@ -208,7 +208,7 @@ def test_goals_that_time_out_together_are_not_ended_twice(tmp_path: Path) -> Non
         executor.on_goal_ended(number, "cancelled")
         reference.command("e", number, OUTCOMES.index("cancelled"))
     assert executor.counters.unexpected == 0
-    # What ended the first one has turned against the other.
+    # The end of the first one has turned against the other.
     assert f"log cancelling {reference.numbers['two']} requirement 1" in reference.lines
     assert f"log cancelling {reference.numbers['one']} timeout" in reference.lines
     replay(compiled(supervisor, tmp_path), reference.commands, reference.lines)
@@ -239,7 +239,7 @@ def test_the_end_of_a_goal_is_taken_whatever_else_is_over(outcome: str, tmp_path
     reference.let_fail()
     executor.restart()
     reference.command("R")
-    # Nothing is requested before the other goal has ended, of which the model knows nothing now.
+    # The other goal, of which the model knows nothing now, must end before anything is requested.
     executor.tick()
     reference.command("t")
     (other,) = (number for number, name in reference.goals.items() if name == "two")

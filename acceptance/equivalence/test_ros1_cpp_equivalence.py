@@ -5,11 +5,20 @@ from pathlib import Path
 
 import pytest
 
+from support import porter_ros1
 from support.equivalence.python_targets import observe
-from support.equivalence.random_scenarios import ODD_MESSAGES, for_node, node_scenario
+from support.equivalence.random_scenarios import (
+    LAYER_KINDS,
+    ODD_MESSAGES,
+    for_layer_node,
+    for_node,
+    layer_node_scenario,
+    node_scenario,
+)
 from support.equivalence.recorded import read_recorded
 from support.equivalence.ros1_target import ros1_cpp_target
 from support.equivalence.targets import compare
+from support.equivalence.worlds import robot_supervisor
 from support.generated import example_supervisor
 from support.ros1_cpp import built_once, missing, supervisor_of
 
@@ -28,6 +37,23 @@ def test_a_recorded_run(robot: str, tmp_path: Path, tmp_path_factory: pytest.Tem
     scenario = for_node(supervisor, read_recorded(robot))
     if robot == "line_follower":
         scenario = replace(scenario, actions=scenario.actions + ODD_MESSAGES)
+    workspace = built_once(supervisor, tmp_path_factory)
+    compare(ros1_cpp_target(supervisor, workspace, tmp_path), scenario, observe(supervisor, scenario))
+
+
+@pytest.mark.parametrize("seed", [3, 4])
+def test_a_layer(seed: int, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    supervisor = porter_ros1.porter_supervisor()
+    scenario = layer_node_scenario(supervisor, seed, 200)
+    seen = observe(supervisor, scenario)
+    assert {kind for item in seen for kind, _, _ in item.issued} >= LAYER_KINDS
+    workspace = built_once(supervisor, tmp_path_factory)
+    compare(ros1_cpp_target(supervisor, workspace, tmp_path), scenario, seen)
+
+
+def test_a_recorded_run_of_a_layer(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    supervisor = robot_supervisor("line_follower_layer")
+    scenario = for_layer_node(supervisor, read_recorded("line_follower_layer"))
     workspace = built_once(supervisor, tmp_path_factory)
     compare(ros1_cpp_target(supervisor, workspace, tmp_path), scenario, observe(supervisor, scenario))
 

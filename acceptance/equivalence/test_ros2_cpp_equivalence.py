@@ -6,12 +6,20 @@ from random import Random
 
 import pytest
 
+from support import porter
 from support.equivalence.python_targets import observe
-from support.equivalence.random_scenarios import for_node, node_scenario
+from support.equivalence.random_scenarios import (
+    LAYER_KINDS,
+    for_layer_node,
+    for_node,
+    layer_node_scenario,
+    node_scenario,
+)
 from support.equivalence.rclcpp_target import rclcpp_target
 from support.equivalence.recorded import read_recorded
 from support.equivalence.scenario import Action, Scenario
 from support.equivalence.targets import compare
+from support.equivalence.worlds import robot_supervisor
 from support.generated import example_supervisor
 from support.rclcpp_nodes import SANITIZERS, compiled_once, courier, missing
 
@@ -47,6 +55,23 @@ def _scan(dice: Random) -> Action:
         if distances:
             distances[dice.randrange(len(distances))] = dice.choice([math.nan, math.inf, -1.0])
     return Action("message", "/scan", {"ranges": distances})
+
+
+@pytest.mark.parametrize("seed", [1, 2])
+def test_a_layer(seed: int, tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    supervisor = porter.porter_supervisor()
+    scenario = layer_node_scenario(supervisor, seed, 150)
+    seen = observe(supervisor, scenario)
+    assert {kind for item in seen for kind, _, _ in item.issued} >= LAYER_KINDS
+    program = compiled_once(supervisor, tmp_path_factory, *SANITIZERS)
+    compare(rclcpp_target(supervisor, program, tmp_path), scenario, seen)
+
+
+def test_a_recorded_run_of_a_layer(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    supervisor = robot_supervisor("line_follower_layer")
+    scenario = for_layer_node(supervisor, read_recorded("line_follower_layer"))
+    program = compiled_once(supervisor, tmp_path_factory)
+    compare(rclcpp_target(supervisor, program, tmp_path), scenario, observe(supervisor, scenario))
 
 
 def test_services_and_actions(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:

@@ -75,7 +75,8 @@ def built(supervisor: Supervisor, folder: Path, *options: str) -> Path:
 
 def built_once(supervisor: Supervisor, factory: pytest.TempPathFactory) -> Path:
     """The same for all tests of a run."""
-    return shared(factory, f"ros1_cpp_{supervisor.model.name}", lambda folder: built(supervisor, folder))
+    name = f"ros1_cpp_{supervisor.model.name}_{supervisor.deployment}"
+    return shared(factory, name, lambda folder: built(supervisor, folder))
 
 
 class Master(Process):
@@ -180,5 +181,6 @@ class Peer:
 
 def node_command(workspace: Path, *parameters: str) -> list[str]:
     """Return the command that starts the one node of a built package, with private parameters like `period:=0.02`."""
-    (program,) = (workspace / "build" / "devel" / "lib").glob("*/controller")
+    folder = workspace / "build" / "devel" / "lib"
+    (program,) = (*folder.glob("*/controller"), *folder.glob("*/layer"))
     return [str(program), *(f"_{parameter}" for parameter in parameters)]

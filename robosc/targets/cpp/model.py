@@ -19,7 +19,8 @@ from robosc.expressions import (
 )
 from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.targets.code.c.header import batch, batch_parameters
-from robosc.targets.code.c.layout import Layout, event_data
+from robosc.targets.code.c.layer import request_parameters
+from robosc.targets.code.c.layout import Layout, event_data, groups, request_data, sharing
 from robosc.targets.code.c.provide import Field, request_field
 from robosc.targets.code.c.text import comment, string_literal
 from robosc.targets.code.c.unit import Unit
@@ -30,6 +31,11 @@ from robosc.targets.text import indent
 _LITERAL = 100
 """Characters of one piece of a long literal."""
 
+_PURPOSES = {
+    CommunicationKind.INCOMING_MESSAGE: "request",
+    CommunicationKind.SERVICE: "call",
+    CommunicationKind.ACTION: "goal",
+}
 _KINDS = {BooleanType: "boolean", IntegerType: "integer", DoubleType: "double", StringType: "string"}
 
 
@@ -57,12 +63,12 @@ class Writer:
         layout = self.layout
         tables = self._tables()
         states = [*self._visit_state(), *self._visit_communications(), *self._put_taken()]
-        requests = self._put_request()
+        requests = [] if layout.is_layer else self._put_request()
         received = [line for number, identifier in enumerate(received_topics(layout)) for line in
                     self._receive(number, identifier)]  # fmt: skip
         answers = [line for item in layout.requests for event in answers_of(item) for line in self._take(event)]
-        fills = [line for item in layout.requests for line in self._fill(item)]
-        body = [*tables, *states, *requests, *self._functions, *received, *answers, *fills]
+        asked = self._asked() if layout.is_layer else [line for item in layout.requests for line in self._fill(item)]
+        body = [*tables, *states, *requests, *self._functions, *received, *answers, *asked]
         head = [*_INCLUDES.splitlines(), "", f"namespace {self.package} {{", "", *_TOP.splitlines(), ""]
         return "\n".join([*head, *body, "}  // namespace model", "", f"}}  // namespace {self.package}"]) + "\n"
 
@@ -264,6 +270,47 @@ class Writer:
             "}",
         ]
 
+    # Requests of the caller, before a layer.
+
+    def _asked(self) -> list[str]:
+        kinds = (CommunicationKind.INCOMING_MESSAGE, *CALLED_KINDS)
+        return [line for kind in kinds for group in groups(self.layout.model, kind) for line in self._ask(group)]
+
+    def _ask(self, group: tuple[Communication, ...]) -> list[str]:
+        """The function that takes what the caller sends on an identifier, and for an action the one for a cancel."""
+        layout, first = self.layout, group[0]
+        purpose = _PURPOSES[first.kind]
+        is_message = first.kind is CommunicationKind.INCOMING_MESSAGE
+        subject = first.identifier if is_message else first.name
+        caller = "" if is_message else ", caller"
+        name = ask_name(layout, first)
+        lines = [line for item in group for line in self._checks(item.request or NoneType(), "message", ())]
+        # The copy takes the numbers that limits move.
+        lines = [*dict.fromkeys(lines), "[[maybe_unused]] Arena arena;", "M sent = message;", "what.message = &sent;"]
+        parameters = request_parameters(layout, group)
+        for parameter, type_ in parameters.values():
+            lines += self._datum(type_, parameter)
+        for item in group:
+            data = request_data(item)
+            if data is not None and layout.raw(data) in parameters:
+                lines += self._note(item.event(EventKind.REQUEST), data, parameters[layout.raw(data)][0])
+        arguments = "".join(self._argument(type_, parameter) for parameter, type_ in parameters.values())
+        lines.append(f"{layout.function(purpose, subject)}(robot, now{caller}{arguments}, what);")
+        found = _function(
+            f"template <class M>\nvoid {name}({layout.prefix}_t* robot, std::uint64_t now, "
+            f"{'' if is_message else 'std::uint32_t caller, '}const M& message, {layout.prefix}_sent_t what, "
+            "[[maybe_unused]] Notes& notes)",
+            lines,
+            comment(f"The caller asks for {', '.join(item.name for item in group)}."),
+        )
+        if first.kind is CommunicationKind.ACTION:
+            found += _function(
+                f"inline void cancel_{name}({layout.prefix}_t* robot, std::uint64_t now, std::uint32_t caller)",
+                [f"{layout.function('cancel', subject)}(robot, now, caller);"],
+                comment(f"The caller cancels a goal of {', '.join(item.name for item in group)}."),
+            )
+        return found
+
     # Received.
 
     def _type_number(self, type_: Type) -> int:
@@ -366,10 +413,12 @@ class Writer:
                 arguments[raw] = self._argument(type_, names[raw])
                 lines += self._datum(type_, names[raw])
             notes += self._note(event, type_, names[raw])
-        call = f"{layout.function('receive', identifier)}(robot, now{''.join(arguments.values())});"
+        whole = ", whole" if layout.is_layer else ""
+        call = f"{layout.function('receive', identifier)}(robot, now{''.join(arguments.values())}{whole});"
         return _function(
             f"template <class M>\nvoid receive_{number}({layout.prefix}_t* robot, std::uint64_t now, "
-            "[[maybe_unused]] const M& message, [[maybe_unused]] Notes& notes)",
+            "[[maybe_unused]] const M& message, [[maybe_unused]] Notes& notes"
+            f"{', const void* whole' if layout.is_layer else ''})",
             [*lines, *notes, call],
             comment(f"A message came on {identifier}."),
         )
@@ -385,7 +434,8 @@ class Writer:
         if type_ is not None:
             lines += [*self._datum(type_, "data"), *self._note(event, type_, "data")]
             argument = self._argument(type_, "data")
-        lines.append(f"{layout.function(purpose, name)}(robot, now, id{argument});")
+        whole = ", &message" if layout.is_layer else ""
+        lines.append(f"{layout.function(purpose, name)}(robot, now, id{argument}{whole});")
         return _function(
             f"template <class M>\nvoid {take_name(layout, event)}({layout.prefix}_t* robot, std::uint64_t now, "
             "std::uint32_t id, [[maybe_unused]] const M& message, [[maybe_unused]] Notes& notes)",
@@ -410,6 +460,16 @@ def answers_of(item: Communication) -> Iterator[str]:
 def fill_name(layout: Layout, item: Communication) -> str:
     """The function that fills the message of a request."""
     return f"fill_{list(layout.communications).index(item.name)}"
+
+
+def ask_name(layout: Layout, item: Communication) -> str:
+    """The function that takes what the caller of a layer sends: one for all on its identifier."""
+    return f"ask_{list(layout.communications).index(first_of(layout, item).name)}"
+
+
+def first_of(layout: Layout, item: Communication) -> Communication:
+    """The first communication of its kind with its identifier."""
+    return sharing(layout.model, item.kind, item.identifier)[0]
 
 
 def take_name(layout: Layout, event: str) -> str:

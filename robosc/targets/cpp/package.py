@@ -1,8 +1,8 @@
 """The files that every C++ package has, and the values for its templates."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, partial
 
 import jinja2
 
@@ -11,20 +11,23 @@ from robosc.model.structure import Communication, CommunicationKind, Deployment,
 from robosc.supervisor import Supervisor
 from robosc.targets.code import templates
 from robosc.targets.code.c.header import head, runtime_text
+from robosc.targets.code.c.layout import Layout
 from robosc.targets.code.c.package import generate as generate_c
 from robosc.targets.code.c.text import safe, string_literal
 from robosc.targets.code.c.unit import Unit, make_unit
 from robosc.targets.code.naming import package_name
 from robosc.targets.code.python.folding import folded
 from robosc.targets.code.templates import shared_values
-from robosc.targets.cpp.model import Writer, fill_name, received_topics, take_name
+from robosc.targets.cpp.model import Writer, ask_name, fill_name, first_of, received_topics, take_name
 from robosc.targets.cpp.naming import require_namespace, require_package_name
 from robosc.targets.cpp.recording import PERIOD_S, record
 from robosc.targets.files import GeneratedFiles
 from robosc.targets.registry import GenerateOptions, StateMessage
+from robosc.targets.ros.layer import Renamed, remapped_names, require_names_of_a_layer, require_own_topics
 from robosc.targets.ros.notices import is_known, with_notices
 from robosc.targets.ros.package import chosen, error_context, packages, release_identifiers, require_own_names
 from robosc.targets.ros.runtime.parameters import Parameter, declarations
+from robosc.targets.ros.runtime.supervised import callers_name, robots_name
 from robosc.targets.ros.topics import Topic, servers, shapes_of, topics
 
 _RUNTIME = (
@@ -40,6 +43,7 @@ _RUNTIME = (
     "state.hpp",
     "values.hpp",
 )
+_OF_A_LAYER = ("callers.hpp",)
 _DIAGNOSTICS = Interface("DiagnosticArray", "diagnostic_msgs")
 _OWN_TYPES = (_DIAGNOSTICS, Interface("String", "std_msgs"))
 
@@ -59,6 +63,12 @@ class Middleware:
         parameters: Parameters that only nodes of this middleware have.
         packages: Packages of messages that its headers use, beside those of every node.
         typed_state: Type of a typed state, or None where nodes of this middleware publish none.
+        of_a_layer: Its own headers that only a layer has.
+        launch: Ending of a launch file.
+        remapped: Names everything that an existing controller before a layer has to call otherwise, given messages and
+            services, and actions.
+        parts_of_actions: Topics that an action is made of, below its name; none where an action has a name of its own.
+        python: The Python package of the target for this middleware in Python, whose launch file of a layer is used.
     """
 
     target: str
@@ -71,6 +81,11 @@ class Middleware:
     parameters: tuple[Parameter, ...] = ()
     packages: tuple[str, ...] = ()
     typed_state: Interface | None = None
+    of_a_layer: tuple[str, ...] = ()
+    launch: str = ""
+    remapped: Callable[[Iterable[str], Iterable[str]], Renamed] | None = None
+    parts_of_actions: tuple[str, ...] = ()
+    python: str = ""
 
 
 def generate_package(middleware: Middleware, supervisor: Supervisor, options: GenerateOptions) -> GeneratedFiles:
@@ -79,20 +94,19 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
     Raises:
         UnsupportedModelError: The model is outside what the target handles.
     """
-    name = package_name(supervisor, options, "controller")
+    name = package_name(supervisor, options, str(supervisor.deployment))
     with error_context(middleware.target):
         return _generate(supervisor, name, options, middleware)
 
 
 def _generate(supervisor: Supervisor, name: str, options: GenerateOptions, middleware: Middleware) -> GeneratedFiles:
-    if supervisor.deployment is not Deployment.CONTROLLER:
-        raise UnsupportedModelError(
-            f"the supervisor of {supervisor.model.name} was made for the deployment '{supervisor.deployment}', and "
-            "this version generates controllers only"
-        )
+    is_layer = supervisor.deployment is Deployment.LAYER
     found, asked = topics(supervisor.model), servers(supervisor.model)
     require_namespace(name)
     require_own_names(name, found, asked)
+    if is_layer:
+        require_names_of_a_layer(found, asked)
+        require_own_topics(found, asked, middleware.parts_of_actions)
     for package in sorted(packages(found, asked)):
         require_package_name(package)
     for item in supervisor.model.communications:
@@ -104,17 +118,35 @@ def _generate(supervisor: Supervisor, name: str, options: GenerateOptions, middl
     files = {f"src/{prefix}{ending}": engine[f"{prefix}{ending}"] for ending in (".h", ".c")}
     files["src/engine.h"] = f'{top}\n#include "{prefix}.h"\n'
     files["src/model.hpp"] = f"{top}\n{Writer(unit, name).text()}"
-    for module, headers in (("robosc.targets.cpp", _RUNTIME), (middleware.module, middleware.runtime)):
+    shared, own = (_OF_A_LAYER, middleware.of_a_layer) if is_layer else ((), ())
+    runtime = (
+        ("robosc.targets.cpp", (*_RUNTIME, *shared)),
+        (middleware.module, (*middleware.runtime, *own)),
+    )
+    for module, headers in runtime:
         for path in headers:
             # Each package has a namespace of its own: two of them may be loaded into one process.
             text = runtime_text(unit.layout, path, module).replace("namespace robosc", f"namespace {name}")
             files[f"src/runtime/{path}"] = f"{top}\n{text}"
-    environment = _environment(middleware.module)
+    environment = _environment(middleware.module, middleware.python)
     context = _context(supervisor, unit, name, found, asked, options, middleware)
-    for path, template in middleware.templates.items():
+    for path, template in _templates(middleware, is_layer).items():
         files[path.format(package=name)] = environment.get_template(template).render(context)
     noticed = with_notices(files, options.metadata)
     return GeneratedFiles({path: folded(text) if path.endswith(".py") else text for path, text in noticed.items()})
+
+
+def _templates(middleware: Middleware, is_layer: bool) -> dict[str, str]:
+    """Path of each file from a template: the template's name."""
+    if not is_layer:
+        return middleware.templates
+    replaced = {
+        f"launch/controller{middleware.launch}": (f"launch/layer{middleware.launch}", f"layer{middleware.launch}.j2"),
+        "README.md": ("README.md", "README_layer.md.j2"),
+    }
+    # The test of a package repeats a run of a controller.
+    kept = {path: template for path, template in middleware.templates.items() if not path.startswith("test/")}
+    return dict(replaced.get(path, (path, template)) for path, template in kept.items())
 
 
 def _engine(supervisor: Supervisor) -> GeneratedFiles:
@@ -145,7 +177,7 @@ def _context(
         types.append(("msg", typed_state))
 
     policy = "fair" if supervisor.strategy is None else "strategy"
-    offered = declarations(released, policy=policy)
+    offered = declarations(released, str(supervisor.deployment), policy)
     declared = tuple(item for item in offered if item.name not in middleware.without)
     declared += middleware.parameters
 
@@ -155,6 +187,14 @@ def _context(
         "prefix": layout.prefix,
         "upper": layout.upper,
         **_recorded(supervisor, unit, middleware),
+        **_layered(found, asked, options, middleware),
+        "deployment": str(supervisor.deployment),
+        "is_layer": layout.is_layer,
+        "node_class": "LayerNode" if layout.is_layer else "ControllerNode",
+        "numbers": _numbers(layout, found, asked, middleware) if layout.is_layer else [],
+        "text_type": middleware.type_name("msg", _OWN_TYPES[1]),
+        "release_identifiers": released,
+        "header": head(supervisor, "# ", "# ", ""),
         "top": head(supervisor),
         "hash_top": head(supervisor, "# ", "# ", ""),
         "includes": sorted({middleware.include(kind, type_) for kind, type_ in types}),
@@ -162,7 +202,7 @@ def _context(
         "has_actions": any(item.kind is CommunicationKind.ACTION for item in asked),
         "has_services": any(item.kind is CommunicationKind.SERVICE for item in asked),
         "topics": [_topic(unit, topic, numbers, middleware) for topic in found],
-        "servers": [_server(unit, number, item, middleware) for number, item in enumerate(asked)],
+        "servers": [_server(unit, number, asked, middleware) for number in range(len(asked))],
         "is_known_license": is_known(options.metadata.license),
         "typed_state": typed_state and middleware.type_name("msg", typed_state),
         "topic_table": found,
@@ -172,8 +212,38 @@ def _context(
     }
 
 
+def _layered(
+    found: tuple[Topic, ...], asked: tuple[Communication, ...], options: GenerateOptions, middleware: Middleware
+) -> dict[str, object]:
+    """Return the names on the caller's side of a layer."""
+    if middleware.remapped is None:
+        return {}
+    return {"supervised": options.supervised, "remapped": remapped_names(found, asked, middleware.remapped)}
+
+
+def _numbers(
+    layout: Layout, found: tuple[Topic, ...], asked: tuple[Communication, ...], middleware: Middleware
+) -> list[dict[str, str]]:
+    """Return the numbers that limits move: the enumerator, the type of the message, and the place in it."""
+    types = {item.name: middleware.type_name("msg", topic.interface) for topic in found for item in topic.published}
+    for item in asked:
+        part = "goal" if item.kind is CommunicationKind.ACTION else "request"
+        if item.interface is not None:
+            types[item.name] = middleware.type_name(part, item.interface)
+    return [
+        {
+            "enumerator": enumerator,
+            "type": types[name],
+            "place": ".".join(("sent", *path)) if path else "basic_field(sent)",
+        }
+        for (name, path), enumerator in layout.numbers.items()
+    ]
+
+
 def _recorded(supervisor: Supervisor, unit: Unit, middleware: Middleware) -> dict[str, object]:
     """Return the run that the package's test repeats, if it has one."""
+    if unit.layout.is_layer:
+        return {}
     if not any(path.startswith("test/") for path in middleware.templates):
         return {}
     return {"recording": record(supervisor, unit.layout), "period_us": int(PERIOD_S * 1e6)}
@@ -189,7 +259,9 @@ def _topic(unit: Unit, topic: Topic, numbers: dict[str, int], middleware: Middle
     return {
         "type": middleware.type_name("msg", topic.interface),
         "literal": string_literal(topic.identifier),
+        "caller": string_literal(callers_name("", topic.identifier)),
         "sent": layout.topics.get(topic.identifier),
+        "ask": ask_name(layout, topic.published[0]) if topic.published else None,
         "received": numbers.get(topic.identifier) if topic.received else None,
         "publisher": topic.publisher_quality,
         "subscription": topic.subscription_quality,
@@ -200,14 +272,15 @@ def _topic(unit: Unit, topic: Topic, numbers: dict[str, int], middleware: Middle
             {
                 "enumerator": layout.communications[item.name],
                 "fill": fill_name(layout, item),
-                "frame": None if item.frame is None else string_literal(item.frame),
+                "frame": None if item.frame is None or layout.is_layer else string_literal(item.frame),
             }
             for item in topic.published
         ],
     }
 
 
-def _server(unit: Unit, number: int, item: Communication, middleware: Middleware) -> dict[str, object]:
+def _server(unit: Unit, number: int, asked_of: tuple[Communication, ...], middleware: Middleware) -> dict[str, object]:
+    item = asked_of[number]
     layout, model = unit.layout, unit.layout.model
     if item.interface is None:
         raise UnsupportedModelError(f"'{item.name}' needs a link to the type of its {item.kind}")
@@ -224,6 +297,9 @@ def _server(unit: Unit, number: int, item: Communication, middleware: Middleware
         "answered": middleware.type_name(answered, item.interface),
         "reported": middleware.type_name("feedback", item.interface),
         "literal": string_literal(item.identifier),
+        "caller": string_literal(callers_name("", item.identifier)),
+        "ask": ask_name(layout, item),
+        "served": next(place for place, other in enumerate(asked_of) if other.name == first_of(layout, item).name),
         "enumerator": layout.communications[item.name],
         "fill": fill_name(layout, item),
         "answer": take_name(layout, item.event(EventKind.RESPONSE)),
@@ -252,10 +328,13 @@ def declaration(parameter: Parameter) -> str:
 
 
 @cache
-def _environment(module: str) -> jinja2.Environment:
+def _environment(module: str, python: str) -> jinja2.Environment:
     filters: dict[str, Callable[..., object]] = {
         "declaration": declaration,
         "literal": string_literal,
         "safe_comment": safe,
+        "callers": partial(callers_name, ""),
+        "robots": partial(robots_name, ""),
     }
-    return templates.environment(module, "robosc.targets.cpp", "robosc.targets.ros", filters=filters)
+    others = (python,) if python else ()
+    return templates.environment(module, "robosc.targets.cpp", "robosc.targets.ros", *others, filters=filters)

@@ -1,9 +1,13 @@
 """The record of the target `ros2-cpp`: ament_cmake, with an rclcpp node around a supervisor in C99."""
 
+from collections.abc import Iterable
+
 from robosc.model.structure import Interface
 from robosc.targets.cpp.naming import file_name
 from robosc.targets.cpp.package import Middleware
+from robosc.targets.ros.layer import Renamed
 from robosc.targets.ros.runtime.parameters import AUTOSTART, STATE_MESSAGE, USE_SIM_TIME
+from robosc.targets.ros.runtime.supervised import old_and_new
 
 _PARTS = {
     "goal": ("action", "::Goal"),
@@ -13,6 +17,14 @@ _PARTS = {
     "response": ("srv", "::Response"),
 }
 """Folder and ending of each part of an action or a service."""
+
+
+_OF_AN_ACTION = ("send_goal", "cancel_goal", "get_result", "feedback", "status")
+
+
+def _remapped(messages_and_services: Iterable[str], actions: Iterable[str]) -> Renamed:
+    parts = (f"{action}/_action/{part}" for action in actions for part in _OF_AN_ACTION)
+    return old_and_new([*messages_and_services, *parts])
 
 
 def _type_name(kind: str, type_: Interface) -> str:
@@ -47,5 +59,9 @@ MIDDLEWARE = Middleware(
     without=frozenset({USE_SIM_TIME}),
     parameters=(AUTOSTART, _STATE_MESSAGE),
     packages=("lifecycle_msgs", "rcl_interfaces"),
+    of_a_layer=("ros2_callers.hpp",),
+    launch=".launch.py",
+    remapped=_remapped,
+    python="robosc.targets.ros2",
     typed_state=Interface("SupervisorState", "robosc_msgs"),
 )

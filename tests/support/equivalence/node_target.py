@@ -24,7 +24,12 @@ LIMIT_S = 15.0
 RESEND_S = 3.0
 
 IN_CPP = Sight(
-    log_keys=frozenset({"kind", "event", "controllable", "data", "state", "identifier", "aim", "assumption", "count"}),
+    log_keys=frozenset(
+        {
+            *("kind", "event", "controllable", "data", "state", "identifier", "action", "why"),
+            *("aim", "assumption", "count"),
+        }
+    ),
     has_readings=False,
 )
 """Sight of nodes in C++ through their logs: what was unknown is not reported in the same words."""

@@ -1,10 +1,12 @@
 """Generated ROS 2 nodes in C++ on the stand-in for rclcpp, as processes that read what happens line by line."""
 
+import json
 import os
 import signal
 import subprocess
 import time
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from pathlib import Path
 from typing import IO, Any
 
@@ -12,13 +14,17 @@ import pytest
 
 from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
+from robosc.targets.ros.runtime.supervised import callers_name
 from robosc.targets.ros.topics import servers, topics
 from support.equivalence.node_target import IN_CPP, LIMIT_S, NodeTarget, given, node_parameters, set_parts
 from support.equivalence.observation import Issued
+from support.equivalence.portable import Callers
 from support.equivalence.scenario import PERIOD_S, Action, Scenario
 
 yaml: Any = pytest.importorskip("yaml", reason="PyYAML, which reads what the stand-in prints, is not installed")
 
+RUNNING = ('"running', '"waiting for the first message')
+"""Beginnings of what a node that has begun reports on `/diagnostics`."""
 _SPIN_S = 0.002
 _KINDS = ("publish", "call", "goal", "cancel")
 # action_msgs/GoalStatus.
@@ -38,7 +44,8 @@ class StandInSurroundings:
     def __init__(
         self, supervisor: Supervisor, program: Path, folder: Path, parameters: Mapping[str, Any] | None = None
     ) -> None:
-        self._topics = {topic.identifier: topic for topic in topics(supervisor.model)}
+        self._deployment = supervisor.deployment
+        self._topics = {_on_ros(topic.identifier): topic for topic in topics(supervisor.model)}
         self._servers = {item.identifier: item for item in servers(supervisor.model)}
         self._program = program
         self._output = folder / "output.txt"
@@ -49,9 +56,7 @@ class StandInSurroundings:
     def start(self, scenario: Scenario, folder: Path) -> None:
         """Start the node; every server is there."""
         parameters = {
-            name: value
-            for name, value in node_parameters(scenario, folder, Deployment.CONTROLLER).items()
-            if value != [""]
+            name: value for name, value in node_parameters(scenario, folder, self._deployment).items() if value != [""]
         } | dict(self._parameters)
         words = [word for name, value in parameters.items() for word in ("-p", f"{name}:={_parameter(value)}")]
         with self._output.open("wb") as output, self._errors.open("wb") as errors:
@@ -97,7 +102,7 @@ class StandInSurroundings:
                 raise ValueError(action.do)
 
     def ask(self, action: Action) -> None:
-        """Raise an error: these nodes are controllers."""
+        """Let the existing controller before a layer do it."""
         raise ValueError(action.do)
 
     def take_issued(self) -> list[Issued]:
@@ -138,6 +143,68 @@ class StandInSurroundings:
         self._process.kill()
         self._process.wait()
         self._input.close()
+
+
+class LayerSurroundings(StandInSurroundings):
+    """A layer and the test, which is the robot and the existing controller."""
+
+    def __init__(self, supervisor: Supervisor, program: Path, folder: Path) -> None:
+        super().__init__(supervisor, program, folder)
+        self._callers = Callers()
+        self._supervised = {_on_ros(callers_name("", topic.identifier)): topic for topic in self._topics.values()}
+        self._offered = {callers_name("", item.identifier): item.name for item in self._servers.values()}
+
+    def start(self, scenario: Scenario, folder: Path) -> None:
+        """Start the node, and wait until it runs: what is sent before is refused."""
+        super().start(scenario, folder)
+        began = time.monotonic()
+        while not any(f": {word}" in self._output.read_text("utf-8") for word in RUNNING):
+            assert time.monotonic() < began + LIMIT_S, self._errors.read_text(errors="replace")
+            self.spin()
+
+    def ask(self, action: Action) -> None:
+        """Let the existing controller do it."""
+        name, data = action.subject, action.data
+        if action.do == "ask":
+            topic = next(item for item in self._topics.values() if item.identifier == name)
+            is_twist = topic.interface.type == "Twist"
+            self._order("message", _on_ros(callers_name("", name)), _twist(data) if is_twist else _line(data))
+            return
+        offered = next(place for place, item in self._offered.items() if item == name)
+        if action.do == "ask_cancel":
+            self._order("ask_cancel", offered, str(self._callers.last(name)))
+        else:
+            self._order(action.do, offered, str(self._callers.next(name)), _line(data) or "0")
+
+    def stop(self) -> None:
+        """Stop by a signal; a goal whose server says nothing more makes the node end with 1."""
+        self._order("signal", str(int(signal.SIGTERM)))
+        errors = self._errors.read_text(errors="replace")
+        assert self._process.wait(LIMIT_S) == 0 or "may be running" in self._errors.read_text(errors="replace"), errors
+
+    def _issued(self, line: str) -> Issued | None:
+        kind, name, text = line.split(" ", 2)
+        if kind == "publish":
+            if name == "/blocked":
+                return "blocked", json.loads(yaml.safe_load(text)["data"])["identifier"], {}
+            topic = self._supervised.get(name)
+            if topic is not None:
+                parts = given(topic.interface, yaml.safe_load(text) or {})
+                # The stand-in itself fills in what makes a scan one of a whole circle.
+                kept = {path: part for path, part in parts.items() if path not in ("range_max", "angle_increment")}
+                return "pass", topic.identifier, kept
+            topic = self._topics.get(name)
+            return (kind, topic.identifier, given(topic.interface, yaml.safe_load(text) or {})) if topic else None
+        if name not in self._offered:
+            return super()._issued(line)
+        number, _, rest = text.partition(" ")
+        found: dict[str, Any] = {"caller": int(number)}
+        if kind == "ended":
+            found["how"], _, rest = rest.partition(" ")
+        parts = set_parts(yaml.safe_load(rest) or {}) if rest else {}
+        # A default response says only why there is no other.
+        parts = {} if list(parts) == ["message"] else parts
+        return kind, self._offered[name], {**found, **parts}
 
 
 class SteppedSurroundings(StandInSurroundings):
@@ -190,6 +257,17 @@ class SteppedSurroundings(StandInSurroundings):
         return state
 
 
+def _on_ros(identifier: str) -> str:
+    """The name of a topic where there is no namespace."""
+    return "/" + identifier.lstrip("/")
+
+
+def _twist(data: Any) -> str:
+    """The parts of both vectors of a twist."""
+    parts = ((data or {}).get(vector, {}).get(axis, 0.0) for vector in ("linear", "angular") for axis in "xyz")
+    return " ".join(map(str, parts))
+
+
 def _parameter(value: Any) -> str:
     return f"[{','.join(value)}]" if isinstance(value, list) else str(value)
 
@@ -207,5 +285,7 @@ def _line(data: Any) -> str:
 
 def rclcpp_target(supervisor: Supervisor, program: Path, folder: Path) -> NodeTarget:
     """The target `ros2-cpp`, compiled with the stand-in."""
-    surroundings = StandInSurroundings(supervisor, program, folder)
-    return NodeTarget("ros2-cpp", supervisor.model, surroundings, folder / "events", IN_CPP)
+    is_layer = supervisor.deployment is Deployment.LAYER
+    surroundings = (LayerSurroundings if is_layer else StandInSurroundings)(supervisor, program, folder)
+    sight = replace(IN_CPP, has_requests=not is_layer)
+    return NodeTarget("ros2-cpp", supervisor.model, surroundings, folder / "events", sight)

@@ -1,5 +1,6 @@
 """An existing controller on ROS 1 before a supervision layer: asks what a test says, remembers what it receives."""
 
+import json
 from typing import Any
 
 from robosc.targets.ros.runtime.supervised import BLOCKED, callers_name
@@ -85,11 +86,15 @@ class Ros1Caller:
             if item.received:
                 values = self._new(item.identifier, peer.values(callers_name("", item.identifier)))
                 found += [("pass", item.identifier, given(item.interface, value)) for value in values]
-        found += [("blocked", value["data"], {}) for value in self._new(BLOCKED, peer.values(BLOCKED))]
+        blocked = [json.loads(value["data"]) for value in self._new(BLOCKED, peer.values(BLOCKED))]
+        found += [("blocked", value["identifier"], {}) for value in blocked]
         for call in [call for call in self._calls if call in peer.replies]:
             name, number = self._calls.pop(call)
             reply = peer.replies[call]
-            found.append(("answer", name, {"caller": number, **set_parts(reply.get("reply") or reply)}))
+            parts = set_parts(reply.get("reply") or reply)
+            # A default response says only why there is no other.
+            parts = {} if list(parts) == ["message"] else parts
+            found.append(("answer", name, {"caller": number, **parts}))
         for goal, (name, number) in self._goals.items():
             for heard in self._new(goal, peer.sent[goal]):
                 for kind, data in _contents(heard):

@@ -7,6 +7,7 @@ import xmlrpc.client
 from collections import Counter
 from collections.abc import Sequence
 from contextlib import ExitStack
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -241,4 +242,5 @@ def ros1_cpp_target(supervisor: Supervisor, workspace: Path, folder: Path) -> No
     command = node_command(workspace)
     name = Path(command[0]).parent.name
     surroundings = Ros1Surroundings(supervisor, name, command, folder)
-    return NodeTarget("ros1-cpp", supervisor.model, surroundings, folder / "events", IN_CPP)
+    sight = replace(IN_CPP, has_requests=supervisor.deployment is Deployment.CONTROLLER)
+    return NodeTarget("ros1-cpp", supervisor.model, surroundings, folder / "events", sight)

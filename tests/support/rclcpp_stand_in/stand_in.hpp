@@ -14,6 +14,9 @@
 //   feedback NAME DATA
 //   result NAME CODE DATA         4: succeeded, 5: canceled, 6: aborted
 //   refuse NAME CODE              the answer to a cancel (0: it is accepted)
+//   ask_call NAME ID DATA         an existing controller calls a service of the node, with a number of its own
+//   ask_goal NAME ID DATA         it sends a goal to an action of the node
+//   ask_cancel NAME ID            it cancels the goal
 //   signal NUMBER
 //   clock SECONDS                 simulated time goes on, or back
 //   wait WORD NAME                go on when the node has done that once more
@@ -22,7 +25,8 @@
 //   end                           the context ends, as by a signal to a container
 //
 // DATA depends on the type: the value of `data`, the ranges of a scan, `success` and `message` of a reply, `sequence`,
-// x, y and z of a point, the voltage of a battery, of odometry x, y, z and w of its orientation, speed and turn, four parts
+// `order`, x, y and z of a point, of a twist
+// the parts of both vectors, the voltage of a battery, of odometry x, y, z and w of its orientation, speed and turn, four parts
 // of a test_msgs/NestedMessage.
 
 #pragma once
@@ -58,6 +62,8 @@ STAND_IN_HAS(HasPoint, z)
 STAND_IN_HAS(HasVoltage, voltage)
 STAND_IN_HAS(HasOdometry, child_frame_id)
 STAND_IN_HAS(HasNested, nested_different_pkg)
+STAND_IN_HAS(HasOrder, order)
+STAND_IN_HAS(HasTwist, linear.x)
 
 template <class T>
 void read_list(std::istream& in, std::vector<T>& list)
@@ -89,6 +95,18 @@ M parsed(std::istream& in)
         std::getline(in >> std::ws, message.message);
     } else if constexpr (HasSequence<M>::value) {
         read_list(in, message.sequence);
+    } else if constexpr (HasOrder<M>::value) {
+        in >> message.order;
+    } else if constexpr (HasTwist<M>::value) {
+        std::vector<double> numbers;
+        read_list(in, numbers);
+        numbers.resize(6);
+        message.linear.x = numbers[0];
+        message.linear.y = numbers[1];
+        message.linear.z = numbers[2];
+        message.angular.x = numbers[3];
+        message.angular.y = numbers[4];
+        message.angular.z = numbers[5];
     } else if constexpr (HasPoint<M>::value) {
         in >> message.x >> message.y >> message.z;
     } else if constexpr (HasVoltage<M>::value) {

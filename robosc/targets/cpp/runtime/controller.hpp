@@ -10,6 +10,7 @@
 #include <deque>
 #include <exception>
 #include <functional>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
@@ -98,12 +99,35 @@ class Middleware {
 public:
     virtual ~Middleware() = default;
 
+#if ROBOT_IS_LAYER
+#if ROBOT_LIMIT_COUNT > 0
+    /* Write a number into what was sent, before that goes out. */
+    virtual void set_number(const void* message, int number, double value) = 0;
+#endif
+    /* The robot's side: a message goes out as it came. */
+    virtual void publish(int topic, const void* message) = 0;
+    virtual void call(std::uint32_t id, int service, const void* message) = 0;
+    virtual void send_goal(std::uint32_t id, int action, const void* message) = 0;
+
+    /* The caller's side; a message that is NULL is the default one, with the reason in it. */
+    virtual void pass_on(int source, const void* message) = 0;
+    virtual void blocked(const std::string& identifier, const std::string& why) = 0;
+    virtual void answer(int service, std::uint32_t caller, const void* message, const std::string& why) = 0;
+    virtual void accept_goal(int action, std::uint32_t caller) = 0;
+    virtual void reject_goal(int action, std::uint32_t caller, const std::string& why) = 0;
+    virtual void pass_feedback(int action, std::uint32_t caller, const void* message) = 0;
+    virtual void end_goal(
+        int action, std::uint32_t caller, robot_end_t end, const void* message, const std::string& why) = 0;
+    /* Notice callers that are gone. */
+    virtual void check_callers() = 0;
+#else
     /* Throws Misfit if the data of a request does not fit its message. */
     virtual void prepare(const robot_request_t& request) = 0;
     virtual void publish(const robot_request_t& request) = 0;
-    virtual void publish_default(int topic) = 0;
     virtual void call(std::uint32_t id, const robot_request_t& request) = 0;
     virtual void send_goal(std::uint32_t id, const robot_request_t& request) = 0;
+#endif
+    virtual void publish_default(int topic) = 0;
     virtual void cancel_goal(int action, std::uint32_t id) = 0;
 
     /* Names of services and actions without a server. */
@@ -157,7 +181,21 @@ public:
         callbacks.call = on_call;
         callbacks.send_goal = on_send_goal;
         callbacks.cancel_goal = on_cancel_goal;
+#if ROBOT_IS_LAYER
+#if ROBOT_LIMIT_COUNT > 0
+        callbacks.set_number = on_set_number;
+#endif
+        callbacks.pass_on = on_pass_on;
+        callbacks.blocked = on_blocked;
+        callbacks.answer = on_answer;
+        callbacks.answer_default = on_answer_default;
+        callbacks.accept_goal = on_accept_goal;
+        callbacks.reject_goal = on_reject_goal;
+        callbacks.pass_feedback = on_pass_feedback;
+        callbacks.end_goal = on_end_goal;
+#else
         callbacks.fits = on_fits;
+#endif
         callbacks.log = on_log;
         if (!robot_init(&robot_, &parameters_.settings, &callbacks)) {
             throw ParameterError("the engine refuses the parameters");
@@ -203,6 +241,19 @@ public:
         report_reasons();
     }
 
+#if ROBOT_IS_LAYER
+    /* Judge what the existing controller sends. */
+    void judge(const Take& take)
+    {
+        begin_anew_after_jump();
+        advance();
+        const std::uint64_t began = now_us();
+        take_in(take);
+        decision_us_ = static_cast<double>(now_us() - began);
+        report_reasons();
+    }
+
+#endif
     /* Do whatever is due: reports of calls and goals, decisions, time that has passed. */
     void run_due()
     {
@@ -350,6 +401,9 @@ private:
             reason_ = failure.what();
             robot_stop(&robot_, now(), true);
         }
+#if ROBOT_IS_LAYER
+        answer_failed();
+#endif
         notes_.clear();
     }
 
@@ -386,8 +440,10 @@ private:
     /* Take in what came early: nothing is decided before the last of it, and ages count from when it came. */
     void take_held()
     {
+#if !ROBOT_IS_LAYER
         const bool decides = robot_.settings.decides_after_batch;
         robot_.settings.decides_after_batch = false;
+#endif
         const std::uint64_t started = began_us_;
         is_held_ = false;
         for (const Held& item : std::exchange(held_, {})) {
@@ -398,7 +454,9 @@ private:
                 }
             }
         }
+#if !ROBOT_IS_LAYER
         robot_.settings.decides_after_batch = decides;
+#endif
         /* A sensor whose last message is too old by now is stale already. */
         begin();
         robot_.deadline_us = began_us_;
@@ -407,13 +465,18 @@ private:
 
     void tick()
     {
-        const bool decides = robot_status(&robot_, now()) == ROBOT_STATUS_RUNNING;
         begin();
+#if ROBOT_IS_LAYER
+        robot_watch(&robot_, began_us_);
+        answer_failed();
+#else
+        const bool decides = robot_status(&robot_, now()) == ROBOT_STATUS_RUNNING;
         robot_tick(&robot_, began_us_);
-        notes_.clear();
         if (decides) {
             decision_us_ = static_cast<double>(now_us() - began_steady_us_);
         }
+#endif
+        notes_.clear();
         report_reasons();
         if (parameters_.publish_state) {
             guarded("no state", [this] { middleware_.publish_state(state_report()); });
@@ -426,8 +489,14 @@ private:
             start_if_ready();
         }
         middleware_.check_servers(now_us());
+#if ROBOT_IS_LAYER
+        middleware_.check_callers();
+#endif
         begin();
         robot_watch(&robot_, began_us_);
+#if ROBOT_IS_LAYER
+        answer_failed();
+#endif
         report_reasons();
     }
 
@@ -801,14 +870,155 @@ private:
         return false;
     }
 
+#if ROBOT_IS_LAYER
+    static bool on_publish(void* context, robot_topic_t topic, const void* message)
+    {
+        return attempted(context, [&](Middleware& middleware) { middleware.publish(static_cast<int>(topic), message); });
+    }
+
+    static bool on_call(void* context, std::uint32_t id, robot_communication_t service, const void* message)
+    {
+        return attempted(
+            context, [&](Middleware& middleware) { middleware.call(id, static_cast<int>(service), message); });
+    }
+
+    static bool on_send_goal(void* context, std::uint32_t id, robot_communication_t action, const void* message)
+    {
+        return attempted(
+            context, [&](Middleware& middleware) { middleware.send_goal(id, static_cast<int>(action), message); });
+    }
+
+#if ROBOT_LIMIT_COUNT > 0
+    static bool on_set_number(void* context, const void* message, robot_number_t number, double value)
+    {
+        return attempted(context,
+            [&](Middleware& middleware) { middleware.set_number(message, static_cast<int>(number), value); });
+    }
+
+#endif
+    static bool on_pass_on(void* context, robot_source_t source, const void* message)
+    {
+        return attempted(
+            context, [&](Middleware& middleware) { middleware.pass_on(static_cast<int>(source), message); });
+    }
+
+    static bool on_blocked(void* context, const char* identifier, robot_refusal_t why)
+    {
+        Controller& controller = self(context);
+        const std::string text = refusal_text(why);
+        controller.write_blocked(identifier, text);
+        const bool is_told = controller.told_refused(text);
+        return attempted(context, [&](Middleware& middleware) { middleware.blocked(identifier, text); }) && is_told;
+    }
+
+    static bool on_answer(void* context, robot_communication_t service, std::uint32_t caller, const void* message)
+    {
+        return attempted(
+            context, [&](Middleware& middleware) { middleware.answer(static_cast<int>(service), caller, message, ""); });
+    }
+
+    /* Why it is refused is known a moment later. */
+    static bool on_answer_default(void* context, robot_communication_t service, std::uint32_t caller)
+    {
+        self(context).refused_.push_back({static_cast<int>(service), caller, false});
+        return true;
+    }
+
+    static bool on_accept_goal(void* context, robot_communication_t action, std::uint32_t caller)
+    {
+        return attempted(
+            context, [&](Middleware& middleware) { middleware.accept_goal(static_cast<int>(action), caller); });
+    }
+
+    static bool on_reject_goal(void* context, robot_communication_t action, std::uint32_t caller)
+    {
+        self(context).refused_.push_back({static_cast<int>(action), caller, true});
+        return true;
+    }
+
+    static bool on_pass_feedback(void* context, robot_communication_t action, std::uint32_t caller, const void* message)
+    {
+        return attempted(
+            context, [&](Middleware& middleware) { middleware.pass_feedback(static_cast<int>(action), caller, message); });
+    }
+
+    static bool on_end_goal(
+        void* context, robot_communication_t action, std::uint32_t caller, robot_end_t end, const void* message)
+    {
+        const char* const why
+            = end == ROBOT_END_ABORTED ? "its server, or the supervisor, ended it, or it took too long" : "";
+        return attempted(context,
+            [&](Middleware& middleware) { middleware.end_goal(static_cast<int>(action), caller, end, message, why); });
+    }
+
+    /* Tell the callers whose calls and goals were refused; false if that failed. */
+    bool told_refused(const std::string& why)
+    {
+        bool is_well = true;
+        for (const Refused& item : std::exchange(refused_, {})) {
+            const bool is_told = attempted(this, [&](Middleware& middleware) {
+                if (item.is_goal) {
+                    middleware.reject_goal(item.communication, item.caller, why);
+                } else {
+                    middleware.answer(item.communication, item.caller, nullptr, why);
+                }
+            });
+            is_well = is_told && is_well;
+        }
+        return is_well;
+    }
+
+    /* Answer the calls that failed. */
+    void answer_failed()
+    {
+        if (!told_refused("the call failed or took too long")) {
+            reason_ = std::exchange(failure_, {});
+            robot_stop(&robot_, now(), true);
+        }
+    }
+
+    static const char* refusal_text(robot_refusal_t why)
+    {
+        switch (why) {
+        case ROBOT_REFUSAL_NOT_ALLOWED:
+            return "not allowed now";
+        case ROBOT_REFUSAL_NOT_FINITE:
+            return "a NaN or an infinity";
+        case ROBOT_REFUSAL_NOT_KNOWN:
+            return "no message of the model";
+#if ROBOT_LIMIT_COUNT > 0
+        case ROBOT_REFUSAL_NOT_WITHIN:
+            return "no number is within all limits";
+#endif
+        case ROBOT_REFUSAL_STILL_RUNNING:
+            return "its last goal may still be under way";
+        case ROBOT_REFUSAL_NOT_STARTED:
+            return "not started";
+        case ROBOT_REFUSAL_WAITING:
+            return "waiting for sensors";
+        case ROBOT_REFUSAL_OLD_GOALS:
+            return "goals from before the restart have not ended";
+        case ROBOT_REFUSAL_STOPPED:
+            return "stopped";
+        default:
+            return "a fault";
+        }
+    }
+
+    void write_blocked(const char* identifier, const std::string& why)
+    {
+        if (log_.is_active()) {
+            std::string line = head("blocked") + ",\"identifier\":";
+            put_json(line, identifier);
+            line += ",\"why\":";
+            put_json(line, why);
+            log_.write(line + "}");
+        }
+    }
+#else
     static bool on_publish(void* context, const robot_request_t* request)
     {
         return attempted(context, [&](Middleware& middleware) { middleware.publish(*request); });
-    }
-
-    static bool on_publish_default(void* context, robot_topic_t topic)
-    {
-        return attempted(context, [&](Middleware& middleware) { middleware.publish_default(static_cast<int>(topic)); });
     }
 
     static bool on_call(void* context, std::uint32_t id, const robot_request_t* request)
@@ -819,12 +1029,6 @@ private:
     static bool on_send_goal(void* context, std::uint32_t id, const robot_request_t* request)
     {
         return attempted(context, [&](Middleware& middleware) { middleware.send_goal(id, *request); });
-    }
-
-    static bool on_cancel_goal(void* context, robot_communication_t action, std::uint32_t id)
-    {
-        return attempted(
-            context, [&](Middleware& middleware) { middleware.cancel_goal(static_cast<int>(action), id); });
     }
 
     static bool on_fits(void* context, const robot_request_t* request)
@@ -839,6 +1043,18 @@ private:
             controller.notes_.note(event, std::move(text));
         }
         return fits;
+    }
+#endif
+
+    static bool on_publish_default(void* context, robot_topic_t topic)
+    {
+        return attempted(context, [&](Middleware& middleware) { middleware.publish_default(static_cast<int>(topic)); });
+    }
+
+    static bool on_cancel_goal(void* context, robot_communication_t action, std::uint32_t id)
+    {
+        return attempted(
+            context, [&](Middleware& middleware) { middleware.cancel_goal(static_cast<int>(action), id); });
     }
 
     static void on_log(void* context, robot_log_t kind, int what)
@@ -912,8 +1128,16 @@ private:
             reasons_.clear();
             write("restart", "what", "");
             return;
+#if ROBOT_IS_LAYER
+        case ROBOT_LOG_BLOCKED:
+            /* The callback `blocked` has the identifier, too. */
+            return;
+#endif
 #if ROBOT_ACTION_COUNT > 0
         case ROBOT_LOG_CANCELLING:
+#if ROBOT_IS_LAYER
+            is_own_cancel_[what] = cancelling(what).why == ROBOT_CANCEL_REQUIREMENT;
+#endif
             put_json(rest, cancel_text(what));
             write_cancel("cancelling", what, "why", rest);
             return;
@@ -984,6 +1208,11 @@ private:
         if (found.why == ROBOT_CANCEL_STOP) {
             return "stop";
         }
+#if ROBOT_IS_LAYER
+        if (found.why == ROBOT_CANCEL_CALLER) {
+            return "the caller";
+        }
+#endif
         std::string numbers;
         for (int place = 0; place < ROBOT_REQUIREMENT_COUNT; place++) {
             if (found.turned[place]) {
@@ -1062,7 +1291,7 @@ private:
         line += ",\"event\":";
         put_json(line, robot_event_name(event));
         line += ",\"controllable\":";
-        put_json(line, model::IS_CONTROLLABLE[event]);
+        put_json(line, is_controllable(event));
         line += ",\"data\":";
         line += notes_.of(event).empty() ? "null" : notes_.of(event);
         line += ",\"state\":";
@@ -1071,6 +1300,20 @@ private:
         state.finish();
         line += ",\"decision_us\":" + number_text(static_cast<double>(now_us() - began_steady_us_)) + "}";
         log_.write(std::move(line));
+    }
+
+    /* A caller's cancel is not the supervisor's to decide. */
+    bool is_controllable(int event) const
+    {
+#if ROBOT_IS_LAYER
+        const std::string name = robot_event_name(event);
+        for (const auto& [action, is_own] : is_own_cancel_) {
+            if (name == std::string(robot_communication_name(action)) + ".cancel") {
+                return is_own;
+            }
+        }
+#endif
+        return model::IS_CONTROLLABLE[event];
     }
 
     static std::string head(const char* kind)
@@ -1087,6 +1330,15 @@ private:
         }
     }
 
+#if ROBOT_IS_LAYER
+    /* A call or goal that was refused, and whose caller is to be told. */
+    struct Refused {
+        int communication;
+        std::uint32_t caller;
+        bool is_goal;
+    };
+
+#endif
     Middleware& middleware_;
     Reports& reports_;
     Parameters parameters_;
@@ -1116,6 +1368,11 @@ private:
     std::uint64_t next_watch_us_ = 0;
     std::uint64_t next_diagnosis_us_ = 0;
     double decision_us_ = -1.0;
+#if ROBOT_IS_LAYER
+    std::vector<Refused> refused_;
+    /* The actions whose goal the supervisor cancels, not their caller. */
+    std::map<int, bool> is_own_cancel_;
+#endif
 };
 
 }  // namespace robosc

@@ -52,7 +52,11 @@ void fill_health(Message& message, const Health& health, const std::string& node
     message.status.resize(1);
     auto& status = message.status.front();
     status.level = static_cast<decltype(status.level)>(health.level);
+#if ROBOT_IS_LAYER
+    status.name = node + ": layer";
+#else
     status.name = node + ": controller";
+#endif
     status.message = health.message;
     status.hardware_id = model::ROBOT;
     status.values.resize(health.values.size());

@@ -270,6 +270,10 @@ inline Parameters validated(const Given& given, const std::vector<Nameable>& req
     if (!(result.period_s >= 0.0001 && result.period_s <= 3600.0)) {
         detail::wrong("period", given.at("period"), "0.0001 seconds or more, and at most 3600 seconds");
     }
+#if ROBOT_IS_LAYER
+    static_cast<void>(requests);
+    settings.command_timeout_us = detail::microseconds(detail::seconds_or_zero(given, "command_timeout"));
+#else
 #if ROBOT_HAS_STRATEGY
     settings.policy
         = static_cast<robot_policy_t>(detail::choice(given, "policy", {"fair", "priority", "random", "strategy"}));
@@ -286,6 +290,7 @@ inline Parameters validated(const Given& given, const std::vector<Nameable>& req
     }
     settings.seed = static_cast<std::uint64_t>(*seed);
     settings.decides_after_batch = detail::choice(given, "every", {"period", "event"}) == 1;
+#endif
     settings.on_unknown
         = static_cast<robot_on_unknown_t>(detail::choice(given, "on_unknown", {"default", "keep", "fault"}));
     settings.service_timeout_us = detail::timeout(given, "service_timeout");

@@ -368,15 +368,21 @@ private:
             shared_->report([take = result_, id, result](robot_t* robot, std::uint64_t now, Notes& notes) {
                 take(robot, now, id, *result, notes);
             });
-        } else if (state == actionlib::TerminalState::PREEMPTED || state == actionlib::TerminalState::RECALLED) {
-            end(id, ROBOT_OUTCOME_CANCELLED);
-        } else if (state == actionlib::TerminalState::REJECTED) {
-            end(id, ROBOT_OUTCOME_REJECTED);
-        } else if (state == actionlib::TerminalState::LOST) {
-            end(id, ROBOT_OUTCOME_LOST);
-        } else {
-            end(id, ROBOT_OUTCOME_ABORTED);
+            return;
         }
+        robot_outcome_t outcome = ROBOT_OUTCOME_ABORTED;
+        if (state == actionlib::TerminalState::PREEMPTED || state == actionlib::TerminalState::RECALLED) {
+            outcome = ROBOT_OUTCOME_CANCELLED;
+        } else if (state == actionlib::TerminalState::REJECTED) {
+            outcome = ROBOT_OUTCOME_REJECTED;
+        } else if (state == actionlib::TerminalState::LOST) {
+            outcome = ROBOT_OUTCOME_LOST;
+        }
+#if ROBOT_IS_LAYER
+        end(id, outcome, result);
+#else
+        end(id, outcome);
+#endif
     }
 
     void on_feedback(std::uint32_t id, const FeedbackConstPtr& feedback)
@@ -404,12 +410,21 @@ private:
             [id](robot_t* robot, std::uint64_t now, Notes&) { robot_cancel_refused(robot, now, id, false); });
     }
 
+#if ROBOT_IS_LAYER
+    void end(std::uint32_t id, robot_outcome_t outcome, const ResultConstPtr& result = {})
+    {
+        shared_->report([id, outcome, result](robot_t* robot, std::uint64_t now, Notes&) {
+            robot_goal_ended(robot, now, id, outcome, result.get());
+        });
+    }
+#else
     void end(std::uint32_t id, robot_outcome_t outcome)
     {
         shared_->report([id, outcome](robot_t* robot, std::uint64_t now, Notes&) {
             robot_goal_ended(robot, now, id, outcome);
         });
     }
+#endif
 
     std::shared_ptr<Shared> shared_;
     TakeResult result_;

@@ -327,10 +327,14 @@ private:
                 take(robot, now, id, *data, notes);
             });
         } else {
-            end(id,
-                result.code == rclcpp_action::ResultCode::CANCELED      ? ROBOT_OUTCOME_CANCELLED
-                    : result.code == rclcpp_action::ResultCode::ABORTED ? ROBOT_OUTCOME_ABORTED
-                                                                        : ROBOT_OUTCOME_LOST);
+            const robot_outcome_t outcome = result.code == rclcpp_action::ResultCode::CANCELED ? ROBOT_OUTCOME_CANCELLED
+                : result.code == rclcpp_action::ResultCode::ABORTED                            ? ROBOT_OUTCOME_ABORTED
+                                                                                               : ROBOT_OUTCOME_LOST;
+#if ROBOT_IS_LAYER
+            end(id, outcome, result.result);
+#else
+            end(id, outcome);
+#endif
         }
     }
 
@@ -361,12 +365,21 @@ private:
         });
     }
 
+#if ROBOT_IS_LAYER
+    void end(std::uint32_t id, robot_outcome_t outcome, const std::shared_ptr<const Result>& result = nullptr)
+    {
+        reports_.add([id, outcome, result](robot_t* robot, std::uint64_t now, Notes&) {
+            robot_goal_ended(robot, now, id, outcome, result.get());
+        });
+    }
+#else
     void end(std::uint32_t id, robot_outcome_t outcome)
     {
         reports_.add([id, outcome](robot_t* robot, std::uint64_t now, Notes&) {
             robot_goal_ended(robot, now, id, outcome);
         });
     }
+#endif
 
     Reports& reports_;
     std::string name_;

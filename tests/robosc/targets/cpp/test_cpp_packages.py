@@ -3,6 +3,7 @@
 import json
 import re
 from pathlib import Path
+from types import ModuleType
 from xml.etree import ElementTree
 
 import pytest
@@ -15,6 +16,10 @@ from robosc.supervisor import Supervisor
 from robosc.targets import GenerateOptions, PackageMetadata, StateMessage, generate, write_files
 from robosc.targets.cpp.naming import file_name
 from robosc.targets.ros.runtime.parameters import declarations
+from robosc.targets.ros1 import package as ros1
+from robosc.targets.ros1_cpp import package as ros1_cpp
+from robosc.targets.ros2 import package as ros2
+from robosc.targets.ros2_cpp import package as ros2_cpp
 from support.generated import example_supervisor
 from support.launch_stub import launch_actions
 from support.models import EXAMPLES, bundle_of
@@ -258,10 +263,69 @@ def test_what_it_cannot_do_is_refused_with_its_name(target: str, body: str, prob
 
 
 @pytest.mark.parametrize("target", TARGETS)
-def test_a_layer_is_refused(target: str) -> None:
+@pytest.mark.parametrize("name", ["line_follower/line_follower_layer", NAVIGATION])
+def test_the_package_of_a_layer_is_complete(target: str, name: str) -> None:
+    files = generate(example_supervisor(name, Deployment.LAYER), target)
+    package = ElementTree.fromstring(files["package.xml"]).findtext("name")
+    assert package == name.rpartition("/")[2] + "_layer"
+    assert "{% " not in "".join(files.values())
+    assert not any(path.startswith("test/") for path in files)
+    for path, text in files.items():
+        if path.endswith((".cpp", ".hpp", ".c", ".h")):
+            folder = (Path("/package") / path).parent
+            for included in re.findall(r'#include "([^"]+)"', text):
+                assert str((folder / included).resolve().relative_to("/package")) in files, (path, included)
+            assert not re.search(r"\brobot_[a-z]\w*_t\b", text), path
+            # Nothing in it decides.
+            assert not re.search(r"_tick\(|_POLICY_|get_data|on_fits", text), path
+    given = yaml.safe_load(files["config/parameters.yaml"])
+    values = given if target == "ros1-cpp" else given["/**"]["ros__parameters"]
+    assert "command_timeout" in values
+    assert "policy" not in values
+    for name_, default in values.items():
+        assert f"| `{name_}` | `{json.dumps(default)}` |" in files["README.md"]
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_layer_tells_the_names_of_both_sides(target: str) -> None:
+    files = generate(example_supervisor("line_follower/line_follower_layer", Deployment.LAYER), target)
+    for text in (files["README.md"], files["src/node.cpp"]):
+        assert "/supervised/cmd_vel" in text
+        assert "/supervised/scan" in text
+    arguments = ["/cmd_vel", "/supervised/cmd_vel"]
+    (launch,) = (path for path in files if path.startswith("launch/layer.launch"))
+    assert all(argument.removeprefix("/") in files[launch] for argument in arguments)
+    assert ":=".join(arguments) in files["README.md"]
+
+
+@pytest.mark.parametrize(("target", "python"), [("ros1-cpp", ros1), ("ros2-cpp", ros2)])
+def test_names_on_the_side_of_the_existing_controller_are_those_of_the_python_node(
+    target: str, python: ModuleType
+) -> None:
+    middleware = {"ros1-cpp": ros1_cpp, "ros2-cpp": ros2_cpp}[target].MIDDLEWARE
+    names = (["/scan", "volume"], ["/count", "move"])
+    assert middleware.remapped is not None
+    assert middleware.remapped(*names) == python.MIDDLEWARE.remapped(*names)
+    assert middleware.parts_of_actions == python.MIDDLEWARE.parts_of_actions
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_the_launch_file_of_a_layer_starts_it_and_the_existing_controller(target: str, tmp_path: Path) -> None:
     supervisor = example_supervisor("line_follower/line_follower_layer", Deployment.LAYER)
-    with pytest.raises(UnsupportedModelError, match=f"target {target}: .*this version generates controllers only"):
-        generate(supervisor, target)
+    files = generate(supervisor, target)
+    package = "line_follower_layer_layer"
+    if target == "ros1-cpp":
+        layer, controller = ElementTree.fromstring(files["launch/layer.launch"]).iter("node")
+        assert (layer.get("pkg"), layer.get("type")) == (package, "layer")
+        assert controller.find("remap") is not None
+        assert "OUTPUT_NAME layer" in files["CMakeLists.txt"]
+        return
+    write_files(files, tmp_path)
+    layer, controller = launch_actions(tmp_path / "launch/layer.launch.py", tmp_path)["Node"]
+    assert (layer.named["package"], layer.named["executable"]) == (package, "layer")
+    assert controller.named["remappings"]
+    assert f'"{package}::LayerNode"' in files["CMakeLists.txt"]
+    assert "add_executable(layer src/main.cpp)" in files["CMakeLists.txt"]
 
 
 @pytest.mark.parametrize(

@@ -419,6 +419,32 @@ private:
     std::map<int64_t, std::function<void(SharedFuture)>> pending_;
 };
 
+template <typename ServiceT>
+class Service {
+public:
+    using SharedPtr = std::shared_ptr<Service>;
+    using Request = typename ServiceT::Request;
+    using Response = typename ServiceT::Response;
+    using Callback = std::function<void(std::shared_ptr<rmw_request_id_t>, std::shared_ptr<Request>)>;
+
+    Service(const std::string& name, Callback callback) : name_(name)
+    {
+        stand_in::world().orders[{"ask_call", name}] = [callback](std::istream& in) {
+            const auto header = std::make_shared<rmw_request_id_t>();
+            in >> header->sequence_number;
+            callback(header, std::make_shared<Request>(stand_in::parsed<Request>(in)));
+        };
+    }
+
+    void send_response(rmw_request_id_t& req_id, Response& response)
+    {
+        stand_in::print("answer", name_, std::to_string(req_id.sequence_number) + " " + to_yaml(response, true));
+    }
+
+private:
+    std::string name_;
+};
+
 enum ParameterType : uint8_t {
     PARAMETER_NOT_SET,
     PARAMETER_BOOL,
@@ -646,6 +672,13 @@ public:
         const std::string& service_name, const QoS& = ServicesQoS(), CallbackGroup::SharedPtr = nullptr)
     {
         return std::make_shared<Client<ServiceT>>(resolved(service_name));
+    }
+
+    template <typename ServiceT, typename CallbackT>
+    typename Service<ServiceT>::SharedPtr create_service(const std::string& service_name, CallbackT&& callback,
+        const QoS& = ServicesQoS(), CallbackGroup::SharedPtr = nullptr)
+    {
+        return std::make_shared<Service<ServiceT>>(resolved(service_name), callback);
     }
 
 private:

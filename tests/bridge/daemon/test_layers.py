@@ -346,6 +346,7 @@ def test_in_standby_everything_is_held_back_and_what_was_awaited_is_answered(sce
     assert program.say(MessageRequested, "/cmd_vel", FORWARD) == [Blocked("/cmd_vel")]
     answered, blocked = program.say(CallRequested, "turn", "a", None)
     assert (answered, blocked) == (Answered("a", None, is_default=True), Blocked("/turn"))
+    assert isinstance(blocked, Blocked)
     assert blocked.why == "the bridge executes no supervisor"
     assert program.say(GoalRequested, "face", "g", None) == [GoalRejected("g"), Blocked("/face")]
     scene.daemon.post(OperatorCommand.START)

@@ -234,7 +234,7 @@ def test_a_received_integer_is_moved_into_its_range(value: Any, expected: int, u
 @pytest.mark.parametrize(
     ("identifier", "value", "what"),
     [
-        *(("level", value, "must be an integer") for value in (2.0, True, "4", NAN, [])),
+        *(("level", value, "must be an integer") for value in list[Any]((2.0, True, "4", NAN, []))),
         ("level", None, "level.response: value is missing, and cannot be unknown"),
         ("/scan", None, "scan.response: value is missing, and cannot be unknown"),
     ],

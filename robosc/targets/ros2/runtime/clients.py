@@ -315,7 +315,7 @@ class ActionGoals:
 
     def _await_result(self, goal_id: int, goal: _Goal, now_s: float) -> None:
         """End a goal whose server shows that it has ended, and gives no result."""
-        outcome = _OUTCOMES.get(getattr(goal.handle, 'status', None))
+        outcome = _OUTCOMES.get(getattr(goal.handle, 'status', 0))
         if outcome is None:
             return
         if goal.ended_s is None:

@@ -30,7 +30,7 @@ class Real(World):
         from rclpy.action import ActionClient
         from std_srvs.srv import SetBool
         from test_msgs.action import Fibonacci
-        from unique_identifier_msgs.msg import UUID
+        from unique_identifier_msgs.msg import UUID  # type: ignore[import-untyped]
 
         super().__init__(supervisor)
         self._peer = peer

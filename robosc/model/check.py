@@ -167,6 +167,10 @@ _FOLLOWING = frozenset(
 """Codes of what a part may seem to lack because it is not sound, or because another one is not."""
 
 
+_HIDING = frozenset({"invalid-character", "unclosed-comment", "unclosed-string"})
+"""Codes of what may hide any part of the text that follows."""
+
+
 def _broken(parsed: Parsed, bundle: Bundle) -> Checked:
     """Result for a text with errors of its grammar: these, and what is wrong with its sound parts."""
     if parsed.sound is None:
@@ -179,6 +183,7 @@ def _broken(parsed: Parsed, bundle: Bundle) -> Checked:
 def _with_sound_parts(parsed: Parsed, checker: "_RobotChecker") -> Checked:
     """The same once the sound parts are checked, without the findings that may follow from what is not there."""
     found = checker.findings.diagnostics
+    hidden = any(item.code in _HIDING for item in parsed.diagnostics)
     broken = {(item.location.file, item.location.line) for item in parsed.diagnostics if item.location is not None}
     unknown = Counter(_name_of(item, checker.bundle) for item in found if item.code == "unknown-name")
     words = Counter(WORD.findall(checker.bundle.main.text)) if unknown else Counter[str]()
@@ -187,7 +192,8 @@ def _with_sound_parts(parsed: Parsed, checker: "_RobotChecker") -> Checked:
     own = [
         item
         for item in found
-        if item.code not in _FOLLOWING
+        if not hidden
+        and item.code not in _FOLLOWING
         and not (item.code == "unknown-name" and _name_of(item, checker.bundle) in defined)
         and (item.location is None or (item.location.file, item.location.line) not in broken)
     ]

@@ -9,6 +9,7 @@ model is given to its run as a library path.
 import hashlib
 import json
 from collections.abc import Iterable, Mapping, Sequence
+from contextlib import suppress
 from itertools import zip_longest
 from pathlib import Path
 from typing import Any
@@ -20,6 +21,7 @@ from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.clock import ManualClock
 from robosc.execution.runtime.event_log import Entry, MemoryLog, plain
 from robosc.execution.runtime.executor import Executor
+from robosc.execution.runtime.protocol import MissingData
 from robosc.execution.runtime.settings import Settings
 from robosc.exploration import explore, graph_json
 from robosc.language import load_bundle
@@ -204,7 +206,8 @@ class Run:
             The stimulus, what was logged and sent, and the parts of the state that it changed.
         """
         logged, sent = len(self._log.entries), len(self._middleware.sent)
-        self._do(*stimulus)
+        with suppress(MissingData):
+            self._do(*stimulus)
         for kind, name, *rest in self._middleware.sent[sent:]:
             if kind in ("call", "goal"):
                 self.open[name] = rest[0]

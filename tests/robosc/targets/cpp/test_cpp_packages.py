@@ -276,7 +276,7 @@ def test_the_package_of_a_layer_is_complete(target: str, name: str) -> None:
             for included in re.findall(r'#include "([^"]+)"', text):
                 assert str((folder / included).resolve().relative_to("/package")) in files, (path, included)
             assert not re.search(r"\brobot_[a-z]\w*_t\b", text), path
-            # Nothing in it decides.
+            # It contains nothing that decides.
             assert not re.search(r"_tick\(|_POLICY_|get_data|on_fits", text), path
     given = yaml.safe_load(files["config/parameters.yaml"])
     values = given if target == "ros1-cpp" else given["/**"]["ros__parameters"]

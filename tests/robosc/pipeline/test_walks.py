@@ -65,9 +65,8 @@ def test_undo_and_redo_lead_where_a_run_that_begins_anew_leads(seed: int) -> Non
 
 def leaves_range(run: robosc.Run, event: str, given: object = NO_DATA) -> bool:
     """Return True if an event would take a synthesis variable out of its range, which synthesis does not let be."""
-    system = run._system
-    reading = system.read(event, None if given is NO_DATA else given)
-    successor = system._successor(system._events[event], reading.values.get)
+    system, reading = run._system, run._reading(event, given)
+    successor = system._successor(system._events[event], {}.get if reading is None else reading.values.get)
     return successor is not None and successor.leaves_range
 
 

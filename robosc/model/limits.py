@@ -94,6 +94,14 @@ class LimitBuilder:
                 f"Write the lower bound first: '{self._written(tree.high, high)}..{self._written(tree.low, low)}'.",
             )
             return None
+        if isinstance(wanted, IntegerType) and not _can_be_within(wanted, low, high):
+            self._findings.error(
+                "empty-limit",
+                f"no number of {type_text(wanted)} is in {low}..{high}",
+                tree.location,
+                "Let the bounds have a number in common with the type.",
+            )
+            return None
         return (Bound(path, low, high),)
 
     def _written(self, tree: syntax.Expression, value: float) -> str:
@@ -149,6 +157,11 @@ class LimitBuilder:
             )
             return None
         return float(value) if is_double else value
+
+
+def _can_be_within(type_: IntegerType, low: float, high: float) -> bool:
+    """Whether a type has a number from low to high."""
+    return (type_.low is None or type_.low <= high) and (type_.high is None or low <= type_.high)
 
 
 def check_together(

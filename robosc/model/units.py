@@ -85,12 +85,13 @@ def unique(names: list[syntax.Name], code: str, what: str, findings: Findings) -
     for name in names:
         earlier = first.setdefault(name.text.casefold(), name)
         if earlier is not name:
+            several = "properties" if what == "property" else f"{what}s"
             same = "" if earlier.text == name.text else f" (it differs from '{earlier.text}' only in case)"
             findings.error(
                 code,
                 f"the {what} '{name.text}' is defined twice{same}",
                 name.location,
-                f"Rename or remove one of the two {what}s: write '{_free_name(name.text, taken)}', for instance.",
+                f"Rename or remove one of the two {several}: write '{_free_name(name.text, taken)}', for instance.",
                 RelatedPlace(f"'{earlier.text}' is defined here first", earlier.location),
             )
 

@@ -19,6 +19,7 @@ from robosc.execution.runtime.layer import (
     Layer,
 )
 from robosc.execution.runtime.middleware_messages import is_finite
+from robosc.execution.runtime.protocol import MissingData
 from robosc.execution.runtime.runner import Status
 from robosc.execution.runtime.settings import Settings
 from robosc.expressions import DoubleType, Type
@@ -269,7 +270,11 @@ class LayerReference(Reference):
         datum, words = self._shared(types, lambda datum: datum)
         place = list(self.layout.received_topics).index(identifier)
         number = self.remember(datum)
-        self.executor.receive(identifier, datum)
+        try:
+            self.executor.receive(identifier, datum)
+        except MissingData:
+            self._let_time_pass(now)
+            return
         self._note_command(["m", now, place, number, *words])
 
     def _shared(self, types: list[Type], change: Callable[[Any], Any]) -> tuple[Any, list[object]]:

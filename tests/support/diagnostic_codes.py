@@ -17,8 +17,9 @@ NO_CODES = frozenset(
     {
         *("utf-8", "utf-8-sig", "robosc-supervisor", "explain-synthesis"),
         *("ssh-ed25519", "check-log", "convert-log", "until-finding", "site-functions", "bash-completion"),
-        # Words of Matplotlib and Foxglove, and a package.
+        # Packages of Debian that nodes depend on.
         "python3-yaml",
+        # Words of Matplotlib and Foxglove.
         *("triangle-up", "steps-post", "x-thin", "follow-none"),
         *(info.name for info in available_targets()),
     }

@@ -76,7 +76,7 @@ class Executor(Runner):
             if self._may_request:
                 if self._decisions.decide(now):
                     self._deadline_s = self._next_deadline(now)
-            elif self._safe_stop.reasons:
+            else:
                 self._safe_stop.retry()
         except Exception as error:
             self._fail(describe_error(error))

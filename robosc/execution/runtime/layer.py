@@ -14,6 +14,7 @@ from __future__ import annotations
 from typing import Any, Callable, Dict, Optional, Sequence, Tuple
 
 from robosc.execution.runtime.callers import Callers
+from robosc.execution.runtime.calls import Goal
 from robosc.execution.runtime.cancels import BY_CALLER
 from robosc.execution.runtime.clock import Clock
 from robosc.execution.runtime.command_timeouts import CommandTimeouts
@@ -40,7 +41,9 @@ _NOT_FINITE = 'a NaN or an infinity'
 _NOT_KNOWN = 'no message of the model'
 _NOT_WITHIN = 'no number is within all limits'
 _FAILED = 'the call failed or took too long'
-_SUPERVISOR = 'the supervisor cancelled it, or it took too long'
+_TOO_LONG = 'it took too long, or the layer began anew'
+_TURNED = 'the supervisor cancelled it: a requirement no longer holds'
+_CAME_TO_REST = 'it was cancelled, because the robot was stopped'
 _STILL_RUNNING = 'its last goal may still be under way'
 _OLD_GOALS = 'goals from before the restart have not ended'
 _AT_REST = {
@@ -247,6 +250,7 @@ class Layer(Runner):
                 self._notify(self._caller.pass_feedback, waiting.action, waiting.goal_id, data)
 
     def _take_end(self, goal_id: int, outcome: str, data: Any) -> None:
+        own = self._goals.find(goal_id)
         try:
             super()._take_end(goal_id, outcome, data)
         finally:
@@ -254,7 +258,7 @@ class Layer(Runner):
             waiting = None if self._goals.find(goal_id) else self._callers.close_goal(goal_id)
             if waiting is not None:
                 end = waiting.outcome(outcome)
-                why = 'its server: {}'.format(outcome) if end == 'aborted' else ''
+                why = _why_aborted(own, outcome) if end == 'aborted' else ''
                 self._notify(
                     self._caller.end_goal, waiting.action, waiting.goal_id, end, data, why
                 )
@@ -265,7 +269,7 @@ class Layer(Runner):
             self._notify(self._caller.answer_default, call.service, call.call_id, _FAILED)
         for goal in self._callers.close_failed_goals():
             self._notify(
-                self._caller.end_goal, goal.action, goal.goal_id, 'aborted', None, _SUPERVISOR
+                self._caller.end_goal, goal.action, goal.goal_id, 'aborted', None, _TOO_LONG
             )
 
     # Requests: why each is held back, or None if it went through.
@@ -402,6 +406,13 @@ class Layer(Runner):
             method(*arguments)
         except Exception as error:
             self._fail(describe_error(error))
+
+
+def _why_aborted(goal: Optional[Goal], outcome: str) -> str:
+    """Return why a goal that its caller did not cancel has ended as aborted for it."""
+    if goal is None or not goal.is_cancelling or outcome != 'cancelled':
+        return 'its server: {}'.format(outcome)
+    return _TURNED if goal.cancelled_by else _CAME_TO_REST
 
 
 def _sharing(infos: Sequence[CommunicationInfo], kind: str) -> Dict[str, Tuple[str, ...]]:

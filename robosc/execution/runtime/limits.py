@@ -92,5 +92,8 @@ def _with_number(message: Any, path: Tuple[str, ...], value: float) -> Any:
         part = None if message is None else message.get(name)
         return {**(message or {}), name: _with_number(part, rest, value)}
     changed = copy.copy(message)
-    setattr(changed, name, _with_number(getattr(message, name), rest, value))
+    part = getattr(message, name)
+    if isinstance(part, float):
+        value = float(value)  # A message of ROS takes nothing else, whatever the model says.
+    setattr(changed, name, _with_number(part, rest, value))
     return changed

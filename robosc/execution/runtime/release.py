@@ -147,6 +147,10 @@ class Releases:
         acting = self._acting.get(identifier)
         if is_default or acting is None or acting.request != request:
             self.sent(request, identifier, is_default, data)
+        elif data is not acting.data:
+            # In an earlier state other limits, or other conditions of its data, applied.
+            acting.data = data
+            acting.held = self._holds(request, data)
 
     def is_acting(self, identifier: str) -> bool:
         """Return True if the last message sent on a release identifier still acts."""

@@ -242,7 +242,7 @@ class Runner:
             return
         try:
             self._look_at_clock()
-            if self._safe_stop.reasons:
+            if not self._may_request:
                 self._safe_stop.retry()
         except Exception as error:
             self._fail(describe_error(error))

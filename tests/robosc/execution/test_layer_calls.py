@@ -218,6 +218,7 @@ def test_a_second_goal_is_blocked_while_the_first_is_under_way() -> None:
 def test_a_goal_that_ends_in_error_ends_as_aborted_for_the_caller(outcome: str) -> None:
     b = driving(is_accepted=outcome != "rejected")
     assert b.end(1, outcome) == end("aborted")
+    assert b.middleware.reasons == [f"its server: {outcome}"]
     assert b.events == ["drive.request", "drive.error", "drive.reset"]
     assert b.state("Driver") == "failed"
 
@@ -226,6 +227,7 @@ def test_a_goal_that_takes_too_long_is_cancelled_and_aborted_at_once() -> None:
     b = driving(action_timeout_s=2.0)
     assert b.wait(1.75) == []
     assert sorted(b.wait(0.25)) == [("cancel", "drive", 1), *end("aborted")]
+    assert b.middleware.reasons == ["it took too long, or the layer began anew"]
     # The caller learns no more of its server's answers.
     assert b.feedback(1, {"left": 0.5}) == []
     assert b.end(1, "succeeded", RESULT) == []
@@ -248,10 +250,18 @@ def test_a_goal_that_turns_against_its_requirements_is_cancelled_and_aborted() -
     assert b.entries("blocked")[0]["why"] == "its last goal may still be under way"
     assert b.feedback(1, {"left": 0.5}) == [("feedback", "drive", "g", {"left": 0.5})]
     assert b.end(1, "cancelled") == end("aborted")
+    assert b.middleware.reasons[-1] == "the supervisor cancelled it: a requirement no longer holds"
     assert b.events[-1] == "drive.cancel"
     assert b.entries("event")[-1]["controllable"] is True
     b.receive("safe", True)
     assert b.goal("drive", "h", GOAL) == [("goal", "drive", 2, GOAL), ("accept", "drive", "h")]
+
+
+def test_a_goal_that_a_stop_cancels_says_so() -> None:
+    b = driving()
+    b.executor.stop("SIGINT")
+    assert b.end(1, "cancelled") == end("aborted")
+    assert b.middleware.reasons == ["it was cancelled, because the robot was stopped"]
 
 
 def test_an_action_without_requirements_is_never_cancelled_by_the_supervisor() -> None:

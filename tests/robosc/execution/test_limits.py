@@ -47,6 +47,12 @@ def test_an_object_is_changed_in_a_copy() -> None:
     assert found.moved == ("linear.x: 2.0 -> 0.5",)
 
 
+def test_a_float_of_a_message_stays_a_float() -> None:
+    found = limited(SimpleNamespace(x=7.5), [(("x",), 0, 3)])
+    assert found is not None
+    assert isinstance(found.message.x, float)
+
+
 ROBOT = """robot R {
     interface sample use Twist from geometry_msgs
     interface ask use Ask from our_msgs
@@ -80,6 +86,15 @@ def test_a_controller_issues_what_is_within_its_limits_and_counts() -> None:
     sent = [item[2]["linear"]["x"] for item in b.middleware.sent if item[0] == "publish"]
     assert sent == [2.0, 1.0, 1.0]
     assert b.executor.counters.limited == 2
+
+
+def test_a_limit_that_returns_releases_what_was_sent_without_it() -> None:
+    b = Bench(system_of(ROBOT), policy="priority", priority=("go",))
+    for near in (2, 0):
+        b.receive("/near", near)
+        b.tick()
+    assert [item[2]["linear"]["x"] for item in b.middleware.sent] == [1.0, 2.0]
+    assert b.receive("/near", 2) == [("default", "/go")]
 
 
 def test_an_unknown_condition_applies_and_what_violates_a_limit_is_released() -> None:

@@ -281,6 +281,21 @@ def test_a_cancel_that_failed_is_tried_again(again: str) -> None:
     assert b.middleware.sent == [("cancel", "go", 1)]
 
 
+@pytest.mark.parametrize("again", ["tick", "watch"])
+def test_a_cancel_that_failed_is_tried_again_after_a_restart(again: str) -> None:
+    b = going()
+    b.executor.on_goal_accepted(1)
+    b.middleware.failing.add("cancel_goal")
+    b.executor.stop("SIGINT")
+    b.executor.restart()
+    assert b.status() is Status.WAITING
+    b.middleware.failing.clear()
+    b.middleware.sent.clear()
+    for _ in range(3):
+        getattr(b.executor, again)()
+    assert b.middleware.sent == [("cancel", "go", 1)]
+
+
 def test_a_stale_sensor_is_noticed_between_two_distant_decisions() -> None:
     b = bench(ROBOT, policy="priority", priority=("move",), period_s=60.0, max_age_s={"/scan": 0.25})
     b.receive("/scan", True)

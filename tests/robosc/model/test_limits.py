@@ -18,6 +18,7 @@ ROBOT = """robot R {{
         incoming message turn with type: double
         incoming message beep with type: none
         incoming message step with type: integer
+        incoming message gear with type: integer(0..3)
         outgoing message speed with type: double
         behaviour {{
             variable level: integer(0..3)
@@ -49,6 +50,8 @@ ROBOT = """robot R {{
         ("no-value-here", "error", "limit turn to 0.0..1.0 if §value > 0.5"),
         ("duplicate-property", "error", "limit drive to { linear: { x: 0.0..1.0, §x: 0.0..1.0 } }"),
         ("empty-limit", "error", "limit turn to §1.0..0.0"),
+        ("empty-limit", "error", "limit gear to §4..9"),
+        ("empty-limit", "error", "limit gear to §-2..-1"),
         ("empty-limit", "error", "limit turn to 0.0..1.0 §limit turn to 2.0..3.0"),
         ("empty-limit", "error", "limit turn to 0.0..1.0 if Base.idle §limit turn to 2.0..3.0 if Base.idle"),
         ("contradictory-limits", "warning", "limit turn to 0.0..1.0 §limit turn to 2.0..3.0 if Base.idle"),

@@ -65,7 +65,7 @@ def test_undo_and_redo_lead_where_a_run_that_begins_anew_leads(seed: int) -> Non
 
 def leaves_range(run: robosc.Run, event: str, given: object = NO_DATA) -> bool:
     """Return True if an event would take a synthesis variable out of its range, which synthesis does not let be."""
-    system, reading = run._system, run._reading(event, given)
+    system, reading = run._system, None if given is NO_DATA else run._reading(event, given)
     successor = system._successor(system._events[event], {}.get if reading is None else reading.values.get)
     return successor is not None and successor.leaves_range
 

@@ -249,13 +249,13 @@ class ActionGoals:
         if not self.is_ready():
             self._end(goal_id, 'lost')
             return
-        name = os.urandom(16)
+        goal = _Goal(os.urandom(16), frozenset(self._servers.look()), self._monotonic())
         future = self._client.send_goal_async(
             message,
             feedback_callback=self._feedback(goal_id),
-            goal_uuid=self._make_uuid(name),
+            goal_uuid=self._make_uuid(goal.uuid),
         )
-        self._goals[goal_id] = _Goal(name, frozenset(self._servers.look()), self._monotonic())
+        self._goals[goal_id] = goal
         future.add_done_callback(lambda done: self._answered(goal_id, done))
 
     def cancel(self, goal_id: int) -> None:

@@ -36,7 +36,7 @@ EXAMPLES = ("line_follower/line_follower_layer", "maze_solver/maze_solver", "nav
 
 EVERYTHING = """
 robot Everything {
-    interface twist use Twist from geometry_msgs
+    interface twist use Twist from some_msgs
     interface go use Go from some_msgs
     datatype object Vector { x: double  y: double }
     datatype object Twist { linear: Vector  gear: integer(0..3)  ranges: array(double) }

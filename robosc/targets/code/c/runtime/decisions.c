@@ -95,6 +95,14 @@ static bool issue(robot_t *r, int request, bool *is_issued)
             if (has_changed || is_default || r->acting[REQUESTS[request].topic].request != request) {
                 sent(r, request, is_default);
             }
+#if ROBOT_LIMIT_COUNT > 0
+            else if (!is_unchanging) {
+                /* In an earlier state other limits, or other conditions of its data, applied. */
+                robot_acting_t *acting = &r->acting[REQUESTS[request].topic];
+                memcpy(acting->numbers, r->numbers, sizeof acting->numbers);
+                (void)get_held(r, acting, acting->held);
+            }
+#endif
         }
 #endif
     }

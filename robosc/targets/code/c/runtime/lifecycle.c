@@ -180,7 +180,7 @@ void robot_tick(robot_t *r, uint64_t now_us)
 #if ROBOT_REQUEST_COUNT > 0
         guard(r, decide(r));
 #endif
-    } else if (is_at_rest(r)) {
+    } else {
         (void)retry(r);
     }
 }
@@ -192,7 +192,7 @@ void robot_watch(robot_t *r, uint64_t now_us)
         return;
     }
     look_at_clock(r, now_us);
-    if (is_at_rest(r)) {
+    if (!r->may_request) {
         (void)retry(r);
     }
 #if ROBOT_IS_LAYER

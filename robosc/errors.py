@@ -47,7 +47,7 @@ class Diagnostic:
         location: Place in the text, or None where no text is at hand (a missing file).
         fix: One sentence on how to fix it.
         related: Other places that explain the finding.
-        accepted: Why the text accepts the finding; None where it does not.
+        accepted: Reason for which the text accepts the finding; None where it does not.
     """
 
     severity: Severity

@@ -66,7 +66,7 @@ class Loading:
         )
 
     def robot(self) -> list[Moment]:
-        """What the robot did so far."""
+        """Return what the robot did so far."""
         lines = self.file.read_text().splitlines() if self.file.exists() else []
         found = [json.loads(line) for line in lines if line.endswith("}")]
         return [Moment(item["time"], item["what"], True) for item in found]

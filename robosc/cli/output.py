@@ -110,7 +110,7 @@ def report_check(
         arguments: Of the command.
         diagnostics: The findings.
         bundle: The texts, or None where they could not be read.
-        summary: What else is reported in JSON.
+        summary: Further parts of the report in JSON.
         accepted: Findings that the text accepts and that are to be shown, which change no status.
     """
     if arguments.json:

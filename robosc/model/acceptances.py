@@ -62,7 +62,7 @@ class Acceptance:
 
     Attributes:
         code: Code of the finding.
-        reason: Why it is meant; empty where the comment says none.
+        reason: Reason that the comment gives; empty where the comment says none.
         location: Place of the comment.
         line: Line, from 1, whose finding it accepts.
     """
@@ -109,7 +109,7 @@ def accept(
     Args:
         bundle: The texts.
         diagnostics: The findings.
-        is_judged: Whether an acceptance of a code that accepts nothing is found to be needless.
+        is_judged: True if an acceptance of a code that accepts nothing is found to be needless.
     """
     found = [item for file in bundle.files for item in acceptances(file)]
     if not found:

@@ -205,7 +205,7 @@ def _name_of(finding: Diagnostic, bundle: Bundle) -> str:
 def _checked(checker: "_RobotChecker", tree: syntax.File) -> Checked:
     findings = checker.findings
     model = checker.model()
-    # Where there are errors, other checks may not have been made.
+    # After errors, other checks may not have been made.
     diagnostics, accepted = accept(
         checker.bundle,
         sorted_diagnostics(findings.diagnostics),

@@ -37,7 +37,7 @@ class GoalWatch:
         """Return what is known of the goals in the system's state.
 
         Args:
-            before: What was known in the state before it.
+            before: Knowledge in the state before it.
         """
         is_stable = self._system.enabled_silent() is None
         found = {}

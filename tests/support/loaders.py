@@ -20,7 +20,7 @@ _SHOWN = ("event", "cancelling", "cancel_overdue", "fault", "stop")
 
 @dataclass(frozen=True)
 class Moment:
-    """Something that node or robot did.
+    """Act of the node or of the robot.
 
     Attributes:
         time_s: Time, in seconds.
@@ -34,7 +34,7 @@ class Moment:
 
 
 def of_node(entries: Iterable[Mapping[str, Any]]) -> list[Moment]:
-    """What a node did, by its event log."""
+    """Return what a node did, by its event log."""
     return [Moment(float(entry["time"]), _words(entry), False) for entry in entries if entry["kind"] in _SHOWN]
 
 
@@ -60,7 +60,7 @@ def check(moments: list[Moment], server: str, expected: str) -> None:
 
     Args:
         moments: All that node and robot did.
-        server: What the server does.
+        server: Behaviour of the server.
         expected: Words of the node about the end.
     """
     turning = False

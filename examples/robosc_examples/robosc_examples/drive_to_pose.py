@@ -46,7 +46,7 @@ class DriveToPose(Wheels):
             raise ParameterError("parameter 'frame' is empty; it must name the frame of the odometry")
         self._goal: tuple[object, Pose] | None = None
         self._end: Future | None = None
-        # How the goal ends once the robot stands, and the result's code.
+        # Outcome of the goal once the robot stands, and the result's code.
         self._outcome: tuple[str, int] | None = None
         self._server = ActionServer(
             self,
@@ -156,7 +156,7 @@ class DriveToPose(Wheels):
         if self.now_s() - self._progress_s > self._patience_s:
             if self._outcome is None:
                 self._finish("abort", NO_ODOMETRY)
-            # Nobody measures whether the robot stands.
+            # No measurement says whether the robot stands.
             self._conclude()
 
     def _finish(self, how: str, code: int = 0) -> None:

@@ -165,7 +165,7 @@ def test_a_program_that_goes_has_no_goals_of_the_last_run() -> None:
     scene.server.leave()
     scene.daemon.post(Order(OperatorCommand.START, "a test", answers.append))
     scene.live(0.5)
-    # What fails at once, again and again, keeps nothing else from happening.
+    # An action that fails at once, again and again, keeps nothing else from happening.
     assert answers == ["", ""]
     assert scene.events().count("travel.error") > 10
 

@@ -44,7 +44,7 @@ def findings(text: str) -> list[tuple[str, int]]:
             f"// robosc: accept shared-topic: yes\n// robosc: accept partial-update: no\n{PUSHED}",
             [("needless-acceptance", 5)],
         ),
-        # What only synthesis says is not judged by a check of the model.
+        # A finding of synthesis is not judged by a check of the model.
         (f"// robosc: accept competing-requests: maybe\n{PUSHED}", [("shared-topic", 5)]),
     ],
 )

@@ -129,7 +129,7 @@ def test_a_random_run_is_that_of_the_interpreter(seed: int) -> None:
         except robosc.EventNotPossibleError:
             assert (str(run.state), len(run)) == (before, length)
             blocked = event.is_controllable and not twin.enabled(event.name)
-            # What lacks data is not read at all.
+            # An event that lacks data is not read at all.
             with suppress(MissingData):
                 assert blocked or twin.step(event.name, twin.read(event.name, *arguments or [None])) is None
             continue

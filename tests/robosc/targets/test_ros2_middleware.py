@@ -61,7 +61,7 @@ def test_every_stamped_field_of_a_goal_gets_time_and_frame(monkeypatch: pytest.M
     from test_msgs.action import Fibonacci
 
     module: Any = types.ModuleType("plan_msgs.action")
-    # What asks after a goal is the same for all actions.
+    # The part that asks after a goal is the same for all actions.
     module.Plan = SimpleNamespace(Goal=GetPlan.Request, Result=GetPlan.Response, Feedback=Empty, Impl=Fibonacci.Impl)
     monkeypatch.setitem(sys.modules, "plan_msgs", types.ModuleType("plan_msgs"))
     monkeypatch.setitem(sys.modules, "plan_msgs.action", module)

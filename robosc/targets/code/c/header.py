@@ -467,7 +467,7 @@ def reply_head(layout: Layout, event: str) -> str:
 
 
 def _null_words(layout: Layout, identifier: str) -> str:
-    """What it means that there is no data, where data is handed over by its address."""
+    """Return what it means that there is no data, where data is handed over by its address."""
     model, events = layout.model, [item.event(EventKind.RESPONSE) for item in batch(layout, identifier)]
     types = [type_ for event in events if (type_ := event_data(model, event)) is not None]
     if not any(layout.is_by_pointer(type_) for type_ in types):

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import Counter
 from pathlib import Path
 from types import ModuleType
 from xml.etree import ElementTree
@@ -23,6 +24,7 @@ from robosc.targets.ros2_cpp import package as ros2_cpp
 from support.generated import example_supervisor
 from support.launch_stub import launch_actions
 from support.models import EXAMPLES, bundle_of
+from support.steward import steward
 
 TARGETS = ("ros1-cpp", "ros2-cpp")
 
@@ -276,7 +278,7 @@ def test_the_package_of_a_layer_is_complete(target: str, name: str) -> None:
             for included in re.findall(r'#include "([^"]+)"', text):
                 assert str((folder / included).resolve().relative_to("/package")) in files, (path, included)
             assert not re.search(r"\brobot_[a-z]\w*_t\b", text), path
-            # Nothing in it decides.
+            # A layer makes no decisions.
             assert not re.search(r"_tick\(|_POLICY_|get_data|on_fits", text), path
     given = yaml.safe_load(files["config/parameters.yaml"])
     values = given if target == "ros1-cpp" else given["/**"]["ros__parameters"]
@@ -334,3 +336,40 @@ def test_the_launch_file_of_a_layer_starts_it_and_the_existing_controller(target
 )
 def test_files_of_types_are_called_as_rosidl_calls_them(type_name: str, expected: str) -> None:
     assert file_name(type_name) == expected
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_requests_that_share_a_name_have_one_server_and_a_client_each(target: str) -> None:
+    text = generate(steward(Deployment.LAYER, on_ros1=target == "ros1-cpp"), target)["src/node.cpp"]
+    clients = re.findall(r"(ServiceCalls|ActionGoals)<.*> client_\d_;", text)
+    assert Counter(clients) == {"ServiceCalls": 4, "ActionGoals": 3}
+    assert len(re.findall(r"(?:CalledService|ServedAction)<.*> served_\d_;", text)) == 3
+    if target == "ros1-cpp":
+        # A call waits in a thread: one of each service of the model may be under way.
+        assert re.findall(r'served_\d_\(.*"(\S+)"\), .*>, (\d)\)', text) == [
+            ("/supervised/power", "2"),
+            ("/supervised/plan", "2"),
+        ]
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_every_number_with_a_limit_can_be_moved_in_a_message(target: str) -> None:
+    text = generate(steward(Deployment.LAYER, on_ros1=target == "ros1-cpp"), target)["src/node.cpp"]
+    numbers = "order" if target == "ros2-cpp" else "goal", "float64_value" if target == "ros2-cpp" else "tolerance"
+    places = re.findall(r"(\S+) = static_cast<std::decay_t", text)
+    assert Counter(places) == {
+        "sent.linear.x": 1,
+        "sent.angular.z": 2,
+        "basic_field(sent)": 2,
+        f"sent.{numbers[0]}": 2,
+        f"sent.{numbers[1]}": 2,
+    }
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_an_object_of_a_request_is_logged_only_with_a_part(target: str) -> None:
+    """A limit may give a part of it, and mostly does not."""
+    text = generate(steward(Deployment.CONTROLLER, on_ros1=target == "ros1-cpp"), target)["src/model.hpp"]
+    put = text[text.index("void put_request") :]
+    assert re.search(r"if \(request\.data\.walk\.angular\.has_z\) \{\s+out \+= .*angular", put)
+    assert "if (request.data.walk.linear.has_x || request.data.walk.angular.has_z) {" in put

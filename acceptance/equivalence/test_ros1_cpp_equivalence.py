@@ -108,7 +108,7 @@ def test_a_controller_with_shared_names_and_limits(tmp_path: Path, tmp_path_fact
 def test_calls_of_services_that_share_a_name_wait_beside_each_other(
     tmp_path: Path, tmp_path_factory: pytest.TempPathFactory
 ) -> None:
-    """In roscpp each waits in a thread; one more is refused at once."""
+    """Each call waits in a thread of roscpp; one more is refused at once."""
     made = make_supervisor(bundle_of(_PLANNERS), deployment=Deployment.LAYER)
     assert made.supervisor is not None, made.reason
     calls = [Action("ask_call", name, {"tolerance": far}) for name, far in (("near", 0.5), ("far", 2.0), ("near", 0.5))]

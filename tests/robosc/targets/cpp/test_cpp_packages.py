@@ -120,6 +120,8 @@ def test_the_readme_names_every_topic_and_says_how_far_it_was_tested(target: str
     ):
         assert f"| `{topic}` |" in text
     assert ("were not\nlinked to rclcpp itself" in text) is (target == "ros2-cpp")
+    layer = generate(example_supervisor(f"{FOLLOWER}_layer", Deployment.LAYER), target)["README.md"]
+    assert ("were not\nlinked to rclcpp itself" in layer) is (target == "ros2-cpp")
     assert "needs" in text
     services = generate(example_supervisor(NAVIGATION), target)["README.md"]
     assert "| `/calibrate` | `std_srvs/" in services

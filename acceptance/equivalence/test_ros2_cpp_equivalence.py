@@ -92,7 +92,7 @@ def test_a_layer_with_shared_names_and_limits(tmp_path: Path, tmp_path_factory: 
     seen = observe(supervisor, scenario)
     assert let_through(seen) == REQUESTS
     assert limited(seen) == LIMITED
-    program = compiled_once(supervisor, tmp_path_factory, *SANITIZERS)
+    program = compiled_once(supervisor, tmp_path_factory)
     compare(rclcpp_target(supervisor, program, tmp_path), scenario, seen)
 
 

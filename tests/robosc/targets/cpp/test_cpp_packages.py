@@ -325,9 +325,9 @@ def test_the_launch_file_of_a_layer_starts_it_and_the_existing_controller(target
         assert "OUTPUT_NAME layer" in files["CMakeLists.txt"]
         return
     write_files(files, tmp_path)
-    layer, controller = launch_actions(tmp_path / "launch/layer.launch.py", tmp_path)["Node"]
-    assert (layer.named["package"], layer.named["executable"]) == (package, "layer")
-    assert controller.named["remappings"]
+    started, existing = launch_actions(tmp_path / "launch/layer.launch.py", tmp_path)["Node"]
+    assert (started.named["package"], started.named["executable"]) == (package, "layer")
+    assert existing.named["remappings"]
     assert f'"{package}::LayerNode"' in files["CMakeLists.txt"]
     assert "add_executable(layer src/main.cpp)" in files["CMakeLists.txt"]
 

@@ -6,6 +6,7 @@ from random import Random
 
 import pytest
 
+from robosc.model.structure import Deployment
 from support import porter
 from support.equivalence.python_targets import observe
 from support.equivalence.random_scenarios import (
@@ -22,6 +23,7 @@ from support.equivalence.targets import compare
 from support.equivalence.worlds import robot_supervisor
 from support.generated import example_supervisor
 from support.rclcpp_nodes import SANITIZERS, compiled_once, courier, missing
+from support.steward import LIMITED, REQUESTS, let_through, limited, steward
 
 PACKAGES = ("geometry_msgs", "sensor_msgs", "std_srvs", "test_msgs")
 pytestmark = pytest.mark.skipif(missing(*PACKAGES) is not None, reason=str(missing(*PACKAGES)))
@@ -81,4 +83,24 @@ def test_services_and_actions(tmp_path: Path, tmp_path_factory: pytest.TempPathF
     asked = {(kind, name) for item in seen for kind, name, _ in item.issued}
     assert asked >= {("call", "power"), ("call", "wind"), ("goal", "count"), ("goal", "reach"), ("cancel", "count")}
     program = compiled_once(supervisor, tmp_path_factory, *SANITIZERS)
+    compare(rclcpp_target(supervisor, program, tmp_path), scenario, seen)
+
+
+def test_a_layer_with_shared_names_and_limits(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    supervisor = steward(Deployment.LAYER)
+    scenario = layer_node_scenario(supervisor, 6, 300)
+    seen = observe(supervisor, scenario)
+    assert let_through(seen) == REQUESTS
+    assert limited(seen) == LIMITED
+    program = compiled_once(supervisor, tmp_path_factory)
+    compare(rclcpp_target(supervisor, program, tmp_path), scenario, seen)
+
+
+def test_a_controller_with_shared_names_and_limits(tmp_path: Path, tmp_path_factory: pytest.TempPathFactory) -> None:
+    supervisor = steward(Deployment.CONTROLLER)
+    scenario = node_scenario(supervisor, 8, 200)
+    seen = observe(supervisor, scenario)
+    assert let_through(seen) == REQUESTS
+    assert limited(seen) == LIMITED
+    program = compiled_once(supervisor, tmp_path_factory)
     compare(rclcpp_target(supervisor, program, tmp_path), scenario, seen)

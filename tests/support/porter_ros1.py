@@ -51,7 +51,11 @@ WAITING, DONE = 2, 7
 
 def model() -> str:
     """The model's text."""
-    text = porter.MODEL
+    return of_ros1(porter.MODEL)
+
+
+def of_ros1(text: str) -> str:
+    """The text of a model whose action is of a type that ROS 1 has."""
     for old, new in _OTHER_TYPES.items():
         assert old in text
         text = text.replace(old, new)

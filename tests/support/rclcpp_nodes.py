@@ -122,7 +122,8 @@ def compiled_test(supervisor: Supervisor, folder: Path) -> Path:
 
 def compiled_once(supervisor: Supervisor, factory: pytest.TempPathFactory, *options: str) -> Path:
     """The same program for all tests of a run, which compile a robot with the same options."""
-    folder = shared(factory, f"ros2_cpp_{supervisor.model.name}", lambda folder: compiled(supervisor, folder, *options))
+    name = f"ros2_cpp_{supervisor.model.name}_{supervisor.deployment}"
+    folder = shared(factory, name, lambda folder: compiled(supervisor, folder, *options))
     return folder / PROGRAM
 
 

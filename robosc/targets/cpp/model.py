@@ -199,22 +199,30 @@ class Writer:
         )
 
     def _put_field(self, found: Field, place: str) -> list[str]:
-        if not isinstance(found.type, ObjectType):
-            return [f"if ({place}.{found.flag}) {{", f"    put_json(out, {place}.{found.value});", "} else {",
-                    '    out += "null";', "}"]  # fmt: skip
+        if isinstance(found.type, ObjectType):
+            is_given = _is_given(found, place)
+            put = self._put_parts(found, place)
+            return (
+                put
+                if is_given is None
+                else [f"if ({is_given}) {{", *indent(put), "} else {", '    out += "null";', "}"]
+            )
+        return [f"if ({place}.{found.flag}) {{", f"    put_json(out, {place}.{found.value});", "} else {",
+                '    out += "null";', "}"]  # fmt: skip
+
+    def _put_parts(self, found: Field, place: str) -> list[str]:
         lines = ['out += "{";', '[[maybe_unused]] const char* between = "";']
         for name, (member, part) in found.parts.items():
             key = json.dumps(name) + ":"
             put = [f"out += std::string(between) + {string_literal(key)};", 'between = ",";']
+            inner = f"{place}.{member}" if isinstance(part.type, ObjectType) else place
             if isinstance(part.type, ObjectType):
-                lines += ["{", *indent(put)]
-                lines += ["    {", *indent(self._put_field(part, f"{place}.{member}"), 2), "    }", "}"]
+                put += ["{", *indent(self._put_parts(part, inner)), "}"]
             else:
-                lines += [
-                    f"if ({place}.{part.flag}) {{",
-                    *indent([*put, f"put_json(out, {place}.{member});"]),
-                    "}",
-                ]
+                put.append(f"put_json(out, {place}.{member});")
+            is_given = _is_given(part, inner)
+            # An object may be given without a part of it.
+            lines += put if is_given is None else [f"if ({is_given}) {{", *indent(put), "}"]
         return [*lines, 'out += "}";']
 
     def _fill(self, item: Communication) -> list[str]:
@@ -475,6 +483,18 @@ def first_of(layout: Layout, item: Communication) -> Communication:
 def take_name(layout: Layout, event: str) -> str:
     """The function that takes an answer."""
     return f"take_{list(layout.events).index(event)}"
+
+
+def _is_given(found: Field, place: str) -> str | None:
+    """Return the condition under which a request's datum has a part; None if none of it can be given."""
+    if not isinstance(found.type, ObjectType):
+        return f"{place}.{found.flag}"
+    inner = (
+        (part, f"{place}.{member}" if isinstance(part.type, ObjectType) else place)
+        for member, part in found.parts.values()
+    )
+    tests = [test for part, where in inner if (test := _is_given(part, where)) is not None]
+    return " || ".join(tests) or None
 
 
 def _array(head: str, items: Iterable[str]) -> list[str]:

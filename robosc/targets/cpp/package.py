@@ -11,7 +11,7 @@ from robosc.model.structure import Communication, CommunicationKind, Deployment,
 from robosc.supervisor import Supervisor
 from robosc.targets.code import templates
 from robosc.targets.code.c.header import head, runtime_text
-from robosc.targets.code.c.layout import Layout
+from robosc.targets.code.c.layout import Layout, sharing
 from robosc.targets.code.c.package import generate as generate_c
 from robosc.targets.code.c.text import safe, string_literal
 from robosc.targets.code.c.unit import Unit, make_unit
@@ -300,6 +300,7 @@ def _server(unit: Unit, number: int, asked_of: tuple[Communication, ...], middle
         "caller": string_literal(callers_name("", item.identifier)),
         "ask": ask_name(layout, item),
         "served": next(place for place, other in enumerate(asked_of) if other.name == first_of(layout, item).name),
+        "sharing": len(sharing(model, item.kind, item.identifier)),
         "enumerator": layout.communications[item.name],
         "fill": fill_name(layout, item),
         "answer": take_name(layout, item.event(EventKind.RESPONSE)),

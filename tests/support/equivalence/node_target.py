@@ -114,7 +114,10 @@ class NodeTarget:
     def __init__(self, name: str, model: Model, surroundings: Surroundings, folder: Path, sight: Sight = FULL) -> None:
         self.name = name
         topics = {i.name: i.identifier for i in model.communications if i.kind is CommunicationKind.INCOMING_MESSAGE}
-        self.sight = replace(sight, topics=topics)
+        first: dict[str, str] = {}
+        servers = [i for i in model.communications if i.kind in (CommunicationKind.SERVICE, CommunicationKind.ACTION)]
+        names = {i.name: first.setdefault(i.identifier, i.name) for i in servers}
+        self.sight = replace(sight, topics=topics, names=names)
         self._surroundings = surroundings
         self._folder = folder
         self._read = 0

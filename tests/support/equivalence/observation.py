@@ -3,7 +3,7 @@
 import json
 import struct
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Any
 
 from robosc.execution.runtime.event_log import plain
@@ -58,6 +58,7 @@ class Sight:
 
     Attributes:
         topics: The topic of each message, for a target that does not show which of those on a topic was sent.
+        names: The first of the services or actions on each identifier, for a target that does not show which was asked.
         is_exact: False for a target seen over a middleware, with `topics`. The given properties are not visible then,
             a field may have less precision than the model's number, and topics have no order between them.
         log_keys: Parts of an entry of the log that it reports; None: all.
@@ -69,6 +70,7 @@ class Sight:
     """
 
     topics: Mapping[str, str] | None = None
+    names: Mapping[str, str] = field(default_factory=dict)
     is_exact: bool = False
     log_keys: frozenset[str] | None = None
     has_log: bool = True
@@ -124,7 +126,7 @@ def _seen(issued: Sequence[Issued], sight: Sight) -> list[Any]:
             found.append(["publish", name, {}])
         else:
             kind = "answer" if kind == "no answer" else kind
-            subject = sight.topics.get(name, name) if kind == "publish" else name
+            subject = sight.topics.get(name, name) if kind == "publish" else sight.names.get(name, name)
             found.append([kind, subject, {path: part for path, value in data.items() if (part := _on_wire(value))}])
     # A middleware keeps the order on each topic; between topics, the event log keeps it.
     return sorted(found, key=lambda item: item[:2])

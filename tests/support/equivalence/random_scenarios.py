@@ -337,8 +337,10 @@ def layer_node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scena
             action = dice.choice(cancels)
         else:
             action = drawn.message() if chance < 0.6 else drawn.asked()
-            if action is not None and action.do == "ask" and dice.random() < 0.1:
-                action = replace(action, data=_spoiled(action.data))
+            if action is not None and action.do == "ask":
+                kind = dice.random()
+                if kind < 0.2:
+                    action = replace(action, data=_with_numbers(action.data, _NAN if kind < 0.1 else 0.0))
         if action is None:
             break
         actions.append(action)
@@ -361,11 +363,11 @@ def layer_node_settings(model: Model) -> dict[str, Any]:
     }
 
 
-def _spoiled(data: Any) -> Any:
-    """The same with its numbers not finite."""
+def _with_numbers(data: Any, number: float) -> Any:
+    """The same with another number in the place of each that is no integer."""
     if isinstance(data, dict):
-        return {name: _spoiled(part) for name, part in data.items()}
-    return _NAN if isinstance(data, float) else data
+        return {name: _with_numbers(part, number) for name, part in data.items()}
+    return number if isinstance(data, float) else data
 
 
 def for_layer_node(supervisor: Supervisor, scenario: Scenario) -> Scenario:

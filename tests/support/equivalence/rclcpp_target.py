@@ -47,6 +47,7 @@ class StandInSurroundings:
         self._deployment = supervisor.deployment
         self._topics = {_on_ros(topic.identifier): topic for topic in topics(supervisor.model)}
         self._servers = {item.identifier: item for item in servers(supervisor.model)}
+        self._identifiers = {item.name: item.identifier for item in servers(supervisor.model)}
         self._program = program
         self._output = folder / "output.txt"
         self._errors = folder / "errors.txt"
@@ -86,7 +87,7 @@ class StandInSurroundings:
 
     def answer(self, action: Action) -> None:
         """Let a server do it."""
-        name = next(item.identifier for item in self._servers.values() if item.name == action.subject)
+        name = self._identifiers[action.subject]
         match action.do:
             case "reply":
                 self._order("answer", name, _line(action.data))
@@ -122,7 +123,7 @@ class StandInSurroundings:
         if kind == "publish":
             topic = self._topics.get(name)
             # A message without a field is printed as nothing.
-            return (kind, name, given(topic.interface, yaml.safe_load(text) or {})) if topic else None
+            return (kind, topic.identifier, given(topic.interface, yaml.safe_load(text) or {})) if topic else None
         return kind, self._servers[name].name, set_parts(yaml.safe_load(text)) if text else {}
 
     def settle(self) -> None:
@@ -145,7 +146,25 @@ class StandInSurroundings:
         self._input.close()
 
 
-class LayerSurroundings(StandInSurroundings):
+class RunningSurroundings(StandInSurroundings):
+    """A node that runs when the test begins: what is sent before is held, and decides nothing; a layer refuses it."""
+
+    def start(self, scenario: Scenario, folder: Path) -> None:
+        """Start the node, and wait until it runs."""
+        super().start(scenario, folder)
+        began = time.monotonic()
+        while not any(f": {word}" in self._output.read_text("utf-8") for word in RUNNING):
+            assert time.monotonic() < began + LIMIT_S, self._errors.read_text(errors="replace")
+            self.spin()
+
+    def stop(self) -> None:
+        """Stop by a signal; a goal whose server says nothing more makes the node end with 1."""
+        self._order("signal", str(int(signal.SIGTERM)))
+        errors = self._errors.read_text(errors="replace")
+        assert self._process.wait(LIMIT_S) == 0 or "may be running" in self._errors.read_text(errors="replace"), errors
+
+
+class LayerSurroundings(RunningSurroundings):
     """A layer and the test, which is the robot and the existing controller."""
 
     def __init__(self, supervisor: Supervisor, program: Path, folder: Path) -> None:
@@ -153,14 +172,6 @@ class LayerSurroundings(StandInSurroundings):
         self._callers = Callers()
         self._supervised = {_on_ros(callers_name("", topic.identifier)): topic for topic in self._topics.values()}
         self._offered = {callers_name("", item.identifier): item.name for item in self._servers.values()}
-
-    def start(self, scenario: Scenario, folder: Path) -> None:
-        """Start the node, and wait until it runs: what is sent before is refused."""
-        super().start(scenario, folder)
-        began = time.monotonic()
-        while not any(f": {word}" in self._output.read_text("utf-8") for word in RUNNING):
-            assert time.monotonic() < began + LIMIT_S, self._errors.read_text(errors="replace")
-            self.spin()
 
     def ask(self, action: Action) -> None:
         """Let the existing controller do it."""
@@ -170,17 +181,11 @@ class LayerSurroundings(StandInSurroundings):
             is_twist = topic.interface.type == "Twist"
             self._order("message", _on_ros(callers_name("", name)), _twist(data) if is_twist else _line(data))
             return
-        offered = next(place for place, item in self._offered.items() if item == name)
+        offered = callers_name("", self._identifiers[name])
         if action.do == "ask_cancel":
             self._order("ask_cancel", offered, str(self._callers.last(name)))
         else:
             self._order(action.do, offered, str(self._callers.next(name)), _line(data) or "0")
-
-    def stop(self) -> None:
-        """Stop by a signal; a goal whose server says nothing more makes the node end with 1."""
-        self._order("signal", str(int(signal.SIGTERM)))
-        errors = self._errors.read_text(errors="replace")
-        assert self._process.wait(LIMIT_S) == 0 or "may be running" in self._errors.read_text(errors="replace"), errors
 
     def _issued(self, line: str) -> Issued | None:
         kind, name, text = line.split(" ", 2)
@@ -286,6 +291,6 @@ def _line(data: Any) -> str:
 def rclcpp_target(supervisor: Supervisor, program: Path, folder: Path) -> NodeTarget:
     """The target `ros2-cpp`, compiled with the stand-in."""
     is_layer = supervisor.deployment is Deployment.LAYER
-    surroundings = (LayerSurroundings if is_layer else StandInSurroundings)(supervisor, program, folder)
+    surroundings = (LayerSurroundings if is_layer else RunningSurroundings)(supervisor, program, folder)
     sight = replace(IN_CPP, has_requests=not is_layer)
     return NodeTarget("ros2-cpp", supervisor.model, surroundings, folder / "events", sight)

@@ -84,15 +84,19 @@ class Ros1Surroundings:
         types: dict[str, str] = {}
         for item in servers(self._supervisor.model):
             name = re.sub("^~/", f"/{self._name}/", item.identifier)
-            self._servers[item.name] = name
             type_name = f"{linked[item.name].package}/{linked[item.name].interface}"
+            if item.kind is CommunicationKind.ACTION:
+                type_name = type_name.removesuffix("Action")
+            types[item.name] = type_name
+            is_offered = name in self._servers.values()
+            self._servers[item.name] = name
+            if is_offered:
+                continue
             if item.kind is CommunicationKind.SERVICE:
                 self._peer.serve(name, type_name)
             else:
-                type_name = type_name.removesuffix("Action")
                 # The end of a cancelled goal is a step of its own.
                 self._peer.act(name, type_name, ends_on_cancel=False)
-            types[item.name] = type_name
         if self._is_layer:
             basic = {i.name for i in self._supervisor.model.communications if not isinstance(i.feedback, ObjectType)}
             self._caller = Ros1Caller(self._peer, list(self._topics), types, self._servers, basic)
@@ -170,7 +174,7 @@ class Ros1Surroundings:
             if topic.published:
                 values = self._new("publish", topic.identifier, peer.values(topic.identifier))
                 found += [("publish", topic.identifier, given(topic.interface, value)) for value in values]
-        for name, on_ros in self._servers.items():
+        for on_ros, name in {on_ros: name for name, on_ros in self._servers.items()}.items():
             found += [
                 ("call", name, set_parts(item)) for item in self._new("call", name, peer.requests.get(on_ros, []))
             ]

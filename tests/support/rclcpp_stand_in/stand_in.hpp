@@ -25,9 +25,8 @@
 //   end                           the context ends, as by a signal to a container
 //
 // DATA depends on the type: the value of `data`, the ranges of a scan, `success` and `message` of a reply, `sequence`,
-// `order`, x, y and z of a point, of a twist
-// the parts of both vectors, the voltage of a battery, of odometry x, y, z and w of its orientation, speed and turn, four parts
-// of a test_msgs/NestedMessage.
+// `order`, `float64_value`, x, y and z of a point, of a twist the parts of both vectors, the voltage of a battery, of
+// odometry x, y, z and w of its orientation, speed and turn, four parts of a test_msgs/NestedMessage.
 
 #pragma once
 
@@ -64,6 +63,7 @@ STAND_IN_HAS(HasOdometry, child_frame_id)
 STAND_IN_HAS(HasNested, nested_different_pkg)
 STAND_IN_HAS(HasOrder, order)
 STAND_IN_HAS(HasTwist, linear.x)
+STAND_IN_HAS(HasBasicTypes, float64_value)
 
 template <class T>
 void read_list(std::istream& in, std::vector<T>& list)
@@ -97,6 +97,8 @@ M parsed(std::istream& in)
         read_list(in, message.sequence);
     } else if constexpr (HasOrder<M>::value) {
         in >> message.order;
+    } else if constexpr (HasBasicTypes<M>::value) {
+        in >> message.float64_value;
     } else if constexpr (HasTwist<M>::value) {
         std::vector<double> numbers;
         read_list(in, numbers);
@@ -189,7 +191,9 @@ inline void obey(const std::string& line)
         if (found == world().orders.end()) {
             std::cout << "no order: " << line << std::endl;
         } else {
-            found->second(in);
+            // The order may change what it does.
+            const Handler handler = found->second;
+            handler(in);
         }
     }
 }

@@ -70,10 +70,8 @@ robot_sent_t sent_of(const M& message)
 }
 
 #if ROBOT_SERVICE_COUNT > 0
-/* Threads in which calls of one service wait: one call is under way, others are refused at once. */
-constexpr std::uint32_t CALL_THREADS = 2;
-
-/* The calls of one service that the layer offers. roscpp waits for the answer in the thread of the call. */
+/* The calls of one service that the layer offers. roscpp waits for the answer in the thread of the call: of each service
+   of the model with its name one call may be under way, and one more is refused at once. */
 template <class Service>
 class CalledService {
 public:
@@ -81,8 +79,8 @@ public:
     using Response = typename Service::Response;
     using Ask = void (*)(robot_t*, std::uint64_t, std::uint32_t, const Request&, robot_sent_t, Notes&);
 
-    CalledService(std::shared_ptr<Shared> shared, const std::string& name, Ask ask)
-        : shared_(std::move(shared)), ask_(ask), spinner_(CALL_THREADS, &queue_)
+    CalledService(std::shared_ptr<Shared> shared, const std::string& name, Ask ask, std::uint32_t sharing)
+        : shared_(std::move(shared)), ask_(ask), spinner_(sharing + 1, &queue_)
     {
         const auto [handle, rest] = place(shared_, name);
         ros::NodeHandle own = handle;

@@ -2,6 +2,7 @@
 
 import json
 import re
+from collections import Counter
 from pathlib import Path
 from types import ModuleType
 from xml.etree import ElementTree
@@ -23,6 +24,7 @@ from robosc.targets.ros2_cpp import package as ros2_cpp
 from support.generated import example_supervisor
 from support.launch_stub import launch_actions
 from support.models import EXAMPLES, bundle_of
+from support.steward import steward
 
 TARGETS = ("ros1-cpp", "ros2-cpp")
 
@@ -118,6 +120,8 @@ def test_the_readme_names_every_topic_and_says_how_far_it_was_tested(target: str
     ):
         assert f"| `{topic}` |" in text
     assert ("were not\nlinked to rclcpp itself" in text) is (target == "ros2-cpp")
+    layer = generate(example_supervisor(f"{FOLLOWER}_layer", Deployment.LAYER), target)["README.md"]
+    assert ("were not\nlinked to rclcpp itself" in layer) is (target == "ros2-cpp")
     assert "needs" in text
     services = generate(example_supervisor(NAVIGATION), target)["README.md"]
     assert "| `/calibrate` | `std_srvs/" in services
@@ -334,3 +338,40 @@ def test_the_launch_file_of_a_layer_starts_it_and_the_existing_controller(target
 )
 def test_files_of_types_are_called_as_rosidl_calls_them(type_name: str, expected: str) -> None:
     assert file_name(type_name) == expected
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_requests_that_share_a_name_have_one_server_and_a_client_each(target: str) -> None:
+    text = generate(steward(Deployment.LAYER, on_ros1=target == "ros1-cpp"), target)["src/node.cpp"]
+    clients = re.findall(r"(ServiceCalls|ActionGoals)<.*> client_\d_;", text)
+    assert Counter(clients) == {"ServiceCalls": 4, "ActionGoals": 3}
+    assert len(re.findall(r"(?:CalledService|ServedAction)<.*> served_\d_;", text)) == 3
+    if target == "ros1-cpp":
+        # A call waits in a thread: one of each service of the model may be under way.
+        assert re.findall(r'served_\d_\(.*"(\S+)"\), .*>, (\d)\)', text) == [
+            ("/supervised/power", "2"),
+            ("/supervised/plan", "2"),
+        ]
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_every_number_with_a_limit_can_be_moved_in_a_message(target: str) -> None:
+    text = generate(steward(Deployment.LAYER, on_ros1=target == "ros1-cpp"), target)["src/node.cpp"]
+    numbers = "order" if target == "ros2-cpp" else "goal", "float64_value" if target == "ros2-cpp" else "tolerance"
+    places = re.findall(r"(\S+) = static_cast<std::decay_t", text)
+    assert Counter(places) == {
+        "sent.linear.x": 1,
+        "sent.angular.z": 2,
+        "basic_field(sent)": 2,
+        f"sent.{numbers[0]}": 2,
+        f"sent.{numbers[1]}": 2,
+    }
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_an_object_of_a_request_is_logged_only_with_a_part(target: str) -> None:
+    """A limit may give a part of it, and mostly does not."""
+    text = generate(steward(Deployment.CONTROLLER, on_ros1=target == "ros1-cpp"), target)["src/model.hpp"]
+    put = text[text.index("void put_request") :]
+    assert re.search(r"if \(request\.data\.walk\.angular\.has_z\) \{\s+out \+= .*angular", put)
+    assert "if (request.data.walk.linear.has_x || request.data.walk.angular.has_z) {" in put

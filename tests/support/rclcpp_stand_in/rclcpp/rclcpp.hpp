@@ -359,21 +359,7 @@ public:
     {
     }
 
-    explicit Client(const std::string& name) : name_(name)
-    {
-        stand_in::world().orders[{"answer", name}] = [this](std::istream& in) {
-            if (pending_.empty()) {
-                stand_in::print("nobody waits for", name_, "");
-                return;
-            }
-            Promise promise;
-            promise.set_value(std::make_shared<typename ServiceT::Response>(
-                stand_in::parsed<typename ServiceT::Response>(in)));
-            const auto callback = pending_.begin()->second;
-            pending_.erase(pending_.begin());
-            callback(promise.get_future().share());
-        };
-    }
+    explicit Client(const std::string& name) : name_(name) { listen(); }
 
     bool service_is_ready() const { return stand_in::world().servers[name_]; }
 
@@ -406,6 +392,8 @@ public:
     SharedFutureAndRequestId async_send_request(SharedRequest request, CallbackT&& callback)
     {
         const int64_t number = ++last_;
+        // Of several clients of a service the one that called last is answered.
+        listen();
         stand_in::print("call", name_, to_yaml(*request, true));
         pending_[number] = std::forward<CallbackT>(callback);
         return {{}, number};
@@ -414,6 +402,22 @@ public:
     bool remove_pending_request(int64_t request_id) { return pending_.erase(request_id) != 0U; }
 
 private:
+    void listen()
+    {
+        stand_in::world().orders[{"answer", name_}] = [this](std::istream& in) {
+            if (pending_.empty()) {
+                stand_in::print("nobody waits for", name_, "");
+                return;
+            }
+            Promise promise;
+            promise.set_value(std::make_shared<typename ServiceT::Response>(
+                stand_in::parsed<typename ServiceT::Response>(in)));
+            const auto callback = pending_.begin()->second;
+            pending_.erase(pending_.begin());
+            callback(promise.get_future().share());
+        };
+    }
+
     std::string name_;
     int64_t last_ = 0;
     std::map<int64_t, std::function<void(SharedFuture)>> pending_;

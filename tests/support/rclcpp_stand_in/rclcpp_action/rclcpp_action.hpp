@@ -66,43 +66,7 @@ public:
         ResultCallback result_callback;
     };
 
-    explicit Client(const std::string& name) : name_(name)
-    {
-        auto& orders = stand_in::world().orders;
-        orders[{"accept", name}] = [this](std::istream&) {
-            handle_ = std::make_shared<GoalHandle>();
-            options_.goal_response_callback(handle_);
-        };
-        orders[{"status", name}] = [this](std::istream& in) {
-            int status = 0;
-            in >> status;
-            handle_->status = static_cast<int8_t>(status);
-        };
-        orders[{"reject", name}] = [this](std::istream&) { options_.goal_response_callback(nullptr); };
-        orders[{"feedback", name}] = [this](std::istream& in) {
-            options_.feedback_callback(
-                handle_, std::make_shared<const Feedback>(stand_in::parsed<typename ActionT::Feedback>(in)));
-        };
-        orders[{"result", name}] = [this](std::istream& in) {
-            int code = 0;
-            in >> code;
-            WrappedResult result;
-            result.code = static_cast<ResultCode>(code);
-            result.result = std::make_shared<typename ActionT::Result>(stand_in::parsed<typename ActionT::Result>(in));
-            handle_.reset();
-            options_.result_callback(result);
-        };
-        orders[{"refuse", name}] = [this](std::istream& in) {
-            int code = 0;
-            in >> code;
-            const auto response = std::make_shared<CancelResponse>();
-            response->return_code = static_cast<int8_t>(code);
-            if (code == 0) {
-                response->goals_canceling.emplace_back();
-            }
-            cancel_callback_(response);
-        };
-    }
+    explicit Client(const std::string& name) : name_(name) { listen(); }
 
     bool action_server_is_ready() const { return stand_in::world().servers[name_]; }
 
@@ -110,6 +74,8 @@ public:
         const Goal& goal, const SendGoalOptions& options = SendGoalOptions())
     {
         options_ = options;
+        // Of several clients of an action the one that sent a goal last is answered.
+        listen();
         stand_in::print("goal", name_, to_yaml(goal, true));
         return {};
     }
@@ -126,6 +92,44 @@ public:
     }
 
 private:
+    void listen()
+    {
+        auto& orders = stand_in::world().orders;
+        orders[{"accept", name_}] = [this](std::istream&) {
+            handle_ = std::make_shared<GoalHandle>();
+            options_.goal_response_callback(handle_);
+        };
+        orders[{"status", name_}] = [this](std::istream& in) {
+            int status = 0;
+            in >> status;
+            handle_->status = static_cast<int8_t>(status);
+        };
+        orders[{"reject", name_}] = [this](std::istream&) { options_.goal_response_callback(nullptr); };
+        orders[{"feedback", name_}] = [this](std::istream& in) {
+            options_.feedback_callback(
+                handle_, std::make_shared<const Feedback>(stand_in::parsed<typename ActionT::Feedback>(in)));
+        };
+        orders[{"result", name_}] = [this](std::istream& in) {
+            int code = 0;
+            in >> code;
+            WrappedResult result;
+            result.code = static_cast<ResultCode>(code);
+            result.result = std::make_shared<typename ActionT::Result>(stand_in::parsed<typename ActionT::Result>(in));
+            handle_.reset();
+            options_.result_callback(result);
+        };
+        orders[{"refuse", name_}] = [this](std::istream& in) {
+            int code = 0;
+            in >> code;
+            const auto response = std::make_shared<CancelResponse>();
+            response->return_code = static_cast<int8_t>(code);
+            if (code == 0) {
+                response->goals_canceling.emplace_back();
+            }
+            cancel_callback_(response);
+        };
+    }
+
     std::string name_;
     SendGoalOptions options_;
     CancelCallback cancel_callback_;

@@ -68,7 +68,7 @@ def scenario_sizes(model: Path) -> tuple[CodeSize, ...]:
         return (CodeSize("model", None, why=str(error)),)
     size = model_size(bundle)
     try:
-        # Nothing of it is executed.
+        # The supervisor is not executed: only its code is counted.
         made = make_supervisor(bundle, allow_livelock=True, only_shown=True)
     except RoboscError as error:
         return (CodeSize("model", size.lines, size.files, str(error)),)

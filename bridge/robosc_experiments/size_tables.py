@@ -99,7 +99,8 @@ def picture(sizes: Sizes) -> bytes:
                 if size.name == summary.name and size.lines
             ]
             label = "model" if summary.is_model else f"{summary.name}: {summary.factors[1]:.1f} times"
-            axes.scatter(*zip(*places, strict=True), c=color, marker=marker, s=22, label=label, zorder=3)
+            lines, rows = [line for line, _ in places], [row for _, row in places]
+            axes.scatter(lines, rows, c=color, marker=marker, s=22, label=label, zorder=3)
         axes.set_yticks(range(len(titles)), titles, parse_math=False)
         axes.set_ylim(-0.7, len(titles) - 0.3)
         axes.set_xscale("log")

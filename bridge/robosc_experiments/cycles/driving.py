@@ -2,6 +2,7 @@
 
 import json
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -104,6 +105,19 @@ def _compiled(experiment: str, supervisor: Supervisor, move: Communication, fold
 def rclcpp_prefix() -> Path | None:
     """Return the folder in which rclcpp is installed; None: it is not."""
     return next((prefix for prefix in _prefixes() if (prefix / _CONFIGURATION).is_file()), None)
+
+
+def rclcpp_version() -> str | None:
+    """Return the version of the rclcpp that is installed, and where; None: there is none."""
+    prefix = rclcpp_prefix()
+    if prefix is None:
+        return None
+    try:
+        text = (prefix / "share" / "rclcpp" / "package.xml").read_text(encoding="utf-8", errors="replace")
+    except OSError:
+        text = ""
+    version = re.search(r"<version>\s*([^<\s]+)", text)
+    return f"{version[1] if version else 'unknown version'} in {prefix}"
 
 
 def _prefixes() -> list[Path]:

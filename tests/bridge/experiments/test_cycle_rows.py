@@ -12,6 +12,7 @@ import pytest
 from robosc.supervisor import Supervisor
 from robosc_experiments.cycles import driving, measure
 from robosc_experiments.cycles.driving import measured_driving, rclcpp_prefix
+from robosc_experiments.report import machine_facts
 from support.generated import example_supervisor
 
 NOT_INSTALLED = "rclcpp is not installed: no folder of AMENT_PREFIX_PATH or CMAKE_PREFIX_PATH has it"
@@ -65,8 +66,16 @@ def test_a_table_has_a_row_for_each_language_and_middleware(
     assert (found[2].median_us, found[4].median_us) == pytest.approx((6, 5))
 
 
+def test_a_report_names_the_version_of_rclcpp(prefix: Path) -> None:
+    assert machine_facts("2030-01-02")["rclcpp"] == f"unknown version in {prefix}"
+    text = "<package><name>rclcpp</name><version>28.1.6</version></package>"
+    (prefix / "share" / "rclcpp" / "package.xml").write_text(text, encoding="utf-8")
+    assert machine_facts("2030-01-02")["rclcpp"] == f"28.1.6 in {prefix}"
+
+
 def test_a_machine_without_rclcpp_has_no_row_of_it(supervisor: Supervisor) -> None:
     assert rclcpp_prefix() is None
+    assert "rclcpp" not in machine_facts("2030-01-02")
     assert measured_driving("rclcpp", "maze", supervisor, 1, 1) == NOT_INSTALLED
 
 
@@ -102,7 +111,7 @@ def test_a_program_is_built_with_the_rclcpp_that_is_installed(
     # Its own libraries come before those of wheels.
     assert program[:2] == ["/usr/bin/env", f"LD_LIBRARY_PATH={prefix / 'lib'}"]
     assert program[-2:] == ["2", "7"]
-    # Nothing is left to fill in.
+    # No place is left to fill in.
     assert not re.findall(r"@\w+@", files["CMakeLists.txt"] + files["driving.cpp"])
 
 

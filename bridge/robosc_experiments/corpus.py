@@ -38,8 +38,9 @@ def models_of(paths: Sequence[Path]) -> dict[str, Path]:
             path.stat()
             files = {path.stem: path}
         for name, file in files.items():
-            if found.setdefault(visible(name), file) != file:
-                found[visible(str(file))] = file
+            if file not in found.values():
+                # Two files may have one name.
+                found[visible(name) if visible(name) not in found else visible(str(file))] = file
     return found
 
 

@@ -274,7 +274,8 @@ def evaluated(
             cycles += _cycles(experiment, controller)
     for number, (name, model) in enumerate(models.items(), 1):
         say(f"lines of code, model {number} of {len(models)}: {name}")
-        sizes[name] = scenario_sizes(model)
+        # An experiment may have the name, too.
+        sizes[name if name not in sizes else visible(str(model))] = scenario_sizes(model)
     date = time.strftime("%Y-%m-%d", time.gmtime())
     return Report(tuple(runs), tuple(failures), tuple(cycles), sizes, machine_facts(date))
 

@@ -15,7 +15,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoes
 
 from robosc._version import __version__
 from robosc.event_logs import LogCheck
-from robosc_experiments.cycles.driving import rclcpp_version
+from robosc_experiments.cycles.rclcpp import rclcpp_version
 from robosc_experiments.cycles.times import CycleTimes
 from robosc_experiments.lines_of_code import COUNTER, CodeSize
 from robosc_experiments.size_tables import factor, missing, names, picture, summaries

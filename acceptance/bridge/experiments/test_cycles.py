@@ -7,8 +7,9 @@ from pathlib import Path
 import pytest
 
 from robosc.supervisor import Supervisor
-from robosc_experiments.cycles.driving import measured_driving, rclcpp_prefix
+from robosc_experiments.cycles.driving import measured_driving
 from robosc_experiments.cycles.measure import measure
+from robosc_experiments.cycles.rclcpp import rclcpp_prefix
 from robosc_experiments.cycles.times import PAPER
 from robosc_experiments.ros1 import missing
 from support.generated import example_supervisor

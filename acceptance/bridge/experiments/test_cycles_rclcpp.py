@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from robosc_experiments.cycles import driving
-from robosc_experiments.cycles.driving import measured_driving, rclcpp_prefix
+from robosc_experiments.cycles.driving import measured_driving
+from robosc_experiments.cycles.rclcpp import rclcpp_prefix
 from support.generated import example_supervisor
 from support.rclcpp_nodes import STAND_IN, missing
 

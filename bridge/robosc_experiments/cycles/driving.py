@@ -2,7 +2,6 @@
 
 import json
 import os
-import re
 import shutil
 import subprocess
 import sys
@@ -17,6 +16,7 @@ from robosc.targets.code.c.layout import make_layout
 from robosc.targets.code.naming import package_name
 from robosc.targets.cpp.model import fill_name
 from robosc_experiments.cycles.isolated import SCRIPTS, write_unit
+from robosc_experiments.cycles.rclcpp import VARIABLES, prefixes, rclcpp_prefix
 from robosc_experiments.cycles.times import LIMIT_S, OTHER, Samples, clear_scan
 from robosc_experiments.processes import Program
 from robosc_experiments.ros import Middleware
@@ -31,9 +31,6 @@ TOPIC = "/robosc_evaluation/cmd_vel"
 _HEADER = Path("/usr/include/ros/ros.h")
 _LIBRARIES = ("roscpp", "rosconsole", "roscpp_serialization", "rostime", "xmlrpcpp", "boost_system", "pthread", "m")
 _FLAGS = ("-O2", "-ffp-contract=off")
-_CONFIGURATION = Path("share", "rclcpp", "cmake", "rclcppConfig.cmake")
-_PREFIXES = ("AMENT_PREFIX_PATH", "CMAKE_PREFIX_PATH")
-"""Variables that name the folders in which CMake looks for the packages of a ROS 2."""
 
 
 def measured_driving(middleware: str, experiment: str, supervisor: Supervisor, runs: int, cycles: int) -> Samples | str:
@@ -102,34 +99,11 @@ def _compiled(experiment: str, supervisor: Supervisor, move: Communication, fold
     return (str(unit.parent / "driving"),)
 
 
-def rclcpp_prefix() -> Path | None:
-    """Return the folder in which rclcpp is installed; None: it is not."""
-    return next((prefix for prefix in _prefixes() if (prefix / _CONFIGURATION).is_file()), None)
-
-
-def rclcpp_version() -> str | None:
-    """Return the version of the rclcpp that is installed, and where; None: there is none."""
-    prefix = rclcpp_prefix()
-    if prefix is None:
-        return None
-    try:
-        text = (prefix / "share" / "rclcpp" / "package.xml").read_text(encoding="utf-8", errors="replace")
-    except OSError:
-        text = ""
-    version = re.search(r"<version>\s*([^<\s]+)", text)
-    return f"{version[1] if version else 'unknown version'} in {prefix}"
-
-
-def _prefixes() -> list[Path]:
-    named = [Path(part) for name in _PREFIXES for part in os.environ.get(name, "").split(os.pathsep) if part]
-    return [*dict.fromkeys((*named, Path(sys.prefix)))]
-
-
 def _built(experiment: str, supervisor: Supervisor, move: Communication, folder: Path) -> Sequence[str]:
     """Return the command of the program with rclcpp, which CMake finds and builds."""
     prefix = rclcpp_prefix()
     if prefix is None:
-        raise ScenarioError(f"rclcpp is not installed: no folder of {' or '.join(_PREFIXES)} has it")
+        raise ScenarioError(f"rclcpp is not installed: no folder of {' or '.join(VARIABLES)} has it")
     cmake, gcc, gxx = (shutil.which(name) for name in ("cmake", "gcc", "g++"))
     if cmake is None or gcc is None or gxx is None:
         raise ScenarioError("cmake, gcc or g++ is not installed")
@@ -137,7 +111,7 @@ def _built(experiment: str, supervisor: Supervisor, move: Communication, folder:
     text = (SCRIPTS / "driving_rclcpp.cmake").read_text(encoding="utf-8")
     text = text.replace("@flags@", " ".join(_FLAGS)).replace("@p@", unit.stem)
     (unit.parent / "CMakeLists.txt").write_text(text, encoding="utf-8")
-    found = ";".join(map(str, _prefixes()))
+    found = ";".join(map(str, prefixes()))
     compilers = (f"-DCMAKE_C_COMPILER={gcc}", f"-DCMAKE_CXX_COMPILER={gxx}")
     _call(unit.parent, [cmake, "-S", ".", "-B", "build", f"-DCMAKE_PREFIX_PATH={found}", *compilers])
     _call(unit.parent, [cmake, "--build", "build"])

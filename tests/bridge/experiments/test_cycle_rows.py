@@ -11,7 +11,8 @@ import pytest
 
 from robosc.supervisor import Supervisor
 from robosc_experiments.cycles import driving, measure
-from robosc_experiments.cycles.driving import measured_driving, rclcpp_prefix
+from robosc_experiments.cycles.driving import measured_driving
+from robosc_experiments.cycles.rclcpp import rclcpp_prefix
 from robosc_experiments.report import machine_facts
 from support.generated import example_supervisor
 

@@ -141,9 +141,11 @@ def test_models_are_files_and_folders(capsys: pytest.CaptureFixture[str], monkey
     monkeypatch.setattr(evaluate, "_sizes", lambda experiment: (sizes, None))
     write_corpus(Path("mine"))
     options = ("--no-runs", "--no-cycles", "--experiment", "maze", "--models", "mine/robots/recorded.rscd")
-    assert call(*options, "--models", "mine/robots", "--json") == 0
-    # The same file is counted once; a model with a recording that has no run is left out of a folder, not by name.
-    assert list(json.loads(capsys.readouterr().out)["lines_of_code"]) == ["maze", "recorded", "new"]
+    Path("mine/maze.rscd").write_text("robot", encoding="utf-8")
+    assert call(*options, "--models", "mine", "--json") == 0
+    # A file is counted once; one with a recording that has no run is left out of a folder, not by name.
+    found = json.loads(capsys.readouterr().out)["lines_of_code"]
+    assert list(found) == ["maze", "recorded", "mine/maze.rscd", "robots/new"]
     assert call(*options, "--models", "mine/robots/broken.rscd", "-o", "here") == 0
     assert capsys.readouterr().out.splitlines()[:2] == [
         "lines of code, times the model's (medians of 3): cif 1.5",

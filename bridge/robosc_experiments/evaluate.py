@@ -35,7 +35,7 @@ _MODULES = "robosc_experiments"
 _DESCRIPTION = """\
 Run the paper's experiments whole: a maze solver and a line follower, each a supervisor that drives a simulated robot in
 real time or faster. Write one report with pictures and tables: sequences of events, every log checked against its
-supervisor, the robot's motion against the requirements, times of a control cycle, lines of code.
+supervisor, the robot's motion against the requirements, times of a control cycle, lines of code of all scenarios.
 """
 
 _EPILOG = """\
@@ -125,6 +125,16 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
     parser.add_argument(
         "--no-cycles", action="store_true", help="do not measure control cycles, which takes a minute or two"
     )
+    parser.add_argument(
+        "--models",
+        type=Path,
+        action="append",
+        metavar="PATH",
+        default=[],
+        help="also count the lines of code of this model, or of every model in this folder (may be repeated; default: "
+        "every model of the corpus with a recorded run, unless --experiment chooses; a few seconds for each)",
+    )
+    parser.add_argument("--no-runs", action="store_true", help="do not let robots drive: measure and count only")
     parser.add_argument("--json", action="store_true", help="print one JSON document for machines")
     parser.set_defaults(run=run)
 
@@ -164,9 +174,17 @@ def run(arguments: argparse.Namespace) -> int:
     connections: Sequence[str] = list(dict.fromkeys(arguments.connection)) or ["serial"]
     if arguments.scene is not None and len(names) > 1:
         raise UsageError("--scene is the world of one experiment: name it with --experiment")
+    from robosc_experiments.corpus import CORPUS, models_of
     from robosc_experiments.processes import interruptible
     from robosc_experiments.report import write_report
 
+    wanted: Sequence[Path] = arguments.models
+    if not wanted and not arguments.experiment and CORPUS.is_dir():
+        wanted = [CORPUS]
+    try:
+        models = models_of(wanted)
+    except OSError as error:
+        raise UsageError(f"cannot read {error.filename}: {error.strerror or error}") from error
     folder: Path = arguments.output
     progress = ProgressLine()
     try:
@@ -180,6 +198,8 @@ def run(arguments: argparse.Namespace) -> int:
                 scene=arguments.scene,
                 speed=arguments.speed,
                 seed=arguments.seed,
+                models=models,
+                has_runs=not arguments.no_runs,
                 has_cycles=not arguments.no_cycles,
                 say=progress.show,
             )
@@ -203,6 +223,8 @@ def evaluated(
     scene: str | None,
     speed: float | None,
     seed: int,
+    models: Mapping[str, Path],
+    has_runs: bool,
     has_cycles: bool,
     say: Callable[[str], None],
 ) -> "Report":
@@ -215,16 +237,19 @@ def evaluated(
         scene: The world; None: each experiment's own ones.
         speed: Speed of the world, as a multiple of the clock's; None: each experiment's own.
         seed: Seed of what a scene leaves to chance.
+        models: More models whose lines of code are counted, by name.
+        has_runs: True if the experiments are run; else only their code is looked at.
         has_cycles: True if control cycles are measured.
         say: Function that takes lines of progress.
     """
+    from robosc_experiments.corpus import scenario_sizes
     from robosc_experiments.report import Report, machine_facts
 
     runs: list[ReportedRun] = []
     failures: list[FailedRun] = []
     cycles: list[CycleTimes] = []
     sizes: dict[str, tuple[CodeSize, ...]] = {}
-    for experiment in experiments:
+    for experiment in experiments if has_runs else ():
         for connection, place in product(connections, experiment.scenes if scene is None else (scene,)):
             title = f"{experiment.name} over {connection}, {place}"
             found = _run(
@@ -247,6 +272,10 @@ def evaluated(
         if has_cycles:
             say(f"{experiment.name}: control cycles")
             cycles += _cycles(experiment, controller)
+    for number, (name, model) in enumerate(models.items(), 1):
+        say(f"lines of code, model {number} of {len(models)}: {name}")
+        # An experiment may have the name, too.
+        sizes[name if name not in sizes else visible(str(model))] = scenario_sizes(model)
     date = time.strftime("%Y-%m-%d", time.gmtime())
     return Report(tuple(runs), tuple(failures), tuple(cycles), sizes, machine_facts(date))
 
@@ -405,15 +434,36 @@ def _document(report: "Report", files: Sequence[Path]) -> dict[str, object]:
         "not_run": [
             {"experiment": item.experiment, "connection": item.connection, "why": item.why} for item in report.failures
         ],
+        "cycles": [
+            {
+                "experiment": times.experiment,
+                "what": times.what,
+                "has_middleware": times.has_middleware,
+                "cycles": times.count,
+                "median_us": None if times.microseconds is None else times.median_us,
+                "not_measured": times.why,
+            }
+            for times in report.cycles
+        ],
+        "lines_of_code": {
+            name: {size.name: {"lines": size.lines, "files": size.files, "why_not": size.why} for size in members}
+            for name, members in report.sizes.items()
+        },
     }
 
 
 def _print(report: "Report", files: Sequence[Path]) -> None:
+    from robosc_experiments.size_tables import summaries
+
     lines = [
         f"{run.experiment} over {run.connection}, {run.scene}: {run.check.events} events, log: {run.log_verdict}, "
         f"motion: {run.motion_verdict}"
         for run in report.runs
     ]
     lines += [f"{item.experiment} over {item.connection}: not run: {item.why}" for item in report.failures]
+    found = [each for each in summaries(report.sizes) if not each.is_model]
+    if found:
+        medians = ", ".join(f"{each.name} {each.factors[1]:.1f}" for each in found)
+        lines.append(f"lines of code, times the model's (medians of {len(report.sizes)}): {medians}")
     lines += [report.verdict, *map(str, files[:2])]
     sys.stdout.write("".join(f"{visible(line)}\n" for line in lines))

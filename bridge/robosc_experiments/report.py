@@ -15,8 +15,10 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined, select_autoes
 
 from robosc._version import __version__
 from robosc.event_logs import LogCheck
+from robosc_experiments.cycles.rclcpp import rclcpp_version
 from robosc_experiments.cycles.times import CycleTimes
 from robosc_experiments.lines_of_code import COUNTER, CodeSize
+from robosc_experiments.size_tables import factor, missing, names, picture, summaries
 
 TITLES: Mapping[str, str] = {"maze": "Maze solver", "line": "Line follower"}
 
@@ -100,7 +102,7 @@ class Report:
         runs: Scenarios that were run.
         failures: Those that could not be.
         cycles: Times of control cycles.
-        sizes: Lines of code by experiment, the model first.
+        sizes: Lines of code by experiment or name of a model, each with the model first.
         machine: Machine that it was run on: facts by name.
     """
 
@@ -120,6 +122,8 @@ class Report:
         """All of it in one sentence."""
         wrong = len(self.failures) + sum(not run.has_passed for run in self.runs)
         count = len(self.runs) + len(self.failures)
+        if not count:
+            return "No scenario was run."
         if not wrong:
             return f"Nothing was wrong in {count} scenario{'s' * (count != 1)}."
         return f"Something was wrong in {wrong} of {count} scenarios."
@@ -173,8 +177,8 @@ def write_report(report: Report, folder: Path) -> tuple[Path, ...]:
             _cycle_rows(report.cycles),
         )
     if report.sizes:
-        files["lines_of_code.csv"] = _csv(("experiment", "what", "lines", "files"), _size_rows(report.sizes))
-        files[_SIZES_PICTURE] = _bars(report.sizes)
+        files["lines_of_code.csv"] = _csv(("experiment", "what", "lines", "files", "why_not"), _size_rows(report.sizes))
+        files[_SIZES_PICTURE] = picture(_titled(report.sizes))
     for name, content in files.items():
         (folder / name).write_bytes(content)
     return tuple(folder / name for name in files)
@@ -201,6 +205,8 @@ def machine_facts(date: str) -> dict[str, str]:
         except (OSError, subprocess.SubprocessError):
             version = "unknown\n"
         facts["gcc"] = version.splitlines()[0]
+    if (rclcpp := rclcpp_version()) is not None:
+        facts["rclcpp"] = rclcpp
     return facts
 
 
@@ -224,6 +230,9 @@ def _values(report: Report) -> dict[str, Any]:
         "cycles": _shown_cycles(report.cycles),
         "cycles_note": f"here {max(counts)} cycles in 3 runs." if counts else "nothing could be measured here.",
         "sizes": _shown_sizes(report.sizes),
+        "size_names": names(report.sizes),
+        "size_summaries": summaries(report.sizes),
+        "size_missing": missing(_titled(report.sizes)),
         "sizes_picture": _SIZES_PICTURE,
         "counter": COUNTER,
     }
@@ -252,16 +261,21 @@ def _shown_cycles(cycles: Iterable[CycleTimes]) -> list[dict[str, Any]]:
     return found
 
 
-def _shown_sizes(sizes: Mapping[str, Sequence[CodeSize]]) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = []
-    for experiment, members in sizes.items():
-        model = members[0].lines or 1
-        for size in members:
-            factor = "" if size.lines is None else f"{size.lines / model:.1f}"
-            found.append({
-                "title": TITLES[experiment], "name": size.name, "lines": size.lines, "files": size.files,
-                "factor": factor, "why": size.why,
-            })  # fmt: skip
+def _titled(sizes: Mapping[str, Sequence[CodeSize]]) -> dict[str, Sequence[CodeSize]]:
+    return {TITLES.get(name, name): members for name, members in sizes.items()}
+
+
+def _shown_sizes(sizes: Mapping[str, Sequence[CodeSize]]) -> list[tuple[str, list[str]]]:
+    """Rows of Figure 13: a scenario, and for everything its lines and how many times the model's these are."""
+    found = []
+    columns = names(sizes)
+    for title, members in _titled(sizes).items():
+        cells = {
+            size.name: str(size.lines) if size is members[0] else f"{size.lines} ({factor(members, size):.1f})"
+            for size in members
+            if size.lines is not None
+        }
+        found.append((title, [cells.get(name, "–") for name in columns]))
     return found
 
 
@@ -291,7 +305,7 @@ def _cycle_rows(cycles: Iterable[CycleTimes]) -> Iterable[tuple[object, ...]]:
 def _size_rows(sizes: Mapping[str, Sequence[CodeSize]]) -> Iterable[tuple[object, ...]]:
     for experiment, members in sizes.items():
         for size in members:
-            yield experiment, size.name, "" if size.lines is None else size.lines, size.files
+            yield experiment, size.name, "" if size.lines is None else size.lines, size.files, size.why
 
 
 def _csv(header: Sequence[str], rows: Iterable[Sequence[object]]) -> bytes:
@@ -308,34 +322,3 @@ def _cell(text: object) -> str:
     for char in "\\|`*_[]<>":
         kept = kept.replace(char, f"\\{char}")
     return kept
-
-
-def _bars(sizes: Mapping[str, Sequence[CodeSize]]) -> bytes:
-    """Lines of code as a bar chart, each bar with its number."""
-    import matplotlib as mpl
-    from matplotlib.figure import Figure
-
-    names = list(dict.fromkeys(size.name for members in sizes.values() for size in members))
-    # Tones that colour-blind readers can tell apart, with hatching beside them.
-    styles = (("#0072B2", ""), ("#E69F00", "//"))
-    width = 0.8 / max(len(sizes), 1)
-    with mpl.rc_context({"font.family": "DejaVu Sans", "font.size": 9}):
-        figure = Figure(figsize=(10, 4.5), layout="constrained", facecolor="white")
-        axes = figure.add_subplot()
-        for number, (experiment, members) in enumerate(sizes.items()):
-            color, hatch = styles[number % len(styles)]
-            lines = {size.name: size.lines or 0 for size in members}
-            places = [place + (number - (len(sizes) - 1) / 2) * width for place in range(len(names))]
-            heights = [lines.get(name, 0) for name in names]
-            bars = axes.bar(
-                places, heights, width, color=color, hatch=hatch, edgecolor="white", label=TITLES[experiment]
-            )
-            axes.bar_label(bars, labels=[str(height) if height else "–" for height in heights], padding=2, fontsize=7)
-        axes.set_xticks(range(len(names)), names)
-        axes.set_ylabel("lines of code")
-        axes.spines[["top", "right"]].set_visible(False)
-        # At the "best" place it would cover nothing, but take a slow machine long to find, which matplotlib warns of.
-        figure.legend(loc="outside upper right", ncols=2, frameon=False)
-        content = io.BytesIO()
-        figure.savefig(content, format="png", dpi=130, metadata={"Software": "RoboSC"})
-    return content.getvalue()

@@ -9,6 +9,7 @@ import pytest
 from robosc.supervisor import Supervisor
 from robosc_experiments.cycles.driving import measured_driving
 from robosc_experiments.cycles.measure import measure
+from robosc_experiments.cycles.rclcpp import rclcpp_prefix
 from robosc_experiments.cycles.times import PAPER
 from robosc_experiments.ros1 import missing
 from support.generated import example_supervisor
@@ -17,6 +18,7 @@ FORMS = (
     ("generated C, gcc -O2", False),
     ("generated Python", False),
     ("generated C, roscpp", True),
+    ("generated C, rclcpp", True),
     ("generated Python, rclpy", True),
     ("generated Python, rospy", True),
 )
@@ -31,7 +33,8 @@ def test_cycles_are_measured(experiment: str, model: str) -> None:
     found = measure(experiment, example_supervisor(model), runs=1, cycles=60)
     assert [(times.what, times.has_middleware) for times in found] == list(FORMS)
     has_ros1, has_ros2 = missing() is None, importlib.util.find_spec("rclpy") is not None
-    is_there = (HAS_GCC, True, HAS_ROSCPP and has_ros1, has_ros2, has_ros1)
+    has_rclcpp = all(map(shutil.which, ("gcc", "g++", "cmake"))) and rclcpp_prefix() is not None
+    is_there = (HAS_GCC, True, HAS_ROSCPP and has_ros1, has_rclcpp and has_ros2, has_ros2, has_ros1)
     for times, is_expected in zip(found, is_there, strict=True):
         assert times.paper == PAPER[experiment, times.has_middleware]
         if times.microseconds is None:
@@ -51,7 +54,7 @@ def supervisor() -> Supervisor:
 
 
 def test_a_model_without_velocities_has_no_cycles_with_middleware() -> None:
-    for middleware in ("rclpy", "rospy", "roscpp"):
+    for middleware in ("rclpy", "rospy", "roscpp", "rclcpp"):
         found = measured_driving(middleware, "maze", example_supervisor("navigation/navigation"), 1, 1)
         assert found == "its model sends no velocities"
 

@@ -7,6 +7,7 @@ from robosc_experiments.cycles.times import CYCLES, RUNS, CycleTimes, cycle_time
 
 _WITH_MIDDLEWARE = (
     ("generated C, roscpp", "roscpp"),
+    ("generated C, rclcpp", "rclcpp"),
     ("generated Python, rclpy", "rclpy"),
     ("generated Python, rospy", "rospy"),
 )

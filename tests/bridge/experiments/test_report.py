@@ -23,7 +23,11 @@ def report_of(*runs: ReportedRun, failures: tuple[FailedRun, ...] = ()) -> Repor
             CycleTimes("maze", "generated C, gcc -O2", False, (0.05, 0.04, 0.4, 0.01), 3000, median_us=0.04),
             CycleTimes("maze", "generated Python, rclpy", True, None, why="rclpy is not installed"),
         ),
-        {"maze": (CodeSize("model", 80, 1), CodeSize("cif", 120, 1), CodeSize("ros1-cpp", None, why="no layers"))},
+        {
+            "maze": (CodeSize("model", 80, 1), CodeSize("cif", 120, 1), CodeSize("ros1-cpp", None, why="no layers")),
+            "robots/arm_$1": (CodeSize("model", 50, 2), CodeSize("cif", 125, 1), CodeSize("ros1-cpp", 1000, 9)),
+            "broken": (CodeSize("model", None, why="it is <not> there"),),
+        },
         machine_facts("2030-01-02"),
     )
 
@@ -51,7 +55,17 @@ def test_a_report_of_a_recorded_run_is_complete(tmp_path: Path) -> None:
     assert "| Maze solver | with | the paper's | 40 | 9 | 660 | 40 | – | – | 3000 |" in text
     assert "| Maze solver | without | generated C, gcc -O2 | 0.05 | 0.04 | 0.40 | 0.01 | 0.04 | – | 3000 |" in text
     assert "| Maze solver | without | the paper's | 2 | 0 | 139 | 7 | – | – | 3000 |" in text
-    assert "| Maze solver | cif | 120 | 1.5 | 1 |" in text
+    assert "| scenario | model | cif | ros1-cpp |" in text
+    assert "| Maze solver | 80 | 120 (1.5) | – |" in text
+    assert "| robots/arm\\_$1 | 50 | 125 (2.5) | 1000 (20.0) |" in text
+    assert "| broken | – | – | – |" in text
+    assert "| model | 2 | 65 |  | |  |" in text
+    assert "| cif | 2 | 122.5 | 1.5 | 2.0 | 2.5 |" in text
+    assert "| ros1-cpp | 1 | 1000 | 20.0 | 20.0 | 20.0 |" in text
+    assert "- Maze solver, ros1-cpp: no layers\n- broken, model: it is \\<not\\> there\n" in text
+    page = (tmp_path / "report.html").read_text(encoding="utf-8")
+    assert '<td>robots/arm_$1</td><td class="number">50</td><td class="number">125 (2.5)</td>' in page
+    assert "<li>broken, model: it is &lt;not&gt; there</li>" in page
     assert "RoboSC's own counter" in text
     # Every table of Markdown stands alone, between blank lines.
     blocks = text.split("\n\n")
@@ -64,7 +78,9 @@ def test_a_report_of_a_recorded_run_is_complete(tmp_path: Path) -> None:
     assert rows(tmp_path / "cycles.csv")[0] == heads
     assert [row[-1] for row in rows(tmp_path / "cycles.csv")[1:]] == ["here", "the paper", "here", "the paper"]
     assert rows(tmp_path / "lines_of_code.csv")[1:] == [
-        ["maze", "model", "80", "1"], ["maze", "cif", "120", "1"], ["maze", "ros1-cpp", "", "0"],
+        ["maze", "model", "80", "1", ""], ["maze", "cif", "120", "1", ""], ["maze", "ros1-cpp", "", "0", "no layers"],
+        ["robots/arm_$1", "model", "50", "2", ""], ["robots/arm_$1", "cif", "125", "1", ""],
+        ["robots/arm_$1", "ros1-cpp", "1000", "9", ""], ["broken", "model", "", "0", "it is <not> there"],
     ]  # fmt: skip
 
 

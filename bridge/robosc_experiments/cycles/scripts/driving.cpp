@@ -1,10 +1,8 @@
-/* Measures cycles of generated C that drives and publishes a Twist through roscpp. `@...@` is filled in.
+/* Measures cycles of generated C that drives and publishes a Twist through roscpp or rclcpp. `@...@` is filled in.
 
    Usage: driving RUNS CYCLES; prints a line of JSON: seconds of each `cycle`, and of each `publish` alone. */
+#include "driving_@middleware@.hpp"
 #include "model.hpp"
-
-#include <geometry_msgs/Twist.h>
-#include <ros/ros.h>
 
 #include <chrono>
 #include <cstdio>
@@ -19,15 +17,14 @@ constexpr double LIMIT_S = 20.0;
 constexpr auto PAUSE = std::chrono::milliseconds(1);
 const double ranges[] = {@ranges@};
 
-ros::Publisher publisher;
-geometry_msgs::Twist message;
+middleware::Twist message;
 
-bool publish(void *, const @p@_request_t *request)
+bool publish(void *context, const @p@_request_t *request)
 {
     if (request->communication == @communication@) {
-        message = geometry_msgs::Twist();
+        message = middleware::Twist();
         @package@::model::@fill@(*request, message);
-        publisher.publish(message);
+        static_cast<middleware::Publishing *>(context)->publish(message);
     }
     return true;
 }
@@ -64,14 +61,12 @@ void print(const char *name, const std::vector<double> &samples)
 
 int main(int argc, char **argv)
 {
-    ros::init(argc, argv, "measured");
     if (argc != 3) {
         return 2;
     }
-    ros::NodeHandle node;
-    publisher = node.advertise<geometry_msgs::Twist>("@topic@", 10);
+    middleware::Publishing publishing(argc, argv, "@topic@");
     const auto began = now();
-    while (publisher.getNumSubscribers() == 0) {
+    while (publishing.subscribers() == 0) {
         if (std::chrono::duration<double>(now() - began).count() > LIMIT_S) {
             std::fprintf(stderr, "no subscriber came\n");
             return 1;
@@ -79,6 +74,7 @@ int main(int argc, char **argv)
         std::this_thread::sleep_for(10 * PAUSE);
     }
     @p@_callbacks_t callbacks = @p@_callbacks_t();
+    callbacks.context = &publishing;
     callbacks.publish = publish;
     callbacks.publish_default = publish_default;
     @p@_data_Scan_t scan = @p@_data_Scan_t();
@@ -96,7 +92,7 @@ int main(int argc, char **argv)
         for (int number = -WARM_UP; number < std::atoi(argv[2]); number++) {
             @p@_receive_scan(&r, ++now_us, &scan);
             const double cycle_s = timed([&] { @p@_tick(&r, ++now_us); });
-            const double publish_s = timed([] { publisher.publish(message); });
+            const double publish_s = timed([&] { publishing.publish(message); });
             if (number >= 0) {
                 cycles.push_back(cycle_s);
                 alone.push_back(publish_s);

@@ -282,6 +282,9 @@ public:
     const char* get_topic_name() const { return topic_.c_str(); }
     QoS get_actual_qos() const { return qos_; }
 
+    // One always listens.
+    size_t get_subscription_count() const { return 1; }
+
     void publish(std::unique_ptr<MessageT> message) { publish(*message); }
 
     void publish(const MessageT& message) { stand_in::print("publish", topic_, to_yaml(message, true)); }
@@ -737,6 +740,11 @@ private:
     node_interfaces::NodeParametersInterface::SharedPtr parameters_;
     std::map<std::string, ParameterValue> declared_;
     std::map<std::string, bool> read_only_;
+};
+
+class Node : public StandInNode {
+public:
+    explicit Node(const std::string& node_name, const NodeOptions& = NodeOptions()) : StandInNode(node_name) {}
 };
 
 template <typename MessageT, typename NodeT>

@@ -160,7 +160,7 @@ class LimitBuilder:
 
 
 def _can_be_within(type_: IntegerType, low: float, high: float) -> bool:
-    """Whether a type has a number from low to high."""
+    """Return True if a type has a number from low to high."""
     return (type_.low is None or type_.low <= high) and (type_.high is None or low <= type_.high)
 
 

@@ -13,6 +13,7 @@ from robosc.controller_properties.controller import Controller, Node
 from robosc.controller_properties.search import search
 from robosc.controller_properties.silent_steps import always_end, never_conflict, never_forbids, stays_nonblocking
 from robosc.execution.interpreter import InterpretedSystem
+from robosc.execution.runtime.protocol import MissingData
 from robosc.model.structure import CommunicationKind, Deployment
 from robosc.supervisor import Supervisor
 from robosc.verification import verify_explicitly
@@ -138,7 +139,10 @@ def _after(system: InterpretedSystem, states: list[dict[Any, Any]], event: str) 
             system._state = state
             if is_ours and not system.enabled(event):
                 continue
-            reading = None if is_ours else system.read(event, data)
+            try:
+                reading = None if is_ours else system.read(event, data)
+            except MissingData:
+                continue
             if system.step(event, reading) is not None and system._state not in found:
                 found.append(system._state)
     return found

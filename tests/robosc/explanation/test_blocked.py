@@ -1,5 +1,6 @@
 """A request has a reason if and only if the interpreter, which executes supervisors, does not enable it."""
 
+from contextlib import suppress
 from random import Random
 from typing import Any
 
@@ -9,6 +10,7 @@ from hypothesis import given, settings
 
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.event_log import plain
+from robosc.execution.runtime.protocol import MissingData
 from robosc.explanation.blocked import MAXIMUM_REASONS, Requests, StateError, read_value
 from robosc.explanation.notation import MAXIMUM_NAMES
 from robosc.expressions import BooleanType, DoubleType, EnumType, IntegerType, StringType
@@ -39,7 +41,8 @@ def wander(supervisor: Supervisor, dice: Random, steps: int) -> Any:
         yield system
         event = dice.choice(events)
         # Events that the supervisor would not let through are taken, too: their states are judged as well.
-        system.step(event, system.read(event, random_data(dice)))
+        with suppress(MissingData):
+            system.step(event, system.read(event, random_data(dice)))
     yield system
 
 

@@ -339,6 +339,8 @@ class Cursor:
         if self.diagnostics[-1].message.startswith("there is no '"):
             # A control node, which has been read as a whole.
             return
+        # Words of missions and of assumptions, which are strange elsewhere.
+        own = "on" if "visit" in words else "allow" if self.texts[begin] == "assume" else ""
         starts = [begin] if before < 0 or not self._is_on_line(before, begin) else [before, begin]
         end = max(self.place, begin + 1)
         line = next(
@@ -348,7 +350,9 @@ class Cursor:
         ends = [end] if "{" in self.texts[line:end] else [line, end]
         for start, behind in ((start, behind) for behind in dict.fromkeys(ends) for start in starts):
             advice = self._sentences.read(start, behind, words)
-            if advice is not None and len(fix := self._obeyed(advice)) <= MAXIMUM_ADVICE and "\n" not in fix:
+            if advice is None or self.texts[advice.index] == own:
+                continue
+            if len(fix := self._obeyed(advice)) <= MAXIMUM_ADVICE and "\n" not in fix:
                 del self.diagnostics[known:]
                 message = f"{shown(advice.word)} does not fit here: {advice.reason}"
                 if advice.more:

@@ -325,8 +325,10 @@ async def test_events_happen_with_their_data_and_are_taken_back() -> None:
         answer = await done(page, "event", line="open")
         assert (answer["kind"], answer["steps"]) == ("wrong", 0)
         assert "open.request' is not allowed now: requirement open needs Sensor.light = day" in answer["lines"][0]
-        # Data that is not given is unknown, and stays so.
+        # Data is asked for where it cannot be unknown by its type; a NaN stays unknown.
         answer = await done(page, "event", line="light.response")
+        assert (answer["kind"], answer["steps"]) == ("wrong", 0)
+        answer = await done(page, "event", line="light.response NaN")
         assert (answer["kind"], answer["steps"]) == ("unknown", 1)
         assert answer["lines"][1] == "value is night by default: an earlier rule is unknown"
         answer = await done(page, "event", line="light.response 512.0")

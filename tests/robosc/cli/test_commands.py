@@ -293,11 +293,6 @@ def test_what_ros_cannot_do_others_can(tmp_path: Path, body: str, target: str) -
     [
         (2, ["synth", LINE_FOLLOWER, "--engine", "magic"], "unknown engine 'magic'"),
         (2, ["generate", LINE_FOLLOWER, "--target", "ros", "-o", "x"], "unknown target 'ros'"),
-        (
-            1,
-            ["generate", NAVIGATION, "--target", "ros2-cpp", "--deployment", "layer", "-o", "x"],
-            "was made for the deployment 'layer'",
-        ),
     ],
 )
 def test_what_is_not_to_be_had_is_said(

@@ -49,7 +49,7 @@ EVENTS = """# A run.
 scan front=0.7 class=1
 
 move.request
-scan.response {"front": "blocked"}
+scan.response {"front": "blocked", "class": 2}
 """
 
 
@@ -72,9 +72,8 @@ def test_events_of_a_file(capsys: pytest.CaptureFixture[str]) -> None:
         "   1  scan.response (value.front = free, value.class = 1): Sensor.front = free, Sensor.number = 1\n"
         "   2  move.request: Base = moving\n"
         "      sends 2\n"
-        "   3  scan.response (value.front = blocked, value.class = unknown): Sensor.front = blocked\n"
-        "      unknown: Sensor.number keeps its value\n"
-        "now       Sensor = sensing, Base = moving, Sensor.front = blocked, Sensor.number = 1\n"
+        "   3  scan.response (value.front = blocked, value.class = 2): Sensor.front = blocked, Sensor.number = 2\n"
+        "now       Sensor = sensing, Base = moving, Sensor.front = blocked, Sensor.number = 2\n"
         "allowed   halt.request\n"
         "can come  scan.response, level.response\n"
     )
@@ -90,7 +89,7 @@ def test_an_event_that_is_not_possible_says_where_and_why(
     assert found.err.startswith(f"robosc: {why}")
     assert found.out.splitlines()[-2] == "allowed   halt.request"
     # Up to there it has happened.
-    assert len(Path("kept.jsonl").read_text().splitlines()) == 4
+    assert len(Path("kept.jsonl").read_text().splitlines()) == 3
 
 
 def test_for_machines(capsys: pytest.CaptureFixture[str]) -> None:
@@ -115,8 +114,8 @@ def test_for_machines(capsys: pytest.CaptureFixture[str]) -> None:
             "communications": {},
         },
     }
-    assert steps[2]["data"] == {"value.front": "blocked", "value.class": None}
-    assert steps[2]["skipped"] == ["Sensor.number"]
+    assert steps[2]["data"] == {"value.front": "blocked", "value.class": 2}
+    assert steps[2]["skipped"] == []
     assert (end["status"], end["steps"], end["marked"], end["enabled"]) == ("done", 3, False, ["halt.request"])
     (disabled,) = end["disabled"]
     assert disabled["event"] == "move.request"
@@ -185,7 +184,7 @@ def test_commands_from_a_file(capsys: pytest.CaptureFixture[str], monkeypatch: p
         # what there is
         enabled
         why halt
-        scan front=free
+        scan front=free class=1
         move
         why halt
         undo 5

@@ -85,7 +85,7 @@ def test_what_nobody_can_mend_is_left_to_a_person() -> None:
     ("text", "code", "words"),
     [
         ("goal always eventually value", "no-value-here", "received data"),
-        ("goal once seen", "unknown-name", "unknown name 'seen'"),
+        ("goal once seen", "unknown-name", "'seen' is a communication, not a value"),
         ("goal once Door", "type-mismatch", "is a component"),
         ("goal once 3", "type-mismatch", "boolean is needed"),
         ("goal Door.ajar leads to Door.open", "unknown-name", "'ajar'"),

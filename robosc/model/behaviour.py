@@ -5,6 +5,8 @@ from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, S
 from dataclasses import dataclass, replace
 from itertools import islice
 
+import msgspec
+
 from robosc.errors import RelatedPlace
 from robosc.expressions import (
     ArrayType,
@@ -414,6 +416,15 @@ class BehaviourBuilder:
                 tree.updates[0].target.location,
                 "Update on something that is received, or use a service.",
             )
+        if kind is EventKind.REQUEST and any(_reads_value(update.value) for update in tree.updates):
+            name = communication.name
+            self._findings.error(
+                "no-value-here",
+                "'value' is the received data, and a request brings none",
+                tree.location,
+                f"Write 'on response from {name}' instead of 'on request to {name}'.",
+            )
+            return ()
         checker = self._checker(communication.received_type(kind), communication.name)
         updates: dict[str, Update] = {}
         places: dict[str, Location] = {}
@@ -582,3 +593,17 @@ def partial_updates(tree: BehaviourTree, behaviour: Behaviour, findings: Finding
 
 def _article(text: str) -> str:
     return f"{'an' if text[0] in 'aeiou' else 'a'} {text}"
+
+
+def _reads_value(tree: object) -> bool:
+    """Return True if an expression reads received data."""
+    stack = [tree]
+    while stack:
+        node = stack.pop()
+        if isinstance(node, syntax.Access) and node.root is None:
+            return True
+        if isinstance(node, tuple):
+            stack += node
+        elif isinstance(node, msgspec.Struct):
+            stack += [getattr(node, name) for name in node.__struct_fields__]
+    return False

@@ -417,12 +417,12 @@ class BehaviourBuilder:
                 "Update on something that is received, or use a service.",
             )
         if kind is EventKind.REQUEST and any(_reads_value(update.value) for update in tree.updates):
-            name = communication.name
+            asked = communication.name
             self._findings.error(
                 "no-value-here",
                 "'value' is the received data, and a request brings none",
                 tree.location,
-                f"Write 'on response from {name}' instead of 'on request to {name}'.",
+                f"Write 'on response from {asked}' instead of 'on request to {asked}'.",
             )
             return ()
         checker = self._checker(communication.received_type(kind), communication.name)

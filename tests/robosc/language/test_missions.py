@@ -63,7 +63,7 @@ DETOUR = "mission m { visit Door.open on Door.shut from anywhere visit Door.open
         ("mission m { visit Door.open then visit Door.shut }", 38, "Remove 'visit'.", SOUND),
         ("mission m { visit then Door.open then Door.shut }", 23, "Remove 'then'.", SOUND),
         ("mission m { visit Door.open then then Door.shut }", 38, "Remove 'then'.", SOUND),
-        ("mission m { visit Door.open and then Door.shut }", 33, "Write 'visit Door.open then Door.shut' instead of 'visit Door.open and then Door.shut'.", SOUND),
+        ("mission m { visit Door.open and then Door.shut }", 33, "Write 'visit Door.open then Door.shut'", SOUND),
         ("mission m { visit Door.open than Door.shut }", 33, "Did you mean 'then'?", SOUND),
         ("mission m { visit Door.open next Door.shut }", 33, "Write 'visit Door.open then Door.shut'", SOUND),
         ("mission m { visit Door.open then Door.shut, }", 47, "Remove ','.", SOUND),

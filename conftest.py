@@ -10,6 +10,7 @@ import importlib
 import inspect
 import os
 import signal
+import subprocess
 from collections.abc import Generator
 from typing import Any
 
@@ -32,6 +33,18 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
     signal.signal(signal.SIGINT, signal.default_int_handler)
 
 load_profile()
+
+_wait_for_program = subprocess.Popen.__exit__
+
+
+def _leave_program(program: subprocess.Popen[Any], kind: Any, error: Any, place: Any) -> None:
+    """Kill a program that a test leaves by an error: it would wait for input, and the run of all tests for it."""
+    if kind is not None:
+        program.kill()
+    _wait_for_program(program, kind, error, place)
+
+
+subprocess.Popen.__exit__ = _leave_program  # type: ignore[method-assign]
 
 
 def pytest_configure() -> None:

@@ -318,7 +318,7 @@ def test_a_terminal_has_a_prompt_completion_and_goes_on_after_mistakes(folder: P
         type_(b"halt\n", b"'halt.request' is not allowed now")
         until(b"> ")
         # Tab completes the only event that begins so, and the value of the enum.
-        type_(b"sc\tfront=fr\t\n", b"scan.response (value.front = free")
+        type_(b"sc\tfront=fr\tclass=1\n", b"scan.response (value.front = free, value.class = 1)")
         until(b"> ")
         type_(b"quit\n", b"quit")
         assert process.wait() == 0

@@ -15,19 +15,9 @@ from robosc.controller_properties import StrategyRun
 from robosc.event_logs import check_log, read_log
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.protocol import MissingData
-from robosc.expressions import (
-    ArrayType,
-    BooleanType,
-    DoubleType,
-    EnumType,
-    IntegerType,
-    ObjectType,
-    StringType,
-    Type,
-)
-from robosc.model.structure import EventKind, Model, is_tau
 from support.effort import seeds
 from support.execution import unsupervised
+from support.fitting_data import fitting, received
 from support.lift import LIFT
 from support.loaders import MODEL as LOADER
 from support.models import EXAMPLES
@@ -73,35 +63,6 @@ def supervisor() -> robosc.Supervisor:
 @pytest.fixture
 def run(supervisor: robosc.Supervisor) -> robosc.Run:
     return robosc.simulate(supervisor)
-
-
-def fitting(dice: Random, model: Model, type_: Type | None) -> Any:
-    """Data of a type, as a sensor would send it."""
-    match type_:
-        case ObjectType(name=name):
-            parts = next(item.properties for item in model.objects if item.name == name)
-            return {part.name: fitting(dice, model, part.type) for part in parts if dice.random() < 0.9}
-        case ArrayType(element=element):
-            return [fitting(dice, model, element) for _ in range(dice.randint(0, 3))]
-        case EnumType(name=name):
-            return fitting(dice, model, next(item.source for item in model.enums if item.name == name))
-        case BooleanType():
-            return dice.random() < 0.5
-        case IntegerType():
-            return dice.choice([-1, 0, 1, 2, 3, 7, 100])
-        case DoubleType():
-            return dice.choice([0.0, 0.5, -1.5, 3, 1e9])
-        case StringType():
-            return dice.choice(["x", "other words", ""])
-        case _:
-            return None
-
-
-def received(model: Model, event: str) -> Type | None:
-    if is_tau(event):
-        return None
-    name, _, kind = event.partition(".")
-    return model.communication(name).received_type(EventKind(kind))
 
 
 @pytest.mark.random

@@ -15,6 +15,7 @@ from robosc.controller_properties import StrategyRun
 from robosc.event_logs import check_log, read_log
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.protocol import MissingData
+from robosc.pipeline.received_data import data_fields
 from support.effort import seeds
 from support.execution import unsupervised
 from support.fitting_data import fitting, received
@@ -63,6 +64,32 @@ def supervisor() -> robosc.Supervisor:
 @pytest.fixture
 def run(supervisor: robosc.Supervisor) -> robosc.Run:
     return robosc.simulate(supervisor)
+
+
+def without(data: Any, path: tuple[str, ...]) -> Any:
+    """Data in which a part is left out."""
+    if not path:
+        return None
+    kept = {**data, path[0]: without(data[path[0]], path[1:])}
+    return kept if len(path) > 1 else {name: part for name, part in data.items() if name != path[0]}
+
+
+@pytest.mark.random
+@pytest.mark.parametrize("seed", seeds(25))
+def test_what_is_required_is_what_the_interpreter_refuses_to_miss(seed: int) -> None:
+    core = random_supervisor(seed)
+    dice = Random(f"fields {seed}")
+    twin = InterpretedSystem(core)
+    for event in to_automata(core.model, core.deployment).events:
+        for field in data_fields(core.model, event.name):
+            data = fitting(dice, core.model, received(core.model, event.name), complete=True)
+            twin.read(event.name, data)
+            try:
+                twin.read(event.name, without(data, field.path))
+            except MissingData:
+                assert field.is_required
+            else:
+                assert not field.is_required
 
 
 @pytest.mark.random

@@ -7,8 +7,10 @@ from playwright.sync_api import Browser, Locator, Page, expect
 
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.event_log import json_line
+from robosc.model.structure import Deployment
 from support.browser import visit
 from support.execution import Bench, unsupervised
+from support.layers import LayerBench
 from support.loaders import MODEL
 from support.view_servers import view_process
 
@@ -85,4 +87,26 @@ def test_a_log_shows_the_goal_as_cancelling_until_it_has_ended(browser: Browser,
             slider.fill(str(kinds.index(kind)))
             expect(place).to_have_text(shown)
         expect(seen.page.locator("#stream-rows")).to_contain_text("cancel_overdue")
+        assert seen.errors == []
+
+
+def test_what_a_layer_holds_back_meanwhile_is_shown_with_the_reason(browser: Browser, tmp_path: Path) -> None:
+    text = MODEL.read_text(encoding="utf-8")
+    bench = LayerBench(InterpretedSystem(unsupervised(text, Deployment.LAYER)))
+    bench.goal("travel", 1, {"order": 3})
+    bench.receive("/stop", True)
+    bench.call("reach", 2, {"data": True})
+    bench.goal("travel", 3, {"order": 3})
+    log = tmp_path / "run.jsonl"
+    log.write_text("".join(map(json_line, bench.log.entries)), encoding="utf-8")
+    words = ("--log", log, "--model", MODEL, "--deployment", "layer")
+    with view_process(*words) as (_, url), visit(browser, url) as seen:
+        seen.page.get_by_role("slider", name="Time in the log").fill(str(len(bench.log.entries)))
+        rows = seen.page.locator("#stream-rows .row", has_text="blocked")
+        expect(rows).to_have_count(2)
+        expect(rows.first).to_contain_text("/arm/reach; why: not allowed now")
+        expect(rows.last).to_contain_text("/travel; why: its last goal may still be under way")
+        expect(seen.page.locator('[data-component="Drive"] .place')).to_have_text("cancelling")
+        expect(seen.page.locator("#requests-panel")).to_contain_text("Drive.idle does not hold (Drive is driving)")
+        seen.picture("blocked")
         assert seen.errors == []

@@ -36,7 +36,7 @@ def test_a_cancel_is_asked_for_and_one_chooses_how_the_goal_ends(browser: Browse
         event(page, "travel.request").locator("button").click()
         expect(travel).to_have_text("executing")
         expect(ends).to_be_hidden()
-        # What every message has cannot be unknown.
+        # A boolean, which every message has, cannot be unknown.
         pressed = event(page, "stop.response").locator("select")
         assert pressed.locator("option").all_text_contents() == ["false", "true"]
         pressed.select_option("true")

@@ -38,3 +38,8 @@ def counts_text(diagnostics: Sequence[Diagnostic]) -> str:
 def diagnostics_json(diagnostics: Sequence[Diagnostic]) -> dict[str, object]:
     """The findings and their counts as JSON values."""
     return {**counts(diagnostics), "diagnostics": [diagnostic.to_json() for diagnostic in diagnostics]}
+
+
+def accepted_json(accepted: Sequence[Diagnostic]) -> dict[str, object]:
+    """The findings that a model accepts as JSON values; nothing where it accepts none."""
+    return {"accepted": [diagnostic.to_json() for diagnostic in accepted]} if accepted else {}

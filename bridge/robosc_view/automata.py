@@ -81,7 +81,7 @@ def robot_of_automata(supervisor: SystemSupervisor, play: Mapping[str, Any]) -> 
 def _events(system: System) -> list[dict[str, Any]]:
     fields: dict[str, list[dict[str, Any]]] = {}
     for item in system.inputs:
-        field = data_field(tuple(map(str, item.path)), item.type, is_read=True)
+        field = data_field(tuple(map(str, item.path)), item.type, is_read=True, is_required=False)
         fields.setdefault(item.event, []).append(field.as_json())
     return [
         {"event": event.name, "controllable": event.is_controllable, "fields": fields.get(event.name, [])}

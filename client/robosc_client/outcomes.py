@@ -56,12 +56,14 @@ def outcome_from_response(result: Synthesis | Generation | Exploration, content:
     """
     if result.status is SynthesisStatus.UNSUPPORTED_MODEL:
         raise UnsupportedModelError(result.reason)
+    found = result.diagnostics
     return SynthesisOutcome(
         OutcomeStatus(str(result.status)),
         decoded(content) if content else None,
-        result.diagnostics,
+        found,
         reason=visible(result.reason),
         explanation=result.explanation,
+        accepted=found.accepted if isinstance(found, Findings) else (),
     )
 
 

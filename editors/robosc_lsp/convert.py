@@ -90,12 +90,15 @@ _TOKENS = {
 
 
 def diagnostics(analysis: Analysis, project: Project, found: Iterable[Diagnostic]) -> list[lsp.Diagnostic]:
-    """Convert the findings of a file with their fixes; findings of other files are shown at its start."""
+    """Convert the findings of a file with their fixes; findings of other files are shown at its start.
+
+    What the text accepts is a hint, with the reason in place of a fix.
+    """
     return [_diagnostic(analysis, project, item) for item in found]
 
 
 def _diagnostic(analysis: Analysis, project: Project, item: Diagnostic) -> lsp.Diagnostic:
-    text, here = analysis.text, analysis.file
+    text, here, is_open = analysis.text, analysis.file, item.accepted is None
     is_here = item.location is not None and item.location.file in ("", here)
     where = text.range_of(item.location) if item.location is not None and is_here else text.range(0, 0)
     message = item.message if is_here or item.location is None else f"{item.location}: {item.message}"
@@ -106,8 +109,8 @@ def _diagnostic(analysis: Analysis, project: Project, item: Diagnostic) -> lsp.D
     ]
     return lsp.Diagnostic(
         where,
-        f"{message}\n{item.fix}",
-        severity=SEVERITIES[item.severity],
+        f"{message}\n{item.fix if is_open else f'accepted: {item.accepted}'}",
+        severity=SEVERITIES[item.severity] if is_open else lsp.DiagnosticSeverity.Hint,
         code=item.code,
         source="robosc",
         related_information=related or None,

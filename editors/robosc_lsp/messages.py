@@ -14,6 +14,7 @@ class FindingMessage(msgspec.Struct, frozen=True):
     fix: str
     location: Location | None
     related: tuple[tuple[str, Location], ...] = ()
+    accepted: str | None = None
 
 
 class SynthesisResponse(msgspec.Struct, frozen=True):
@@ -24,7 +25,7 @@ class SynthesisResponse(msgspec.Struct, frozen=True):
         states: States of the controlled robot; None if there is no supervisor.
         reason: Reason why there is no supervisor; empty if there is one.
         added: Conditions that the supervisor adds to each controllable event, as texts.
-        findings: Findings that need a synthesis.
+        findings: Every finding about the robot, those that it accepts, too.
     """
 
     unknown: str = ""
@@ -40,12 +41,10 @@ class SynthesisRequest(msgspec.Struct, frozen=True):
     Attributes:
         main: Name and text of its file.
         libraries: Those of each library.
-        known: Codes of findings that the checks have already reported.
     """
 
     main: tuple[str, str]
     libraries: tuple[tuple[str, str], ...]
-    known: tuple[str, ...]
 
 
 __all__ = ["FindingMessage", "SynthesisRequest", "SynthesisResponse"]

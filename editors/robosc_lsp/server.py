@@ -205,13 +205,23 @@ class Server(LanguageServer):
         self._last_analysis_s = time.monotonic() - begun_s
 
     def _publish(self, uri: str, analysis: Analysis) -> None:
-        items = diagnostics(analysis, self.project, self._findings(analysis))
+        items = diagnostics(analysis, self.project, (*self._findings(analysis), *self._accepted(analysis)))
         self.text_document_publish_diagnostics(
             lsp.PublishDiagnosticsParams(uri, items, version=self._versions.get(uri))
         )
 
     def _findings(self, analysis: Analysis) -> tuple[Diagnostic, ...]:
-        return (*analysis.inspected.checked.diagnostics, *self._from_synthesis(analysis))
+        found = (item for item in self._from_synthesis(analysis) if item.accepted is None)
+        return (*analysis.inspected.checked.diagnostics, *found)
+
+    def _accepted(self, analysis: Analysis) -> tuple[Diagnostic, ...]:
+        """The findings that the file itself accepts."""
+        found = (item for item in self._from_synthesis(analysis) if item.accepted is not None)
+        return tuple(
+            item
+            for item in (*analysis.inspected.checked.accepted, *found)
+            if item.location is not None and item.location.file == analysis.file
+        )
 
     # Synthesis
 
@@ -223,9 +233,12 @@ class Server(LanguageServer):
         return known[1]
 
     def _from_synthesis(self, analysis: Analysis) -> tuple[Diagnostic, ...]:
+        """Those findings, also the accepted ones, that the checks have not reported."""
         found = self.outcome(analysis)
         if found is None:
             return ()
+        checked = analysis.inspected.checked
+        known = {*checked.diagnostics, *checked.accepted}
         items = [
             Diagnostic(
                 Severity(item.severity),
@@ -234,9 +247,11 @@ class Server(LanguageServer):
                 item.location,
                 item.fix,
                 tuple(RelatedPlace(*place) for place in item.related),
+                item.accepted,
             )
             for item in found.findings
         ]
+        items = [item for item in items if item not in known]
         if found.reason and analysis.whole is not None:
             items.append(no_supervisor(found.reason, analysis.whole.definition.location))
         return tuple(items)
@@ -263,9 +278,8 @@ class Server(LanguageServer):
 
     async def _synthesize(self, uri: str, analysis: Analysis, bundle: Bundle) -> None:
         await asyncio.sleep(_SYNTHESIS_PAUSE_S)
-        known = frozenset(item.code for item in analysis.inspected.checked.diagnostics)
         async with self._queue.slot(uri):
-            self._outcomes[uri] = bundle.digest, await run_synthesis(bundle, known, self._synthesis_s)
+            self._outcomes[uri] = bundle.digest, await run_synthesis(bundle, self._synthesis_s)
         self._publish(uri, analysis)
         capabilities = self.client_capabilities.workspace
         lens = capabilities.code_lens if capabilities is not None else None

@@ -62,18 +62,16 @@ class SynthesisQueue:
         return self._edited.index(uri) if uri in self._edited else len(self._edited)
 
 
-async def run_synthesis(bundle: Bundle, known: frozenset[str], limit_s: float) -> SynthesisResponse:
+async def run_synthesis(bundle: Bundle, limit_s: float) -> SynthesisResponse:
     """Return the result of synthesis for a robot without errors; cancelling this ends its process.
 
     Args:
         bundle: The robot.
-        known: Codes of findings that the checks have already reported.
         limit_s: Time limit, in seconds.
     """
     request = SynthesisRequest(
         (bundle.main.name, bundle.main.text),
         tuple((file.name, file.text) for file in bundle.libraries),
-        tuple(sorted(known)),
     )
     try:
         process = await asyncio.create_subprocess_exec(

@@ -43,9 +43,9 @@ def outcome(request: SynthesisRequest) -> SynthesisResponse:
             item.fix,
             item.location,
             tuple((place.message, place.location) for place in item.related),
+            item.accepted,
         )
-        for item in made.diagnostics
-        if item.code not in request.known
+        for item in (*made.diagnostics, *made.accepted)
     )
     if made.supervisor is None:
         return SynthesisResponse(reason=made.reason, findings=findings)

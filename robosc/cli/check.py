@@ -17,6 +17,7 @@ if TYPE_CHECKING:
     from robosc.certification import SynthesisOutcome
     from robosc.certification.goals import GoalExplanation
     from robosc.explanation import EmptyExplanation
+    from robosc.pipeline.findings import Findings
 
 
 def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") -> None:
@@ -54,7 +55,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 def run_with(
     arguments: argparse.Namespace,
-    check: Callable[[Bundle], tuple[Diagnostic, ...]],
+    check: "Callable[[Bundle], Findings]",
     make: "Callable[[Bundle], SynthesisOutcome]",
 ) -> int:
     """Check the model wherever that is done.
@@ -73,14 +74,14 @@ def run_with(
     except LanguageError as error:
         return report_check(arguments, error.diagnostics, None)
     if not arguments.synthesize:
-        return report_check(arguments, check(bundle), bundle, accepted=_accepted(arguments, bundle))
+        checked = check(bundle)
+        return report_check(arguments, checked, bundle, accepted=checked.accepted if arguments.all else ())
     arguments.deployment = arguments.deployment or str(Deployment.CONTROLLER)
     try:
         found = _synthesized(make(bundle))
     except UnsupportedModelError as error:
-        found = _Synthesized(
-            check(bundle), "unsupported model", str(error), has_failed=True, accepted=_accepted(arguments, bundle)
-        )
+        checked = check(bundle)
+        found = _Synthesized(checked, "unsupported model", str(error), has_failed=True, accepted=checked.accepted)
     return _report_synthesized(arguments, found, bundle)
 
 
@@ -97,17 +98,12 @@ def require_synthesis(arguments: argparse.Namespace) -> None:
         )
 
 
-def _checked(bundle: Bundle) -> tuple[Diagnostic, ...]:
+def _checked(bundle: Bundle) -> "Findings":
     from robosc.model.check import check
+    from robosc.pipeline.findings import Findings
 
-    return check(bundle).diagnostics
-
-
-def _accepted(arguments: argparse.Namespace, bundle: Bundle) -> tuple[Diagnostic, ...]:
-    """The findings that a model accepts, if they are to be shown."""
-    from robosc.model.check import check
-
-    return check(bundle).accepted if arguments.all else ()
+    found = check(bundle)
+    return Findings(found.diagnostics, bundle, found.accepted)
 
 
 @dataclass(frozen=True, slots=True)
@@ -143,8 +139,7 @@ def _synthesized(outcome: "SynthesisOutcome") -> _Synthesized:
 def _report_synthesized(arguments: argparse.Namespace, found: _Synthesized, bundle: Bundle) -> ExitCode:
     """Print the findings and what became of the synthesis as asked, and return the exit status."""
     summary = {"status": found.status, **reasons_json(found)}
-    accepted = (found.accepted or _accepted(arguments, bundle)) if arguments.all else ()
-    status = report_check(arguments, found.diagnostics, bundle, summary, accepted)
+    status = report_check(arguments, found.diagnostics, bundle, summary, found.accepted if arguments.all else ())
     if not arguments.json:
         synth.report_reasons(found, bundle)
     return ExitCode.FAILED if found.has_failed else status

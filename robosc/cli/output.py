@@ -17,7 +17,7 @@ from types import MappingProxyType
 from typing import TextIO
 
 from robosc.errors import Diagnostic, Severity
-from robosc.json_documents import counts_text, diagnostics_json, json_text
+from robosc.json_documents import accepted_json, counts_text, diagnostics_json, json_text
 from robosc.pipeline.files import FileAccessError, write_whole
 from robosc.source import Bundle
 
@@ -114,8 +114,8 @@ def report_check(
         accepted: Findings that the text accepts and that are to be shown, which change no status.
     """
     if arguments.json:
-        shown = {"accepted": [item.to_json() for item in accepted]} if accepted else {}
-        print_json({"file": str(arguments.model), **summary, **diagnostics_json(diagnostics), **shown})
+        shown = {**diagnostics_json(diagnostics), **accepted_json(accepted)}
+        print_json({"file": str(arguments.model), **summary, **shown})
     else:
         for item in accepted:
             sys.stderr.write(f"{item.render(bundle)}\n")

@@ -18,5 +18,7 @@ def check(model: ModelLike) -> Findings:
     from robosc.model.check import check as check_bundle
 
     bundle = loaded(model)
-    found = check_automata_file(bundle) if isinstance(bundle, LoadedAutomata) else check_bundle(bundle)
-    return Findings(found.diagnostics, bundle)
+    if isinstance(bundle, LoadedAutomata):
+        return Findings(check_automata_file(bundle).diagnostics, bundle)
+    found = check_bundle(bundle)
+    return Findings(found.diagnostics, bundle, found.accepted)

@@ -14,19 +14,27 @@ class Findings(tuple[Diagnostic, ...]):
 
     Attributes:
         has_errors: True if any of them is an error: the model cannot be used.
+        accepted: Findings that the model accepts, which are none of these.
     """
 
     _bundle: Bundle | None
+    accepted: tuple[Diagnostic, ...]
 
-    def __new__(cls, diagnostics: Iterable[Diagnostic] = (), bundle: Bundle | None = None) -> Self:
+    def __new__(
+        cls,
+        diagnostics: Iterable[Diagnostic] = (),
+        bundle: Bundle | None = None,
+        accepted: Iterable[Diagnostic] = (),
+    ) -> Self:
         """Take the findings.
 
         Args:
             diagnostics: The findings.
             bundle: The texts that the findings are about, from which their lines are shown; None if there are no texts.
+            accepted: Findings that the model accepts.
         """
         made = super().__new__(cls, diagnostics)
-        made._bundle = bundle
+        made._bundle, made.accepted = bundle, tuple(accepted)
         return made
 
     @property

@@ -29,7 +29,7 @@ from robosc.expressions import (
     values,
 )
 from robosc.model.findings import did_you_mean
-from robosc.model.received import converted_paths
+from robosc.model.received import converted_paths, required_parts
 from robosc.model.structure import EventKind, Model, is_tau
 
 MAXIMUM_ELEMENTS = 1000
@@ -69,6 +69,7 @@ class DataField:
         choices: Names of its values, for an enum or boolean; else empty.
         is_number: True if it is a number.
         is_read: True if the model reads it.
+        is_required: True if it cannot be unknown: data without it is refused.
     """
 
     path: tuple[str, ...]
@@ -76,6 +77,7 @@ class DataField:
     choices: tuple[str, ...]
     is_number: bool
     is_read: bool
+    is_required: bool
 
     @property
     def name(self) -> str:
@@ -89,6 +91,7 @@ class DataField:
             "type": self.type,
             "choices": list(self.choices),
             "is_boolean": self.type == "boolean",
+            "is_required": self.is_required,
         }
 
 
@@ -98,19 +101,23 @@ def data_fields(model: Model, event: str) -> tuple[DataField, ...]:
     if type_ is None:
         return ()
     read = {tuple(step for step in path if isinstance(step, str)) for path in converted_paths(model, event)}
-    return tuple(_fields(model, type_, (), read))
+    required = {path for path, _ in required_parts(model, event)}
+    return tuple(
+        data_field(path, part, is_read=any(other[: len(path)] == path for other in read), is_required=path in required)
+        for path, part in _parts(model, type_, ())
+    )
 
 
-def _fields(model: Model, type_: Type, path: tuple[str, ...], read: set[tuple[str, ...]]) -> Iterator[DataField]:
+def _parts(model: Model, type_: Type, path: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Type]]:
     match type_:
         case ObjectType(name=name):
             for item in model.object(name).properties:
-                yield from _fields(model, item.type, (*path, item.name), read)
-            return
-    yield data_field(path, type_, is_read=any(other[: len(path)] == path for other in read))
+                yield from _parts(model, item.type, (*path, item.name))
+        case _:
+            yield path, type_
 
 
-def data_field(path: tuple[str, ...], type_: Type, *, is_read: bool) -> DataField:
+def data_field(path: tuple[str, ...], type_: Type, *, is_read: bool, is_required: bool) -> DataField:
     """Return the part of a datum at a path, whose type has no parts itself."""
     match type_:
         case EnumType(values=names):
@@ -119,7 +126,7 @@ def data_field(path: tuple[str, ...], type_: Type, *, is_read: bool) -> DataFiel
             choices = ("false", "true")
         case _:
             choices = ()
-    return DataField(path, type_text(type_), choices, isinstance(type_, IntegerType | DoubleType), is_read)
+    return DataField(path, type_text(type_), choices, isinstance(type_, IntegerType | DoubleType), is_read, is_required)
 
 
 def one_datum(event: str, data: object, fields: Mapping[str, object]) -> object:

@@ -7,7 +7,7 @@ from robosc.automata import System
 from robosc.certification import SynthesisOutcome, make_supervisor
 from robosc.certification.goals import GoalExplanation
 from robosc.certification.progress import OnProgress, ShouldStop, ignored, never
-from robosc.errors import Diagnostic, UnsupportedModelError
+from robosc.errors import UnsupportedModelError
 from robosc.explanation import EmptyExplanation
 from robosc.model.check import check
 from robosc.pipeline.automata_models import automata_synthesis
@@ -166,10 +166,8 @@ def make(
 
 def findings_of(attempt: Attempt, bundle: LoadedModel) -> Findings:
     """Return the findings about the model of an attempted synthesis."""
-    found: tuple[Diagnostic, ...] = (
-        attempt.diagnostics if isinstance(attempt, SynthesisOutcome) else check(bundle).diagnostics
-    )
-    return Findings(found, bundle)
+    found = attempt if isinstance(attempt, SynthesisOutcome) else check(bundle)
+    return Findings(found.diagnostics, bundle, found.accepted)
 
 
 def status_of(attempt: Attempt) -> tuple[SynthesisStatus, str]:

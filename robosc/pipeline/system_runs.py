@@ -136,7 +136,9 @@ class SystemRun(ManualRun):
             UnknownEventError: There is no such event; the message names the nearest one.
         """
         inputs = self._inputs.get(self._require_event(event), ())
-        return tuple(data_field(tuple(map(str, item.path)), item.type, is_read=True) for item in inputs)
+        return tuple(
+            data_field(tuple(map(str, item.path)), item.type, is_read=True, is_required=False) for item in inputs
+        )
 
     def choices(self, event: str, data: object = NO_DATA, /) -> tuple[StateInWords, ...]:
         """Return the states that an event can lead to now, in the order of their values; none if it cannot happen.

@@ -263,6 +263,12 @@ class TestGet:
         ("kind", "messages", "status", "word"),
         [
             ("check", [pb.CheckResponse()], 0, '"errors": 0'),
+            (
+                "check",
+                [pb.CheckResponse(accepted=[pb.Diagnostic(severity=pb.SEVERITY_NOTE, accepted="so it is meant")])],
+                0,
+                '"accepted": "so it is meant"',
+            ),
             ("synthesize", [synthesis()], 1, '"status": "empty"'),
             ("synthesize", [MADE], 0, '"status": "supervisor"'),
             ("generate", generation(), 0, "a/one.py"),

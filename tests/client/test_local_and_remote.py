@@ -16,7 +16,7 @@ from robosc_api.v1 import synthesis_pb2 as pb
 from robosc_client import AsyncClient, Client, Explain, NotThereError, Synthesize, Verify
 from robosc_client.commands.job_results import result_json
 from robosc_client.convert.requests import request_of
-from support.models import EMPTY, EXAMPLES, UNSUPPORTED
+from support.models import ACCEPTING, EMPTY, EXAMPLES, UNSUPPORTED
 from support.service import served
 
 NAVIGATION = EXAMPLES / "navigation" / "navigation.rscd"
@@ -52,6 +52,7 @@ TEXTS = {
     "empty": EMPTY,
     "wrong": WRONG,
     "unsupported": UNSUPPORTED,
+    "accepting": ACCEPTING,
 }
 METHODS = ("check", "synthesize", "explore", "verify", "explain", "generate")
 
@@ -84,6 +85,8 @@ def require_alike(local: Any, remote: Any, *, is_made: bool) -> None:
 def test_check(client: Client, model: robosc.LoadedModel) -> None:
     local, remote = robosc.check(model), client.check(model)
     assert local == remote
+    assert local.accepted == remote.accepted
+    assert [item.accepted for item in local.accepted] == ["one person presses both"] * ("Lamps" in model.main.text)
     # The texts have their lines, which the server did not send back.
     assert str(local) == str(remote)
     assert isinstance(remote, robosc.Findings)
@@ -97,6 +100,11 @@ def test_synthesize(client: Client, model: robosc.LoadedModel) -> None:
         assert (local.status, local.reason) == (remote.status, remote.reason)
         return
     require_alike(local, remote, is_made=is_made)
+    assert isinstance(local.diagnostics, robosc.Findings) and isinstance(remote.diagnostics, robosc.Findings)
+    assert local.diagnostics.accepted == remote.diagnostics.accepted
+    assert [item.code for item in local.diagnostics.accepted] == (
+        ["shared-topic", "competing-requests"] if "Lamps" in model.main.text else []
+    )
     assert bool(remote.supervisor) == is_made
     assert local.summary == remote.summary
     if local.supervisor is not None and local.statistics is not None and remote.statistics is not None:

@@ -30,7 +30,7 @@ from support.client_commands import Run, interrupted
 from support.fake_tasks import TASK_FUNCTION
 from support.health_servers import answering
 from support.long_work import long_work
-from support.models import EXAMPLE_DEPLOYMENTS, UNSUPPORTED
+from support.models import ACCEPTING, EXAMPLE_DEPLOYMENTS, UNSUPPORTED
 from support.models import EXAMPLES as EXAMPLES_FOLDER
 from support.mutants import change
 from support.scripted_service import scripted
@@ -244,6 +244,13 @@ class TestSameAsHere:
         assert found.status == (1 if how == ["--strict"] and text == COMPETING else status)
         if how == ["--json"] and text == UNSUPPORTED:
             assert json.loads(found.output)["status"] == "unsupported model"
+
+    @pytest.mark.parametrize("how", [[], ["--all"], ["--json"], ["--json", "--all"]])
+    @pytest.mark.parametrize("more", [[], ["--synthesize"]])
+    def test_what_the_model_accepts(self, both: Both, tmp_path: Path, more: Any, how: Any) -> None:
+        found = both("check", write(tmp_path, ACCEPTING), *more, *how)
+        assert (found.status, "shared-topic" in found.output + found.errors) == (0, "--all" in how)
+        assert ("one of them" in found.output + found.errors) is ("--all" in how and bool(more))
 
     @pytest.mark.parametrize(
         "how", [["--deployment", "layer"], ["--engine", "cudd"], ["--reorder"], ["--max-nodes", "9"]]

@@ -175,6 +175,43 @@ def test_warnings_of_synthesis_follow_and_are_those_of_the_text(tmp_path: Path) 
         assert "unused-requirement" not in codes and "never-enabled" not in codes
 
 
+ACCEPTED = """robot Lamps {
+    component Switch { outgoing message pressed with identifier: "/pressed", type: none }
+    component Button {
+        // robosc: accept shared-topic: one person presses both
+        outgoing message pushed with identifier: "/pressed", type: none
+        // robosc: accept needless-property: left over
+        incoming message light with identifier: "/light", type: none
+        // robosc: accept competing-requests: one of them will do
+        incoming message dim with identifier: "/light", type: none
+        // robosc: accept never-enabled: left over, too
+        incoming message buzz with identifier: "/buzz", type: none
+    }
+}
+"""
+
+
+def test_what_the_text_accepts_is_a_hint_with_its_reason(tmp_path: Path) -> None:
+    with Editor(tmp_path) as editor:
+        editor.open("lamps.rscd", ACCEPTED)
+        found = editor.findings("lamps.rscd", lambda found: any(item.code == "competing-requests" for item in found))
+        hints = [item for item in found if item.severity is lsp.DiagnosticSeverity.Hint]
+        assert [(item.code, part_of(ACCEPTED, item.range), item.message.rpartition("\n")[2]) for item in hints] == [
+            ("shared-topic", "pushed", "accepted: one person presses both"),
+            ("competing-requests", "dim", "accepted: one of them will do"),
+        ]
+        # Each of the two that accept nothing is found by a stage of its own.
+        left = [(item.code, item.range.start.line) for item in found if item not in hints]
+        assert [item for item in left if item[0] == "needless-acceptance"] == [
+            ("needless-acceptance", 5),
+            ("needless-acceptance", 9),
+        ]
+        editor.replace("lamps.rscd", ACCEPTED.replace("// robosc: accept", "//"))
+        found = editor.findings("lamps.rscd", lambda found: any(item.code == "competing-requests" for item in found))
+        assert not any(item.severity is lsp.DiagnosticSeverity.Hint for item in found)
+        assert {"shared-topic", "competing-requests"} <= {item.code for item in found}
+
+
 def test_that_there_is_no_supervisor_is_reported_at_the_robot(tmp_path: Path) -> None:
     with Editor(tmp_path) as editor:
         editor.open("fall.rscd", FALL)

@@ -197,7 +197,7 @@ def test_a_synthesis_that_takes_too_long_is_given_up(tmp_path: Path) -> None:
 
 
 def test_a_synthesis_takes_no_more_memory_than_it_may(monkeypatch: pytest.MonkeyPatch) -> None:
-    request = SynthesisRequest(("small.rscd", bounded_products(4)), (), ())
+    request = SynthesisRequest(("small.rscd", bounded_products(4)), ())
     assert synthesizer.outcome(request).states
     monkeypatch.setattr(synthesizer, "_MOST_NODES", 10)
     outcome = synthesizer.outcome(request)

@@ -31,6 +31,7 @@ from robosc_bridge.devices.interface import BINS, DriveReading, Pose, RawScan, S
 from robosc_bridge.host import monotonic
 from robosc_bridge.safety import Caution, Reason
 from robosc_view import ViewEndpoint
+from support.fitting_data import fitting, received
 from support.models import model_of
 from support.random_supervisors import CERTIFICATE
 
@@ -132,7 +133,7 @@ class LiveRobot:
 
     def take(self, event: str) -> None:
         """Let an event happen, send it and show the state after it."""
-        data = self._dice.randint(0, 3)
+        data = fitting(self._dice, self._model, received(self._model, event), complete=True)
         has_data = event.endswith((".response", ".feedback"))
         self.system.step(event, self.system.read(event, data) if has_data else None)
         self.feed.append(

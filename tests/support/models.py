@@ -23,6 +23,19 @@ EXAMPLE_DEPLOYMENTS = tuple(
     if (name, deployment) != ("line_follower/line_follower", Deployment.LAYER)
 )
 
+# A robot that accepts a finding of the check, and one of the synthesis.
+ACCEPTING = """robot Lamps {
+    component Switch { outgoing message pressed with identifier: "/pressed", type: none }
+    component Button {
+        // robosc: accept shared-topic: one person presses both
+        outgoing message pushed with identifier: "/pressed", type: none
+        incoming message light with identifier: "/light", type: none
+        // robosc: accept competing-requests: one of them will do
+        incoming message dim with identifier: "/light", type: none
+    }
+}
+"""
+
 # A robot whose synthesis is given up: the condition of its requirement has too many values.
 UNSUPPORTED = """robot R {
     component C {

@@ -56,18 +56,20 @@ class PlayEvent {
   }
 }
 
-/** A part of the data of an event; nothing in it is unknown, or of automata any value. */
+/** A part of the data of an event; nothing in it, where that may be, is unknown, or of automata any value. */
 class Field {
-  constructor(event, { path, type, choices, is_boolean: isBoolean }) {
+  constructor(event, { path, type, choices, is_boolean: isBoolean, is_required: isRequired }) {
     this.path = path;
     this.isBoolean = isBoolean;
     this.isChoice = choices.length > 0;
     const name = path.join(".") || "value";
     const label = `${name} of ${event}`;
     const nothing = isAutomata() ? "any" : "unknown";
+    const options = choices.map((choice) => make("option", { value: choice }, choice));
+    if (!isRequired) options.unshift(make("option", { value: "" }, nothing));
     this.input = this.isChoice
-      ? make("select", { "aria-label": label }, make("option", { value: "" }, nothing), ...choices.map((choice) => make("option", { value: choice }, choice)))
-      : make("input", { type: "text", placeholder: nothing, "aria-label": label, autocomplete: "off", size: 9 });
+      ? make("select", { "aria-label": label }, ...options)
+      : make("input", { type: "text", required: isRequired, placeholder: isRequired ? null : nothing, "aria-label": label, autocomplete: "off", size: 9 });
     this.element = make("label", { class: "play-field", title: `${name}: ${type}` }, quoted(name), this.input);
   }
 

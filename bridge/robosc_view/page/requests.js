@@ -27,7 +27,7 @@ class Request {
     this.key = key;
     mark(this.element, "data-enabled", isEnabled ?? "unknown");
     say(this.word, isEnabled === null ? "? not known" : isEnabled ? "✓ enabled" : "✕ not now");
-    say(this.why, why.join(" "));
+    say(this.why, why.join("; "));
     // The line stays when the reason goes: nothing jumps when a request becomes enabled and stops being so.
     if (why.length > 0) this.element.classList.add("has-why");
     const lines = why.length > 0 ? why : [NO_REASON.get(isEnabled)];

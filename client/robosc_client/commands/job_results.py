@@ -11,8 +11,10 @@ from robosc.certification.reasons import reasons_json
 from robosc.cli import automata
 from robosc.cli.output import CommandError, ExitCode, UsageError, print_diagnostics, print_json, write_bytes
 from robosc.cli.synth import report_reasons
-from robosc.json_documents import counts_text, diagnostics_json, json_text
+from robosc.errors import Diagnostic
+from robosc.json_documents import accepted_json, counts_text, diagnostics_json, json_text
 from robosc.model.structure import Deployment
+from robosc.pipeline.findings import Findings
 from robosc.pipeline.results import NoSupervisor
 from robosc.source import Bundle, SourceFile, visible
 from robosc.targets import write_files
@@ -92,7 +94,7 @@ def result_json(found: TaskResult) -> dict[str, Any]:
 
     match found:
         case tuple():
-            return diagnostics_json(found)
+            return _findings_json(found)
         case Verification():
             return dict(found.report) or {"status": str(found.status), "reason": found.reason}
         case Formatted():
@@ -105,7 +107,7 @@ def result_json(found: TaskResult) -> dict[str, Any]:
             elif not isinstance(why, NoSupervisor):
                 summary["explanation"] = document(why)
             return {**summary, **diagnostics_json(found.diagnostics)}
-    result = {"status": str(found.status), **reasons_json(found), **diagnostics_json(found.diagnostics)}
+    result = {"status": str(found.status), **reasons_json(found), **_findings_json(found.diagnostics)}
     match found:
         case Synthesis():
             result["summary"] = found.summary and found.summary.text
@@ -116,6 +118,11 @@ def result_json(found: TaskResult) -> dict[str, Any]:
         case Exploration():
             result["graph"] = found.graph and msgspec.to_builtins(found.graph)
     return result
+
+
+def _findings_json(found: tuple[Diagnostic, ...]) -> dict[str, object]:
+    """The findings of a result, and those that the model accepts, as JSON values."""
+    return {**diagnostics_json(found), **(accepted_json(found.accepted) if isinstance(found, Findings) else {})}
 
 
 def print_result(job: Job, found: TaskResult) -> None:

@@ -71,19 +71,23 @@ def require_at_most(most: int, count: int, what: str) -> None:
         raise malformed(f"it has more than {most} {what}")
 
 
-def diagnostics_of(messages: Sequence[pb.Diagnostic], bundle: Bundle | None = None) -> Findings:
+def diagnostics_of(
+    messages: Sequence[pb.Diagnostic], bundle: Bundle | None = None, accepted: Sequence[pb.Diagnostic] = ()
+) -> Findings:
     """Return findings as the core's values.
 
     Args:
         messages: The findings.
         bundle: Texts that they are about, or None if those are not at hand.
+        accepted: The findings that the texts accept.
 
     Raises:
         ServiceError: A severity is unknown, or there are too many.
     """
-    require_at_most(_MAXIMUM_ITEMS, len(messages), "findings")
-    require_at_most(_MAXIMUM_ITEMS, sum(len(message.related) for message in messages), "places")
-    return Findings(map(_diagnostic, messages), bundle)
+    for found in (messages, accepted):
+        require_at_most(_MAXIMUM_ITEMS, len(found), "findings")
+        require_at_most(_MAXIMUM_ITEMS, sum(len(message.related) for message in found), "places")
+    return Findings(map(_diagnostic, messages), bundle, map(_diagnostic, accepted))
 
 
 def progress_of(message: pb.Progress) -> Progress:
@@ -276,6 +280,7 @@ def _diagnostic(message: pb.Diagnostic) -> Diagnostic:
         location=_location(message.location) if message.HasField("location") else None,
         fix=message.mend,
         related=tuple(RelatedPlace(place.message, _location(place.location)) for place in message.related),
+        accepted=message.accepted or None,
     )
 
 

@@ -153,7 +153,7 @@ class SynthesisReader(_StreamReader):
             raise malformed("its signature is invalid")
         self._found = Synthesis(
             status=status,
-            diagnostics=diagnostics_of(message.diagnostics),
+            diagnostics=diagnostics_of(message.diagnostics, accepted=message.accepted),
             reason=message.reason,
             supervisor=message.supervisor,
             summary=summary_of(message.summary) if message.HasField("summary") else None,
@@ -398,7 +398,7 @@ def check_reader(bundle: Bundle | None = None) -> UnaryReader[pb.CheckResponse, 
     Args:
         bundle: Texts that were sent; None: they are not available.
     """
-    return UnaryReader(lambda message: diagnostics_of(message.diagnostics, bundle))
+    return UnaryReader(lambda message: diagnostics_of(message.diagnostics, bundle, message.accepted))
 
 
 def format_reader(before: str | None) -> UnaryReader[pb.FormatResponse, Formatted]:

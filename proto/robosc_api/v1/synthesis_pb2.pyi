@@ -128,20 +128,22 @@ class RelatedPlace(_message.Message):
     def __init__(self, message: _Optional[str] = ..., location: _Optional[_Union[Location, _Mapping]] = ...) -> None: ...
 
 class Diagnostic(_message.Message):
-    __slots__ = ("severity", "code", "message", "location", "mend", "related")
+    __slots__ = ("severity", "code", "message", "location", "mend", "related", "accepted")
     SEVERITY_FIELD_NUMBER: _ClassVar[int]
     CODE_FIELD_NUMBER: _ClassVar[int]
     MESSAGE_FIELD_NUMBER: _ClassVar[int]
     LOCATION_FIELD_NUMBER: _ClassVar[int]
     MEND_FIELD_NUMBER: _ClassVar[int]
     RELATED_FIELD_NUMBER: _ClassVar[int]
+    ACCEPTED_FIELD_NUMBER: _ClassVar[int]
     severity: Severity
     code: str
     message: str
     location: Location
     mend: str
     related: _containers.RepeatedCompositeFieldContainer[RelatedPlace]
-    def __init__(self, severity: _Optional[_Union[Severity, str]] = ..., code: _Optional[str] = ..., message: _Optional[str] = ..., location: _Optional[_Union[Location, _Mapping]] = ..., mend: _Optional[str] = ..., related: _Optional[_Iterable[_Union[RelatedPlace, _Mapping]]] = ...) -> None: ...
+    accepted: str
+    def __init__(self, severity: _Optional[_Union[Severity, str]] = ..., code: _Optional[str] = ..., message: _Optional[str] = ..., location: _Optional[_Union[Location, _Mapping]] = ..., mend: _Optional[str] = ..., related: _Optional[_Iterable[_Union[RelatedPlace, _Mapping]]] = ..., accepted: _Optional[str] = ...) -> None: ...
 
 class SynthesisOptions(_message.Message):
     __slots__ = ("deployment", "engine", "allow_livelock", "allow_reordering", "maximum_nodes", "verified_states")
@@ -166,10 +168,12 @@ class CheckRequest(_message.Message):
     def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ...) -> None: ...
 
 class CheckResponse(_message.Message):
-    __slots__ = ("diagnostics",)
+    __slots__ = ("diagnostics", "accepted")
     DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
+    ACCEPTED_FIELD_NUMBER: _ClassVar[int]
     diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
-    def __init__(self, diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ...) -> None: ...
+    accepted: _containers.RepeatedCompositeFieldContainer[Diagnostic]
+    def __init__(self, diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., accepted: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ...) -> None: ...
 
 class SynthesizeRequest(_message.Message):
     __slots__ = ("bundle", "options", "modular")
@@ -198,7 +202,7 @@ class Progress(_message.Message):
     def __init__(self, stage: _Optional[str] = ..., message: _Optional[str] = ...) -> None: ...
 
 class SynthesisResult(_message.Message):
-    __slots__ = ("status", "diagnostics", "supervisor", "reason", "summary", "statistics", "explanation", "supervisor_digest", "signature", "goals")
+    __slots__ = ("status", "diagnostics", "supervisor", "reason", "summary", "statistics", "explanation", "supervisor_digest", "signature", "goals", "accepted")
     STATUS_FIELD_NUMBER: _ClassVar[int]
     DIAGNOSTICS_FIELD_NUMBER: _ClassVar[int]
     SUPERVISOR_FIELD_NUMBER: _ClassVar[int]
@@ -209,6 +213,7 @@ class SynthesisResult(_message.Message):
     SUPERVISOR_DIGEST_FIELD_NUMBER: _ClassVar[int]
     SIGNATURE_FIELD_NUMBER: _ClassVar[int]
     GOALS_FIELD_NUMBER: _ClassVar[int]
+    ACCEPTED_FIELD_NUMBER: _ClassVar[int]
     status: SynthesisStatus
     diagnostics: _containers.RepeatedCompositeFieldContainer[Diagnostic]
     supervisor: bytes
@@ -219,7 +224,8 @@ class SynthesisResult(_message.Message):
     supervisor_digest: bytes
     signature: bytes
     goals: GoalExplanation
-    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., supervisor: _Optional[bytes] = ..., reason: _Optional[str] = ..., summary: _Optional[_Union[Summary, _Mapping]] = ..., statistics: _Optional[_Union[Statistics, _Mapping]] = ..., explanation: _Optional[str] = ..., supervisor_digest: _Optional[bytes] = ..., signature: _Optional[bytes] = ..., goals: _Optional[_Union[GoalExplanation, _Mapping]] = ...) -> None: ...
+    accepted: _containers.RepeatedCompositeFieldContainer[Diagnostic]
+    def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., supervisor: _Optional[bytes] = ..., reason: _Optional[str] = ..., summary: _Optional[_Union[Summary, _Mapping]] = ..., statistics: _Optional[_Union[Statistics, _Mapping]] = ..., explanation: _Optional[str] = ..., supervisor_digest: _Optional[bytes] = ..., signature: _Optional[bytes] = ..., goals: _Optional[_Union[GoalExplanation, _Mapping]] = ..., accepted: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ...) -> None: ...
 
 class GoalExplanation(_message.Message):
     __slots__ = ("goals", "is_hopeless", "blamed", "is_minimal", "helpful", "nearest", "has_counter_strategy")

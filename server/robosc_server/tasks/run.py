@@ -205,8 +205,11 @@ def _check(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator[
     request = pb.CheckRequest.FromString(content)
     bundle = from_proto.bundle(request.bundle)
     on_report(Report("check", bundle.main.name))
-    found = check_automata_file(bundle) if isinstance(bundle, LoadedAutomata) else check(bundle)
-    yield pb.CheckResponse(diagnostics=to_proto.findings(found.diagnostics))
+    if isinstance(bundle, LoadedAutomata):
+        yield pb.CheckResponse(diagnostics=to_proto.findings(check_automata_file(bundle).diagnostics))
+        return
+    found = check(bundle)
+    yield pb.CheckResponse(diagnostics=to_proto.findings(found.diagnostics), accepted=to_proto.findings(found.accepted))
 
 
 def _automata(
@@ -228,6 +231,7 @@ def _synthesize(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iter
     result = pb.SynthesisResult()
     with attempt:
         made = attempt.make(request, limits.nodes, on_report, allow_livelock=request.options.allow_livelock)
+        result.accepted.extend(to_proto.findings(made.accepted))
         if made.statistics is not None:
             result.statistics.CopyFrom(to_proto.statistics(made.statistics))
         if made.supervisor is not None:

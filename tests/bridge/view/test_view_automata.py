@@ -117,7 +117,7 @@ async def test_what_is_shown(tmp_path: Path) -> None:
             ("line.belt.c_turn", True),
         ]
         assert play["events"][0]["fields"] == [
-            {"path": [], "type": "boolean", "choices": ["false", "true"], "is_boolean": True}
+            {"path": [], "type": "boolean", "choices": ["false", "true"], "is_boolean": True, "is_required": False}
         ]
         # The supervisor does not let it begin at 4. Input variables change at any time.
         assert play["beginnings"] == [f"tank.level = {level}" for level in range(4)]

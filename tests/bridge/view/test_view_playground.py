@@ -318,7 +318,13 @@ async def test_events_happen_with_their_data_and_are_taken_back() -> None:
         events = {item["event"]: item for item in definition["play"]["events"]}
         assert [name for name, item in events.items() if item["controllable"]] == ["open.request", "shut.request"]
         (field,) = events["light.response"]["fields"]
-        assert field == {"path": [], "type": "Light", "choices": ["day", "night"], "is_boolean": False}
+        assert field == {
+            "path": [],
+            "type": "Light",
+            "choices": ["day", "night"],
+            "is_boolean": False,
+            "is_required": True,
+        }
         first = await page.receive("run")
         assert (first["steps"], first["undo"], first["redo"], first["is_marked"]) == (0, "", "", True)
         assert first["blocked"]["shut.request"] == ["Gate is in closed, not in opened"]

@@ -15,19 +15,10 @@ from robosc.controller_properties import StrategyRun
 from robosc.event_logs import check_log, read_log
 from robosc.execution.interpreter import InterpretedSystem
 from robosc.execution.runtime.protocol import MissingData
-from robosc.expressions import (
-    ArrayType,
-    BooleanType,
-    DoubleType,
-    EnumType,
-    IntegerType,
-    ObjectType,
-    StringType,
-    Type,
-)
-from robosc.model.structure import EventKind, Model, is_tau
+from robosc.pipeline.received_data import data_fields
 from support.effort import seeds
 from support.execution import unsupervised
+from support.fitting_data import fitting, received
 from support.lift import LIFT
 from support.loaders import MODEL as LOADER
 from support.models import EXAMPLES
@@ -75,33 +66,30 @@ def run(supervisor: robosc.Supervisor) -> robosc.Run:
     return robosc.simulate(supervisor)
 
 
-def fitting(dice: Random, model: Model, type_: Type | None) -> Any:
-    """Data of a type, as a sensor would send it."""
-    match type_:
-        case ObjectType(name=name):
-            parts = next(item.properties for item in model.objects if item.name == name)
-            return {part.name: fitting(dice, model, part.type) for part in parts if dice.random() < 0.9}
-        case ArrayType(element=element):
-            return [fitting(dice, model, element) for _ in range(dice.randint(0, 3))]
-        case EnumType(name=name):
-            return fitting(dice, model, next(item.source for item in model.enums if item.name == name))
-        case BooleanType():
-            return dice.random() < 0.5
-        case IntegerType():
-            return dice.choice([-1, 0, 1, 2, 3, 7, 100])
-        case DoubleType():
-            return dice.choice([0.0, 0.5, -1.5, 3, 1e9])
-        case StringType():
-            return dice.choice(["x", "other words", ""])
-        case _:
-            return None
-
-
-def received(model: Model, event: str) -> Type | None:
-    if is_tau(event):
+def without(data: Any, path: tuple[str, ...]) -> Any:
+    """Data in which a part is left out."""
+    if not path:
         return None
-    name, _, kind = event.partition(".")
-    return model.communication(name).received_type(EventKind(kind))
+    kept = {**data, path[0]: without(data[path[0]], path[1:])}
+    return kept if len(path) > 1 else {name: part for name, part in data.items() if name != path[0]}
+
+
+@pytest.mark.random
+@pytest.mark.parametrize("seed", seeds(25))
+def test_what_is_required_is_what_the_interpreter_refuses_to_miss(seed: int) -> None:
+    core = random_supervisor(seed)
+    dice = Random(f"fields {seed}")
+    twin = InterpretedSystem(core)
+    for event in to_automata(core.model, core.deployment).events:
+        for field in data_fields(core.model, event.name):
+            data = fitting(dice, core.model, received(core.model, event.name), complete=True)
+            twin.read(event.name, data)
+            try:
+                twin.read(event.name, without(data, field.path))
+            except MissingData:
+                assert field.is_required
+            else:
+                assert not field.is_required
 
 
 @pytest.mark.random

@@ -19,7 +19,7 @@ from support.models import EXAMPLES
 # Rules of ament_flake8 and ament_pep257 that ruff has, too; the linters themselves run in acceptance/.
 SELECTED = "A001,A002,C4,D,E,F,Q,W"
 EXAMPLE_MODELS = sorted(path.relative_to(EXAMPLES).with_suffix("").as_posix() for path in EXAMPLES.glob("*/*.rscd"))
-IGNORED = "C416,D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404"
+IGNORED = "D100,D101,D102,D103,D104,D105,D106,D107,D203,D212,D404"
 
 
 @pytest.mark.parametrize("name", PACKAGES)

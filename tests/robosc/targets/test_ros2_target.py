@@ -135,6 +135,9 @@ def test_a_given_parameter_hides_that_of_the_file(files: GeneratedFiles, tmp_pat
     whole, left = (yaml.safe_load(Path(path).read_text("utf-8"))["/**"]["ros__parameters"] for path in (file, chosen))
     assert left == {name: value for name, value in whole.items() if name not in ("period", "seed")}
     assert names["arguments"](["--ros-args", "-p", "other:=1"])[2] == str(file)
+    # ROS itself refuses a section that is none.
+    file.write_text("/**: {ros__parameters: {period: 0.1}}\nodd: 3\n", encoding="utf-8")
+    assert yaml.safe_load(Path(names["arguments"](given)[2]).read_text("utf-8")) == {"odd": 3}
 
 
 def test_the_readme_names_every_topic_and_parameter(files: GeneratedFiles) -> None:

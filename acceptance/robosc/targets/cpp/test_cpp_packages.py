@@ -22,7 +22,10 @@ MISFIT = """
 robot Misfit {
     datatype object Wrong { x: string w: double }
     interface i use Vector3 from geometry_msgs
-    component C { outgoing message m with identifier: "/m", type: Wrong links i }
+    component C {
+        outgoing message m with identifier: "/m", type: Wrong links i
+        behaviour { variable w: double on response from m do w := value.w initial marked state s { } }
+    }
 }
 """
 

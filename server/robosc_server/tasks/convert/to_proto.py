@@ -40,6 +40,7 @@ def findings(diagnostics: Iterable[Diagnostic]) -> list[pb.Diagnostic]:
             location=_location(item.location) if item.location else None,
             mend=item.fix,
             related=map(_related, item.related),
+            accepted=item.accepted or "",
         )
         for item in diagnostics
     ]

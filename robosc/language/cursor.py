@@ -109,6 +109,11 @@ class Cursor:
         last = self.place - 1
         return self._places.location(self._starts[index], self._starts[last] + len(self.texts[last]))
 
+    def text_since(self, index: int) -> str:
+        """What is written from a token to the last one that was read."""
+        last = self.place - 1
+        return self._file.text[self._starts[index] : self._starts[last] + len(self.texts[last])]
+
     # Faults
 
     def report(self, code: str, message: str, location: Location, fix: str, *related: RelatedPlace) -> None:

@@ -5,7 +5,7 @@ after them, allow contextual keywords as names, and take linear time on any text
 grammar `tests/support/robosc.tx`.
 """
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 
@@ -35,6 +35,9 @@ _NEEDED = "a request is only made where requirements hold, so write 'requirement
 _CHOSEN = "what is received always counts, so go to a state from where a 'transition if ...' chooses."
 _RESULT_KINDS = ("request", "response", "feedback", "error", "cancel")
 _QUALITIES = ("reliable", "best_effort", "sensor", "latched")
+
+type _Nested = dict[str, _Nested | str]
+"""Text of each property of an object, by its name."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -529,22 +532,22 @@ class _Parser(MissionParser):
             if self.kinds[begin] == _NAME and self.texts[begin + 1] == ":":
                 raise self.fault("'{'", fix="Write '{' before it.")
             return self.expression()
-        self.place += 1
-        self.deeper(begin)
-        properties: list[tuple[syntax.Name, syntax.ObjectValue | syntax.Expression]] = []
-        if self.texts[self.place] != "}":
-            properties.append((self.name(), self._property_value()))
-            while self.takes(","):
-                properties.append((self.name(), self._property_value()))
-        self.take("}")
-        self.shallower()
-        return syntax.ObjectValue(tuple(properties), self.since(begin))
+        return syntax.ObjectValue(self._properties(self._provided), self.since(begin))
 
     def _limit(self) -> syntax.Limit:
+        begin = self.place
         place = self.at(self.take("limit"))
         communication = self.name()
+        dot = self.place
+        path = tuple(self._path())
         self.take("to")
+        first = self.place
         range_ = self._range()
+        if path:
+            nested: _Nested = {}
+            _nest(nested, path, self.text_since(first))
+            meant = f"limit {self.texts[dot - 1]} to {_nested_text(nested)}"
+            raise self._not_nested(dot, meant, self.text_since(begin))
         condition = self.expression() if self.takes("if") else None
         return syntax.Limit(communication, range_, condition, place)
 
@@ -556,24 +559,65 @@ class _Parser(MissionParser):
             low = self.expression()
             self.take("..")
             return syntax.Range(low, self.expression(), self.since(begin))
+        return syntax.ObjectRange(self._properties(self._range), self.since(begin))
+
+    def _properties[Node](self, read: Callable[[], Node]) -> tuple[tuple[syntax.Name, Node], ...]:
+        """Read the properties of an object in braces, each with what stands behind its colon."""
+        begin = self.place
         self.place += 1
         self.deeper(begin)
-        properties: list[tuple[syntax.Name, syntax.ObjectRange | syntax.Range]] = []
-        if self.texts[self.place] != "}":
-            properties.append((self.name(), self._property_range()))
-            while self.takes(","):
-                properties.append((self.name(), self._property_range()))
+        properties: list[tuple[syntax.Name, Node]] = []
+        nested: _Nested = {}
+        dot = None
+        while self.texts[self.place] != "}" or properties:
+            name = self.name()
+            word = self.texts[self.place - 1]
+            if dot is None and self.texts[self.place] == ".":
+                dot = self.place
+            path = (word, *self._path())
+            self.take(":")
+            first = self.place
+            properties.append((name, read()))
+            _nest(nested, path, self.text_since(first))
+            if not self.takes(","):
+                break
         self.take("}")
         self.shallower()
-        return syntax.ObjectRange(tuple(properties), self.since(begin))
+        if dot is not None:
+            raise self._not_nested(dot, _nested_text(nested), self.text_since(begin))
+        return tuple(properties)
 
-    def _property_range(self) -> syntax.ObjectRange | syntax.Range:
-        self.take(":")
-        return self._range()
+    def _path(self) -> Iterator[str]:
+        """Read the further names of a path, which other languages have for the property of a property."""
+        while self.kinds[self.place + 1] == _NAME and self.takes("."):
+            self.name()
+            yield self.texts[self.place - 1]
 
-    def _property_value(self) -> syntax.ObjectValue | syntax.Expression:
-        self.take(":")
-        return self._provided()
+    def _not_nested(self, dot: int, meant: str, written: str) -> Fault:
+        """Report a path where objects are nested; raise what is returned."""
+        self.report(
+            "syntax-error",
+            "'.' does not fit here: an object in braces stands for each property that has properties",
+            self.at(dot),
+            f"Write '{meant}'" + ("." if "\n" in written else f" instead of '{written}'."),
+        )
+        return self.reported_fault()
+
+
+def _nest(nested: _Nested, path: Sequence[str], text: str) -> None:
+    """Put the text behind a path where objects are nested."""
+    first, *rest = path
+    inner = nested.setdefault(first, {})
+    if not rest or isinstance(inner, str):
+        nested[first] = " ".join(text.split())
+    else:
+        _nest(inner, rest, text)
+
+
+def _nested_text(nested: _Nested | str) -> str:
+    if isinstance(nested, str):
+        return nested
+    return "{ " + ", ".join(f"{name}: {_nested_text(inner)}" for name, inner in nested.items()) + " }"
 
 
 @dataclass(frozen=True, slots=True)

@@ -1,11 +1,13 @@
 """Collection of the findings of all checks."""
 
 import re
-from collections.abc import Collection, Iterable
+from collections.abc import Collection, Iterable, Mapping
 
 from robosc.errors import Diagnostic, RelatedPlace, Severity
+from robosc.expressions import Type
 from robosc.language import syntax
 from robosc.language.words import spelled
+from robosc.model.structure import Communication
 from robosc.source import Location, SourceFile
 
 _MAXIMUM_COMPARISONS = 20_000
@@ -143,6 +145,27 @@ class Findings:
         """Add an `unknown-name` error, unless another error explains it."""
         if not self.explain(name):
             self.unknown("communication", name, location, known)
+
+    def request_of(
+        self, name: syntax.Name, communications: Mapping[str, Communication], code: str, why: str, fix: str
+    ) -> Type | None:
+        """Return the type of the request of the communication that a name denotes; None, with an error, without one.
+
+        Args:
+            name: Name that is written; its definition is noted.
+            communications: All communications of the robot.
+            code: Code of the error about an outgoing message, which has no request.
+            why: Reason for which an outgoing message does not fit.
+            fix: Advice on what fits.
+        """
+        found = communications.get(name.text)
+        self.bindings.bind_communication(name)
+        if found is None:
+            self.unknown_communication(name.text, name.location, communications)
+            return None
+        if found.request is None:
+            self.error(code, f"'{name.text}' is an outgoing message: {why}", name.location, fix)
+        return found.request
 
     def near(self, name: str, known: Iterable[str]) -> str | None:
         """The nearest known name; None once so many names have been compared that more would take noticeable time."""

@@ -56,20 +56,16 @@ class LimitBuilder:
         """A limit of the model, or None where it is broken."""
         name = tree.communication
         condition = None if tree.condition is None else self._checker.condition(tree.condition)
-        communication = communications.get(name.text)
-        self._findings.bindings.bind_communication(name)
-        if communication is None:
-            self._findings.unknown_communication(name.text, name.location, communications)
+        request = self._findings.request_of(
+            name,
+            communications,
+            "limit-on-outgoing",
+            "a component sends it, and nothing can move its numbers",
+            "Limit an incoming message, a service or an action.",
+        )
+        if request is None:
             return None
-        if communication.request is None:
-            self._findings.error(
-                "limit-on-outgoing",
-                f"'{name.text}' is an outgoing message: a component sends it, and nothing can move its numbers",
-                name.location,
-                "Limit an incoming message, a service or an action.",
-            )
-            return None
-        bounds = self._bounds(tree.range, communication.request, name, ())
+        bounds = self._bounds(tree.range, request, name, ())
         if bounds is None or (tree.condition is not None and condition is None):
             return None
         return Limit(name.text, bounds, condition)

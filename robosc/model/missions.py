@@ -120,21 +120,17 @@ def _requests(
     found: dict[str, None] = {}
     is_sound = True
     for name in names:
-        communication = communications.get(name.text)
-        findings.bindings.bind_communication(name)
-        if communication is None:
-            findings.unknown_communication(name.text, name.location, communications)
-        elif communication.request is None:
-            findings.error(
-                "preference-on-outgoing",
-                f"'{name.text}' is an outgoing message: a component sends it, and no strategy chooses it",
-                name.location,
-                "Name an incoming message, a service or an action.",
-            )
+        request = findings.request_of(
+            name,
+            communications,
+            "preference-on-outgoing",
+            "a component sends it, and no strategy chooses it",
+            "Name an incoming message, a service or an action.",
+        )
+        if request is None:
+            is_sound = False
         else:
             found[name.text] = None
-            continue
-        is_sound = False
     return tuple(found) if is_sound else None
 
 

@@ -9,7 +9,6 @@ from robosc.model.expression_checker import ExpressionChecker
 from robosc.model.findings import Findings
 from robosc.model.structure import (
     Communication,
-    CommunicationKind,
     Invariant,
     ObjectValue,
     Provide,
@@ -55,18 +54,14 @@ def _restricted(
     tree: syntax.Requirement, communications: Mapping[str, Communication], findings: Findings
 ) -> Iterator[str]:
     for name in tree.communications:
-        communication = communications.get(name.text)
-        findings.bindings.bind_communication(name)
-        if communication is None:
-            findings.unknown_communication(name.text, name.location, communications)
-        elif communication.kind is CommunicationKind.OUTGOING_MESSAGE:
-            findings.error(
-                "requirement-on-outgoing",
-                f"'{name.text}' is an outgoing message: a component sends it, and no requirement can forbid it",
-                name.location,
-                "Restrict an incoming message, a service or an action.",
-            )
-        else:
+        request = findings.request_of(
+            name,
+            communications,
+            "requirement-on-outgoing",
+            "a component sends it, and no requirement can forbid it",
+            "Restrict an incoming message, a service or an action.",
+        )
+        if request is not None:
             yield name.text
 
 
@@ -93,22 +88,18 @@ class ProvideBuilder:
         """A provide statement of the model, or None where it is broken."""
         name = tree.communication
         condition = None if tree.condition is None else self._checker.condition(tree.condition)
-        communication = communications.get(name.text)
-        self._findings.bindings.bind_communication(name)
-        if communication is None:
-            self._findings.unknown_communication(name.text, name.location, communications)
-            return None
-        if communication.request is None:
-            self._findings.error(
-                "provide-to-outgoing",
-                f"'{name.text}' is an outgoing message: its data come from the component",
-                name.location,
-                "Provide data for an incoming message, a service or an action.",
-            )
+        request = self._findings.request_of(
+            name,
+            communications,
+            "provide-to-outgoing",
+            "its data come from the component",
+            "Provide data for an incoming message, a service or an action.",
+        )
+        if request is None:
             return None
         self._because = RelatedPlace(f"'{name.text}' is declared here", self._places[name.text])
         with self._checker.where(TRUE if condition is None else condition):
-            value = self._value(tree.value, communication.request, name)
+            value = self._value(tree.value, request, name)
         if value is None or (tree.condition is not None and condition is None):
             return None
         return Provide(name.text, value, condition)

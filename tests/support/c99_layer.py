@@ -10,12 +10,15 @@ from typing import Any
 from robosc.execution.runtime.layer import (
     _A_FAULT,
     _AT_REST,
+    _CAME_TO_REST,
     _NOT_ALLOWED,
     _NOT_FINITE,
     _NOT_KNOWN,
     _NOT_WITHIN,
     _OLD_GOALS,
     _STILL_RUNNING,
+    _TOO_LONG,
+    _TURNED,
     Layer,
 )
 from robosc.execution.runtime.middleware_messages import is_finite
@@ -49,6 +52,9 @@ def refusals_of(layout: Layout) -> list[str]:
     """The reasons of a layer, in the order of its enumeration."""
     return [why for why in REFUSALS if layout.numbers or why != _NOT_WITHIN]
 
+
+ABORTS = (*(f"its server: {outcome}" for outcome in OUTCOMES), _TURNED, _CAME_TO_REST, _TOO_LONG)
+"""The reasons why a goal ends as aborted, in the order of the enumeration of a layer."""
 
 _ENDS = ("succeeded", "aborted", "cancelled")
 
@@ -189,7 +195,8 @@ class LayerReference(Reference):
     def end_goal(self, communication: str, goal_id: Any, outcome: str, data: Any, why: str) -> None:
         """Remember."""
         number = -1 if data is None and outcome != "succeeded" else self.number(data)
-        self._send("end", self.numbers[communication], goal_id, _ENDS.index(outcome), number)
+        reason = ABORTS.index(why) if outcome == "aborted" else -1
+        self._send("end", self.numbers[communication], goal_id, _ENDS.index(outcome), number, reason)
 
     def write(self, entry: dict[str, Any]) -> None:
         """Remember what happened."""

@@ -19,6 +19,14 @@ CALLBACKS = (
 )
 """Names of the callbacks here, in the order of the struct; also the bits of those that are to fail."""
 
+_ABORT_REASON = """
+#if @P@_ACTION_COUNT > 0
+#define ABORT_REASON(action) ((int)@p@_abort_reason(&r, action))
+#else
+#define ABORT_REASON(action) (-1)
+#endif
+"""
+
 _CALLBACK = """
 static bool do_@name@(void *context@parameters@)
 {
@@ -188,6 +196,7 @@ class _LayerProgram(_Program):
             self.cases("do_back", "int number, uint64_t now_us, uint32_t id, const void *message", back),
             self.cases("do_request", "int number, uint64_t now_us", asked),
             self.print_state(),
+            _ABORT_REASON,
             *([_SET_NUMBER] if layout.numbers else []),
             *(_callback(name, place) for place, name in enumerate(CALLBACKS)),
             _MAIN.replace("@callbacks@", ", ".join(f"do_{name}" for name in self.callbacks())),
@@ -215,6 +224,10 @@ def _callback(name: str, place: int) -> str:
         formats.append("%s" if word == "identifier" else "%d")
         shown = {"identifier": "in_hexadecimal(identifier)", "message": "token(message)"}
         arguments.append(shown.get(word, f"(int){word}"))
+    if name == "end":
+        # The reason of an aborted goal belongs to its end, though a caller asks for it.
+        formats.append("%d")
+        arguments.append("end == @P@_END_ABORTED ? ABORT_REASON(communication) : -1")
     text = _CALLBACK.replace("@name@", name).replace("@flag@", str(2**place))
     text = text.replace("@format@", ", ".join([f'"{" ".join(formats)}\\n"', *arguments]))
     return text.replace("@parameters@", "".join(f", {parameter}" for parameter in parameters))

@@ -48,6 +48,7 @@ _FILES = (
     "test/test_supervisor.py",
     "{package}/connections.py",
     "{package}/diagnostics.py",
+    "{package}/entry.py",
     "{package}/host.py",
     "{package}/interfaces.py",
     "{package}/node.py",
@@ -142,8 +143,8 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
         files[path.format(package=name)] = get_template(f"{replaced.get(file, file)}.j2").render(values)
     files |= {path.format(package=name): "" for path in middleware.markers}
     scripts = _scripts(supervisor, str(values["starter"])) if middleware.script else {}
-    for path, (module, purpose) in scripts.items():
-        files[path] = get_template(middleware.script).render(values, module=module, purpose=purpose)
+    for path, (function, purpose) in scripts.items():
+        files[path] = get_template(middleware.script).render(values, function=function, purpose=purpose)
     return GeneratedFiles(
         {
             path: folded(text) if path.endswith(".py") or path in scripts else text
@@ -154,11 +155,11 @@ def generate_package(middleware: Middleware, supervisor: Supervisor, options: Ge
 
 
 def _scripts(supervisor: Supervisor, starter: str) -> dict[str, tuple[str, str]]:
-    """Path of each program, the module that it runs, and its purpose."""
+    """Path of each program, the entry that it runs, and its purpose."""
     purpose = f"The {supervisor.deployment} of the robot {supervisor.model.name}"
     return {
-        f"scripts/{supervisor.deployment}": ("node", f"{purpose}."),
-        f"scripts/{starter}": ("start", f"{purpose} with its parameter file."),
+        f"scripts/{supervisor.deployment}": ("run_node", f"{purpose}."),
+        f"scripts/{starter}": ("run_starter", f"{purpose} with its parameter file."),
     }
 
 

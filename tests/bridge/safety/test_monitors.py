@@ -6,7 +6,14 @@ from dataclasses import replace
 import pytest
 
 from robosc_bridge.devices.interface import BatteryLevel
-from robosc_bridge.safety.monitors import BatteryMonitor, Freshness, ScanCoverageMonitor, WheelMonitor
+from robosc_bridge.safety.monitors import (
+    REFUSAL_SHOWN_S,
+    BatteryMonitor,
+    Freshness,
+    RefusalMonitor,
+    ScanCoverageMonitor,
+    WheelMonitor,
+)
 from support.safety import LIMITS, reading
 
 # Powers of two: no rounding at the borders.
@@ -292,3 +299,10 @@ def test_wheels_that_have_not_stood_still_yet_are_none_that_begin_to_rotate() ->
 def test_slow_ones_do_not_count() -> None:
     slow: list[Read] = [(ZERO, (0.03125, -0.03125), 10.0 + step) for step in range(3)]
     assert unbidden((ZERO, ZERO, 9.0), *slow) == [False] * 4
+
+
+def test_a_refused_reading_is_shown_until_its_time_has_passed() -> None:
+    monitor = RefusalMonitor()
+    monitor.update(1, 8.0)
+    assert monitor.is_recent(8.0 + REFUSAL_SHOWN_S / 2)
+    assert not monitor.is_recent(8.0 + REFUSAL_SHOWN_S)

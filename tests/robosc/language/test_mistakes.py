@@ -193,3 +193,38 @@ def test_the_type_of_a_variable_is_looked_for_in_the_begin_of_a_text() -> None:
     found = first_error(begin.replace("do_", many))
     assert found is not None
     assert found.fix == "Write ': boolean' before it."
+
+
+NESTED = """robot Limited {
+    datatype object Vector { x: double y: double }
+    datatype object Twist { linear: Vector angular: Vector }
+    interface twist use Twist from geometry_msgs
+    component Base { incoming message drive with identifier: "/cmd_vel", type: Twist links twist }
+    ITEM
+}"""
+
+
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("limit drive.linear.x to -0.1..0.1", "limit drive to { linear: { x: -0.1..0.1 } }"),
+        (
+            "limit drive to { linear.x: -0.1..0.1, linear.y: 0.0..0.5, angular: { x: 0.0..1.0 } }",
+            "limit drive to { linear: { x: -0.1..0.1, y: 0.0..0.5 }, angular: { x: 0.0..1.0 } }",
+        ),
+        ("provide drive with { linear.x: 0.5 }", "provide drive with { linear: { x: 0.5 } }"),
+    ],
+)
+def test_a_path_to_a_property_is_shown_as_nested_objects(written: str, meant: str) -> None:
+    text = NESTED.replace("ITEM", written)
+    found = first_error(text)
+    assert found is not None
+    assert "'.' does not fit here" in found.message
+    assert obeyed(text, found) == NESTED.replace("ITEM", meant)
+    assert first_error(NESTED.replace("ITEM", meant)) is None
+
+
+def test_a_path_in_braces_over_several_lines_is_shown_as_nested_objects() -> None:
+    found = first_error(NESTED.replace("ITEM", "limit drive to {\n linear.x: 0.0..0.5,\n linear.y: 0.0..0.1 }"))
+    assert found is not None
+    assert found.fix == "Write '{ linear: { x: 0.0..0.5, y: 0.0..0.1 } }'."

@@ -1,6 +1,8 @@
 """All targets at once: what each gives alone, in folders, and what refuses is reported."""
 
 import json
+import re
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -30,6 +32,7 @@ from support.generated import example_supervisor
 from support.models import bundle_of
 
 EXAMPLES = Path(__file__).parents[3] / "examples"
+LINE_FOLLOWER = EXAMPLES / "line_follower" / "line_follower_layer.rscd"
 MAZE = EXAMPLES / "maze_solver" / "maze_solver.rscd"
 
 SPACES = """robot Spaces {
@@ -60,6 +63,18 @@ def refusing(name: str) -> None:
         raise UnsupportedModelError("no | model\nwill do")
 
     register(Target(TargetInfo(name, "picky"), refuse))
+
+
+@pytest.mark.parametrize("deployment", Deployment)
+@pytest.mark.parametrize("name", [info.name for info in available_targets()])
+def test_a_blank_line_parts_each_heading_of_a_page_from_what_is_before(name: str, deployment: Deployment) -> None:
+    made = make_supervisor(bundle_of(LINE_FOLLOWER.read_text(encoding="utf-8")), deployment=deployment)
+    assert made.supervisor is not None
+    for path, text in generate(made.supervisor, name).items():
+        if path.endswith(".md"):
+            lines = text.splitlines()
+            crowded = [line for before, line in pairwise(lines) if before and re.match("#+ [A-Z]", line)]
+            assert not crowded, f"{path}: {crowded}"
 
 
 def test_each_target_gives_what_it_gives_alone() -> None:

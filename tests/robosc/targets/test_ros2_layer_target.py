@@ -24,7 +24,7 @@ def files() -> GeneratedFiles:
 
 
 def test_its_program_is_installed(files: GeneratedFiles) -> None:
-    assert "'layer = ' + PACKAGE + '.node:main'" in files["setup.py"]
+    assert "'layer = ' + PACKAGE + '.entry:run_node'" in files["setup.py"]
 
 
 # Names.

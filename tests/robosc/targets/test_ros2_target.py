@@ -81,7 +81,7 @@ def test_setup_py_installs_what_is_there(folder: Path, monkeypatch: pytest.Monke
     found = [str(path.parent.relative_to(folder)).replace("/", ".") for path in folder.rglob("__init__.py")]
     assert given["packages"] == sorted(found) == [PACKAGE, f"{PACKAGE}.runtime"]
     assert given["extras_require"] == {"test": ["pytest"]}
-    scripts = [f"controller = {PACKAGE}.node:main", f"start_line_follower = {PACKAGE}.start:main"]
+    scripts = [f"controller = {PACKAGE}.entry:run_node", f"start_line_follower = {PACKAGE}.entry:run_starter"]
     assert given["entry_points"] == {"console_scripts": scripts}
     installed = [path for _, paths in given["data_files"] for path in paths]
     assert all((folder / path).is_file() for path in installed)

@@ -1,6 +1,9 @@
 """Tests of input that comes while a node waits for its servers: held, and taken in before the first decision."""
 
 import importlib
+import signal
+import subprocess
+import sys
 import warnings
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +16,7 @@ from robosc.execution.runtime.runner import Status
 from robosc.execution.runtime.settings import Settings
 from robosc.model.structure import Deployment
 from robosc.targets import generate
+from robosc.targets.files import write_files
 from robosc.targets.ros.runtime.startup import HeldMessages
 from robosc.targets.ros.runtime.startup_controller import StartupBufferingExecutor
 from robosc.targets.ros.runtime.startup_layer import StartupBufferingLayer
@@ -193,3 +197,31 @@ def test_a_node_that_waits_for_its_servers_loses_nothing_and_its_stop_reaches_lo
         assert published == cancelled == []
         controller.stop("SIGINT")
     assert cancelled == ["lost goals"]
+
+
+NEVER_IMPORTED = """
+import signal
+print("importing", flush=True)
+while True:
+    signal.pause()
+"""
+
+
+@pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM, signal.SIGHUP])
+@pytest.mark.parametrize("entry", ["run_node", "run_starter"])
+@pytest.mark.parametrize("target", ["ros1", "ros2"])
+def test_a_signal_that_comes_during_imports_ends_the_node(
+    target: str, entry: str, number: signal.Signals, tmp_path: Path
+) -> None:
+    write_files(generate(unsupervised(MODEL), target), tmp_path)
+    for module in ("actionlib", "diagnostic_msgs", "rclpy", "rosgraph", "rospy"):
+        (tmp_path / f"{module}.py").write_text(NEVER_IMPORTED, encoding="utf-8")
+    line = f"from guarded_controller.entry import {entry}; {entry}()"
+    with subprocess.Popen(
+        [sys.executable, "-c", line], cwd=tmp_path, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True
+    ) as program:
+        assert program.stdout is not None
+        assert program.stdout.readline() == "importing\n"
+        program.send_signal(number)
+        assert program.communicate() == ("", "")
+        assert program.returncode == 0

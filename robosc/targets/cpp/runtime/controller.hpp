@@ -945,10 +945,32 @@ private:
     static bool on_end_goal(
         void* context, robot_communication_t action, std::uint32_t caller, robot_end_t end, const void* message)
     {
-        const char* const why
-            = end == ROBOT_END_ABORTED ? "its server, or the supervisor, ended it, or it took too long" : "";
+        const char* const why = end == ROBOT_END_ABORTED ? self(context).abort_text(action) : "";
         return attempted(context,
             [&](Middleware& middleware) { middleware.end_goal(static_cast<int>(action), caller, end, message, why); });
+    }
+
+    const char* abort_text([[maybe_unused]] robot_communication_t action) const
+    {
+#if ROBOT_ACTION_COUNT > 0
+        switch (robot_abort_reason(&robot_, action)) {
+        case ROBOT_ABORT_REJECTED:
+            return "its server: rejected";
+        case ROBOT_ABORT_ABORTED:
+            return "its server: aborted";
+        case ROBOT_ABORT_CANCELLED:
+            return "its server: cancelled";
+        case ROBOT_ABORT_LOST:
+            return "its server: lost";
+        case ROBOT_ABORT_TURNED:
+            return "the supervisor cancelled it: a requirement no longer holds";
+        case ROBOT_ABORT_STOP:
+            return "it was cancelled, because the robot was stopped";
+        case ROBOT_ABORT_FAILED:
+            break;
+        }
+#endif
+        return "it took too long, or the layer began anew";
     }
 
     /* Tell the callers whose calls and goals were refused; false if that failed. */

@@ -286,7 +286,7 @@ def test_a_goal_ends_for_its_caller_when_it_turns_against_its_requirements(tmp_p
     # `one` has failed, so `two` is cancelled: aborted for its caller as soon as its server ends it.
     world.goal("two", 9)
     world.reference.end(2, "cancelled")
-    assert world.lines()[4:] == ["cancel 1 2", "end 0 7 1 -1", "reject 1 9", f"blocked {_TWO} 3", "end 1 8 1 -1"]
+    assert world.lines()[4:] == ["cancel 1 2", "end 0 7 1 -1 1", "reject 1 9", f"blocked {_TWO} 3", "end 1 8 1 -1 4"]
     world.check(tmp_path)
 
 

@@ -21,6 +21,7 @@ from robosc.targets.ros1 import package as ros1
 from robosc.targets.ros1_cpp import package as ros1_cpp
 from robosc.targets.ros2 import package as ros2
 from robosc.targets.ros2_cpp import package as ros2_cpp
+from support.c99_layer import ABORTS
 from support.generated import example_supervisor
 from support.launch_stub import launch_actions
 from support.models import EXAMPLES, bundle_of
@@ -375,3 +376,10 @@ def test_an_object_of_a_request_is_logged_only_with_a_part(target: str) -> None:
     put = text[text.index("void put_request") :]
     assert re.search(r"if \(request\.data\.walk\.angular\.has_z\) \{\s+out \+= .*angular", put)
     assert "if (request.data.walk.linear.has_x || request.data.walk.angular.has_z) {" in put
+
+
+@pytest.mark.parametrize("target", TARGETS)
+def test_a_layer_has_the_reasons_of_the_python_layer_for_goals_that_are_aborted(target: str) -> None:
+    files = generate(steward(Deployment.LAYER, on_ros1=target == "ros1-cpp"), target)
+    text = next(text for path, text in files.items() if path.endswith("runtime/controller.hpp"))
+    assert re.findall(r'"([^"]*)"', text.split("* abort_text(")[1].split("\n    }")[0]) == list(ABORTS)

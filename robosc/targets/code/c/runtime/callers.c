@@ -66,6 +66,7 @@ static void finish(robot_t *r)
         if (first < 0) {
             break;
         }
+        r->goals[first].abort = ROBOT_ABORT_FAILED;
         end_for_caller(r, first, ROBOT_END_ABORTED, NULL);
     }
 #endif

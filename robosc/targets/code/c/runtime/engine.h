@@ -111,6 +111,20 @@ typedef enum {
     ROBOT_END_CANCELLED
 } robot_end_t;
 
+#if ROBOT_ACTION_COUNT > 0
+
+/* Reason why a goal that its caller did not cancel has ended as aborted for it. */
+typedef enum {
+    ROBOT_ABORT_REJECTED,  /* its server refused it */
+    ROBOT_ABORT_ABORTED,   /* its server gave it up */
+    ROBOT_ABORT_CANCELLED, /* somebody else cancelled it */
+    ROBOT_ABORT_LOST,      /* its server is gone */
+    ROBOT_ABORT_TURNED,    /* the supervisor cancelled it: a requirement no longer holds */
+    ROBOT_ABORT_STOP,      /* it was cancelled, because the robot came to rest */
+    ROBOT_ABORT_FAILED     /* it took too long, or the layer began anew */
+} robot_abort_t;
+#endif
+
 /* Message, request or goal that the caller sent. It is needed until the function that takes it returns. All zero is
    held back. */
 typedef struct {
@@ -273,6 +287,7 @@ typedef struct {
     bool is_awaited; /* by the caller */
     bool is_cancelled_by_caller;
     uint32_t caller_id;
+    robot_abort_t abort;
 #endif
     bool held[ROBOT_REQUIREMENT_COUNT + 1];
 } robot_goal_t;
@@ -437,4 +452,9 @@ void robot_cancel_refused(robot_t *r, uint64_t now_us, uint32_t id, bool has_end
 
 /* Cancel of the goal of an action that is under way, if there is one and it is to be cancelled. */
 robot_cancelling_t robot_cancelling(const robot_t *r, robot_communication_t action);
+#if ROBOT_IS_LAYER
+
+/* Reason why the last goal of an action that has ended as aborted for its caller did so; `end_goal` may ask for it. */
+robot_abort_t robot_abort_reason(const robot_t *r, robot_communication_t action);
+#endif
 #endif

@@ -290,4 +290,17 @@ robot_cancelling_t robot_cancelling(const robot_t *r, robot_communication_t acti
     }
     return found;
 }
+#if ROBOT_IS_LAYER
+
+robot_abort_t robot_abort_reason(const robot_t *r, robot_communication_t action)
+{
+    robot_abort_t found = ROBOT_ABORT_FAILED;
+    for (int place = 0; place < ROBOT_ACTION_COUNT; place++) {
+        if (ACTIONS[place].communication == action) {
+            found = r->goals[place].abort;
+        }
+    }
+    return found;
+}
+#endif
 #endif

@@ -139,6 +139,23 @@ static bool take_end(robot_t *r, int action, robot_outcome_t outcome)
 }
 
 #if ROBOT_IS_LAYER
+/* Return why a goal that has not succeeded is aborted to a caller that did not cancel it. */
+static robot_abort_t abort_reason(const robot_goal_t *goal, robot_outcome_t outcome)
+{
+    switch (outcome) {
+    case ROBOT_OUTCOME_REJECTED:
+        return ROBOT_ABORT_REJECTED;
+    case ROBOT_OUTCOME_ABORTED:
+        return ROBOT_ABORT_ABORTED;
+    case ROBOT_OUTCOME_LOST:
+        return ROBOT_ABORT_LOST;
+    default:
+        return goal->cancelling.why == ROBOT_CANCEL_NONE          ? ROBOT_ABORT_CANCELLED
+               : goal->cancelling.why == ROBOT_CANCEL_REQUIREMENT ? ROBOT_ABORT_TURNED
+                                                                  : ROBOT_ABORT_STOP;
+    }
+}
+
 void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id, robot_outcome_t outcome, const void *message)
 #else
 void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id, robot_outcome_t outcome)
@@ -160,6 +177,7 @@ void robot_goal_ended(robot_t *r, uint64_t now_us, uint32_t id, robot_outcome_t 
 #endif
         }
 #if ROBOT_IS_LAYER
+        r->goals[action].abort = abort_reason(&r->goals[action], outcome);
         end_for_caller(r, action, outcome == ROBOT_OUTCOME_CANCELLED ? ROBOT_END_CANCELLED : ROBOT_END_ABORTED,
                        message);
         guard(r, is_well);

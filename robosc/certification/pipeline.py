@@ -6,11 +6,11 @@ everywhere.
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import msgspec
+from msgspec.structs import replace
 
 from robosc import explanation as explanations
 from robosc.automata import ExecutableSystem, Semantics
@@ -71,8 +71,7 @@ class OutcomeStatus(StrEnum):
     MODEL_ERRORS = "model errors"
 
 
-@dataclass(frozen=True, slots=True)
-class SynthesisOutcome:
+class SynthesisOutcome(msgspec.Struct, frozen=True):
     """The outcome of `make_supervisor`.
 
     Attributes:
@@ -94,8 +93,7 @@ class SynthesisOutcome:
     accepted: tuple[Diagnostic, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class SynthesisProblem:
+class SynthesisProblem(msgspec.Struct, frozen=True):
     """A model without errors, ready for synthesis.
 
     Attributes:

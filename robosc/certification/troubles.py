@@ -5,7 +5,9 @@ Each says what would follow, and how to mend the model, as far as a mend was tri
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+from dataclasses import replace
+
+import msgspec
 
 from robosc import explanation as explanations
 from robosc.automata.compile import State
@@ -30,8 +32,7 @@ MAXIMUM_NODES = 50_000
 """Nodes of a synthesis beyond which none of these searches, each of which takes some more of them, is begun."""
 
 
-@dataclass(frozen=True, slots=True)
-class Synthesized:
+class Synthesized(msgspec.Struct, frozen=True):
     """A synthesis whose result is told.
 
     Attributes:

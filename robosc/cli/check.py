@@ -2,8 +2,9 @@
 
 import argparse
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+import msgspec
 
 from robosc.certification.reasons import reasons_json
 from robosc.cli import automata, synth
@@ -110,8 +111,7 @@ def _accepted(arguments: argparse.Namespace, bundle: Bundle) -> tuple[Diagnostic
     return check(bundle).accepted if arguments.all else ()
 
 
-@dataclass(frozen=True, slots=True)
-class _Synthesized:
+class _Synthesized(msgspec.Struct, frozen=True):
     """Result of checking and synthesis.
 
     Attributes:

@@ -2,8 +2,10 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
+from dataclasses import asdict
 from typing import TYPE_CHECKING
+
+import msgspec
 
 if TYPE_CHECKING:
     from robosc.synthesis import Statistics
@@ -20,8 +22,7 @@ _NAMES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Figures:
+class Figures(msgspec.Struct, frozen=True):
     """Figures of a synthesis.
 
     Attributes:

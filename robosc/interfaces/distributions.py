@@ -5,13 +5,13 @@ lines, each after a blank. `deploy/collect_interfaces.py` writes the files.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
 
+import msgspec
 
-@dataclass(frozen=True, slots=True)
-class Distribution:
+
+class Distribution(msgspec.Struct, frozen=True):
     """A ROS distribution.
 
     Attributes:

@@ -7,7 +7,8 @@ grammar `tests/support/robosc.tx`.
 
 from collections.abc import Callable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+
+import msgspec
 
 from robosc.errors import Diagnostic, RelatedPlace, sorted_diagnostics
 from robosc.language import syntax
@@ -37,8 +38,7 @@ _RESULT_KINDS = ("request", "response", "feedback", "error", "cancel")
 _QUALITIES = ("reliable", "best_effort", "sensor", "latched")
 
 
-@dataclass(frozen=True, slots=True)
-class Parsed:
+class Parsed(msgspec.Struct, frozen=True):
     """Result of parsing a text.
 
     Attributes:
@@ -576,8 +576,7 @@ class _Parser(MissionParser):
         return self._provided()
 
 
-@dataclass(frozen=True, slots=True)
-class _WithList:
+class _WithList(msgspec.Struct, frozen=True):
     """Content of a `with` list."""
 
     identifier: syntax.Text | None

@@ -2,7 +2,6 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict
 from typing import TYPE_CHECKING
 
 import msgspec
@@ -37,6 +36,9 @@ class Figures(msgspec.Struct, frozen=True):
         """Return the figures as JSON values; None without a synthesis."""
         if self.statistics is None:
             return None
+        # Not at the beginning: `robosc check` loads nothing else that needs this slow module.
+        from dataclasses import asdict
+
         figures = asdict(self.statistics) | {"kernel": self._kernel(), "seconds": round(self.seconds, 3)}
         return {name: figures[name] for name in _NAMES}
 

@@ -8,12 +8,12 @@ import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 from types import CodeType, FrameType
 from typing import Any
 
 import pytest
-from msgspec.structs import replace
 
 from robosc.execution.runtime.event_log import NullLog
 from robosc_bridge.assembly import EXCHANGE_S, assemble

@@ -14,8 +14,9 @@ one `LanguageError` (or returns them, where a result with warnings exists).
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass
 from enum import StrEnum
+
+import msgspec
 
 from robosc.source import Bundle, Location, visible
 
@@ -28,16 +29,14 @@ class Severity(StrEnum):
     NOTE = "note"
 
 
-@dataclass(frozen=True, slots=True)
-class RelatedPlace:
+class RelatedPlace(msgspec.Struct, frozen=True):
     """Another place that explains a finding, such as a first definition."""
 
     message: str
     location: Location
 
 
-@dataclass(frozen=True, slots=True)
-class Diagnostic:
+class Diagnostic(msgspec.Struct, frozen=True):
     """One finding about a model.
 
     Attributes:

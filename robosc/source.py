@@ -1,6 +1,5 @@
 """Source texts and places in them, to which every diagnostic refers."""
 
-from dataclasses import dataclass
 from functools import lru_cache
 
 import msgspec
@@ -12,8 +11,7 @@ def _sha256(text: str) -> str:
     return hashlib.sha256(text.encode("utf-8")).hexdigest()
 
 
-@dataclass(frozen=True, slots=True)
-class SourceFile:
+class SourceFile(msgspec.Struct, frozen=True):
     """One text of a bundle.
 
     Attributes:
@@ -67,8 +65,7 @@ class Location(msgspec.Struct, frozen=True, order=True, gc=False):
         return f"{self.file}:{self.line}:{self.column}"
 
 
-@dataclass(frozen=True, slots=True)
-class Bundle:
+class Bundle(msgspec.Struct, frozen=True):
     """All texts of one run: the model and the libraries it may import from.
 
     Attributes:

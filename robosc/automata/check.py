@@ -1,7 +1,9 @@
 """Check that the parts of a system fit together; a front end may run it before it passes a system on."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field, replace
+
+import msgspec
+from msgspec.structs import replace
 
 from robosc.automata.structure import Automaton, Edge, System
 from robosc.errors import Diagnostic, InvalidExpressionError, InvalidSystemError
@@ -18,8 +20,7 @@ _FRAMES_PER_LEVEL = 6
 """Python frames that the greediest walk through expressions has open for each level."""
 
 
-@dataclass(frozen=True, slots=True)
-class SystemPlaces:
+class SystemPlaces(msgspec.Struct, frozen=True):
     """Places of the parts of a system in the files that it was read from; of parts that no file has, none.
 
     Attributes:
@@ -29,14 +30,13 @@ class SystemPlaces:
         plant_conditions: Places of `System.plant_conditions`.
     """
 
-    automata: Mapping[str, Location] = field(default_factory=dict)
+    automata: Mapping[str, Location] = msgspec.field(default_factory=dict)
     conditions: tuple[Location, ...] = ()
     invariants: tuple[Location, ...] = ()
     plant_conditions: tuple[Location, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class CheckedSystem:
+class CheckedSystem(msgspec.Struct, frozen=True):
     """Outcome of checking a file in which a front end finds automata.
 
     Attributes:
@@ -47,7 +47,7 @@ class CheckedSystem:
 
     system: System | None
     diagnostics: tuple[Diagnostic, ...]
-    places: SystemPlaces = field(default_factory=SystemPlaces)
+    places: SystemPlaces = msgspec.field(default_factory=SystemPlaces)
 
 
 def check_system(system: System) -> None:
@@ -86,8 +86,7 @@ def _expressions(system: System) -> Iterator[tuple[Expression, str]]:
     yield system.marker, "the marker condition"
 
 
-@dataclass(frozen=True, slots=True)
-class _Checker:
+class _Checker(msgspec.Struct, frozen=True):
     system: System
 
     def problems(self) -> Iterator[str]:

@@ -1,7 +1,8 @@
 """The controlled system as an explicit graph: plants, event conditions and a supervisor's added conditions."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+
+import msgspec
 
 from robosc.automata.compile import State
 from robosc.automata.semantics import Semantics, TooManyChoicesError
@@ -17,8 +18,7 @@ STOP_INTERVAL = 64
 """States handled between two questions whether to stop."""
 
 
-@dataclass(frozen=True, slots=True)
-class ControlledGraph:
+class ControlledGraph(msgspec.Struct, frozen=True):
     """Every state of the controlled system; a state's number is its place in `states`.
 
     Attributes:

@@ -4,6 +4,8 @@ from bisect import bisect_right
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
+import msgspec
+
 from robosc.automata.compile import State
 from robosc.expressions import Value
 
@@ -18,8 +20,7 @@ def index_in(values: Sequence[Value]) -> Callable[[Value], int]:
     return {value: index for index, value in enumerate(values)}.__getitem__
 
 
-@dataclass(frozen=True, slots=True)
-class Test:
+class Test(msgspec.Struct, frozen=True):
     """Node: the branch that each value takes.
 
     Attributes:

@@ -1,6 +1,6 @@
 """Input variables: the environment sets them at any time to any value, and automata may read them."""
 
-from dataclasses import dataclass
+import msgspec
 
 from robosc.automata.structure import Assignment, Automaton, DiscreteVariable, Edge, Event, InputVariable
 from robosc.expressions import Expression, Received, Type, VariableRead, domain
@@ -8,8 +8,7 @@ from robosc.expressions import Expression, Received, Type, VariableRead, domain
 _LOCATION = "here"
 
 
-@dataclass(frozen=True, slots=True)
-class EnvironmentVariable:
+class EnvironmentVariable(msgspec.Struct, frozen=True):
     """An input variable, as parts of a system: one uncontrollable event gives it any value, at any time.
 
     Attributes:

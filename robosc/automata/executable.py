@@ -8,7 +8,6 @@ because it is the reference that the others are compared with.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cached_property
 
 import msgspec
@@ -36,8 +35,7 @@ CALLED_KINDS = frozenset(PLANT_LOCATIONS)
 """The kinds of communication whose plant has more than one location."""
 
 
-@dataclass(frozen=True, slots=True)
-class Moves:
+class Moves(msgspec.Struct, frozen=True):
     """Moves of the plant of a service or an action on one event.
 
     Attributes:
@@ -60,8 +58,7 @@ class Moves:
         return found.pop() if found else None
 
 
-@dataclass(frozen=True, slots=True)
-class Participant:
+class Participant(msgspec.Struct, frozen=True):
     """A component whose behaviour mentions an event.
 
     Attributes:
@@ -86,8 +83,7 @@ class Participant:
         return tuple((tuple(states), transition) for states, transition in found.values())
 
 
-@dataclass(frozen=True, slots=True)
-class ExecutableEvent:
+class ExecutableEvent(msgspec.Struct, frozen=True):
     """An event, with all that happens on it.
 
     Attributes:

@@ -5,9 +5,11 @@ executor and the game observe it at the same moments. Observing a state twice ch
 """
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
+
+import msgspec
 
 from robosc.automata.compile import subjects_read
 from robosc.automata.state import Subject
@@ -22,8 +24,7 @@ MEMORY = "goal memory"
 """Name of the automaton whose variables are the memory: no component can be called so."""
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(msgspec.Struct, frozen=True):
     """A truth value that is remembered.
 
     Attributes:
@@ -45,8 +46,7 @@ class Place:
         return Binary("and", self.read, self.update)
 
 
-@dataclass(frozen=True, slots=True)
-class Judgement:
+class Judgement(msgspec.Struct, frozen=True):
     """A goal or an assumption as a condition that is to be true again and again.
 
     Attributes:
@@ -86,8 +86,7 @@ def holds(condition: Expression) -> Expression:
     return Unary("holds", condition)
 
 
-@dataclass(frozen=True, slots=True)
-class Cancel:
+class Cancel(msgspec.Struct, frozen=True):
     """A cancel that the executor asks for by itself, where a requirement held since the request and does not any more.
 
     Asking is no event. The goal may end as cancelled from then on: that is the cancel event, if the supervisor allows
@@ -177,8 +176,7 @@ class AimKind(StrEnum):
     DETOUR_VISIT = "visit of a detour"
 
 
-@dataclass(frozen=True, slots=True)
-class Aim:
+class Aim(msgspec.Struct, frozen=True):
     """A goal, or a visit of a mission or of one of its detours: the strategy has one mode for each.
 
     Attributes:
@@ -216,8 +214,7 @@ def counted(aims: Collection[Aim]) -> str:
     return " and ".join(f"{count} {word}{'s' if count > 1 else ''}" for word, count in counts if count)
 
 
-@dataclass(frozen=True, slots=True)
-class Stage:
+class Stage(msgspec.Struct, frozen=True):
     """Stage of a mission or a detour.
 
     Attributes:
@@ -229,8 +226,7 @@ class Stage:
     is_passed: Expression
 
 
-@dataclass(frozen=True, slots=True)
-class Tour:
+class Tour(msgspec.Struct, frozen=True):
     """The stages of a mission or a detour, round and round: each stable state moves it on to one that is not passed.
 
     Attributes:
@@ -256,8 +252,7 @@ class Tour:
         return conjunction(*wanted, _comes(self.stages, number), self.stages[number].is_passed)
 
 
-@dataclass(frozen=True, slots=True)
-class Journey:
+class Journey(msgspec.Struct, frozen=True):
     """A mission as aims.
 
     Attributes:
@@ -395,8 +390,7 @@ def _any(conditions: Iterable[Expression]) -> Expression:
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class Obligations:
+class Obligations(msgspec.Struct, frozen=True):
     """Aims and assumptions of a robot, with the memory that judging them needs.
 
     Attributes:

@@ -12,11 +12,13 @@ systems modeled as extended finite automata", IEEE T-ASE 8(3), 2011, pp. 560-569
 
 from collections.abc import Callable, Iterable
 from copy import copy
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import cached_property
 from itertools import product
 from math import prod
 from operator import itemgetter
+
+import msgspec
 
 from robosc.automata.compile import (
     NO_DATA,
@@ -47,8 +49,7 @@ _Writes = tuple[tuple[int, Value], ...]
 """Values that a step writes, each with its place in a state tuple."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Update:
+class _Update(msgspec.Struct, frozen=True):
     place: int
     function: Function
     type: Type
@@ -62,8 +63,7 @@ class _Update:
                 return True
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Arc:
+class _Arc(msgspec.Struct, frozen=True, eq=False):
     """A compiled edge; compared by identity."""
 
     guard: Function
@@ -72,8 +72,7 @@ class _Arc:
     updates: tuple[_Update, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Outcome:
+class _Outcome(msgspec.Struct, frozen=True):
     """Effect of one event in a state.
 
     Attributes:
@@ -95,8 +94,7 @@ _Participant = tuple[int, dict[Value, tuple[_Arc, ...]]]
 """An automaton: place of its location, and its arcs by location."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Rule:
+class _Rule(msgspec.Struct, frozen=True):
     """Compiled meaning of one event.
 
     Attributes:
@@ -120,8 +118,8 @@ class _Rule:
     conditions: tuple[Function, ...]
     plant_conditions: tuple[Function, ...]
     plant_invariants: tuple[Function, ...]
-    outcomes: dict[object, _Outcome] = field(default_factory=dict)
-    carried: dict[object, _Writes | None] = field(default_factory=dict)
+    outcomes: dict[object, _Outcome] = msgspec.field(default_factory=dict)
+    carried: dict[object, _Writes | None] = msgspec.field(default_factory=dict)
 
     def outcome(self, state: State) -> _Outcome:
         key = self.reads(state)
@@ -293,7 +291,7 @@ class Semantics:
         """
         alone = copy(self)
         alone.system = replace(self.system, events=(event,), invariants=())
-        rule = replace(self._rules[event.name], outcomes={}, carried={})
+        rule = msgspec.structs.replace(self._rules[event.name], outcomes={}, carried={})
         alone._rules = {event.name: rule}
         alone._invariants = ()
         alone._uncontrollable = () if event.is_controllable else (rule,)

@@ -1,13 +1,12 @@
 """A global state of a system, as a flat tuple: the interchange form of every explicit algorithm."""
 
-from dataclasses import dataclass
+import msgspec
 
 from robosc.automata.structure import System
 from robosc.expressions import Type, Value, domain
 
 
-@dataclass(frozen=True, slots=True)
-class Subject:
+class Subject(msgspec.Struct, frozen=True):
     """Content of one place of a state tuple: an automaton's location, or one of its variables.
 
     Attributes:

@@ -6,7 +6,6 @@ that all that could happen before still can.
 
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass
 from itertools import islice
 
 import msgspec
@@ -30,8 +29,7 @@ _WORDS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Mend:
+class Mend(msgspec.Struct, frozen=True):
     """A transition that leads elsewhere, or that was not there.
 
     Attributes:

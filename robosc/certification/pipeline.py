@@ -6,19 +6,17 @@ everywhere.
 
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import TYPE_CHECKING
 
 import msgspec
+from msgspec.structs import replace
 
 from robosc import explanation as explanations
 from robosc.automata import ExecutableSystem, Semantics
 from robosc.automata.goal_memory import counted
 from robosc.certification.certify import certify
-from robosc.certification.goals import GoalExplanation, goal_explanation
 from robosc.certification.progress import Progress
-from robosc.certification.strategies import verify_strategy
 from robosc.certification.troubles import (
     Synthesized,
     forbidden_cancel_findings,
@@ -33,14 +31,7 @@ from robosc.model.layers import layer_findings, layer_warnings, without_controll
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
-from robosc.strategies import (
-    blame_goals,
-    goal_findings,
-    goals_and_missions,
-    layer_goal_findings,
-    put_off_findings,
-    synthesize_strategy,
-)
+from robosc.strategies.findings import layer_goal_findings
 from robosc.supervisor import CheckResult, Supervisor
 from robosc.synthesis import (
     EngineOptions,
@@ -54,6 +45,7 @@ from robosc.synthesis import (
 from robosc.verification import DEFAULT_STATES, CheckOutcome, Limits
 
 if TYPE_CHECKING:
+    from robosc.certification.goals import GoalExplanation
     from robosc.explanation import EmptyExplanation
 
 CANCEL_REASON = "no supervisor is made, because it would have to forbid a cancel that must be possible"
@@ -71,8 +63,7 @@ class OutcomeStatus(StrEnum):
     MODEL_ERRORS = "model errors"
 
 
-@dataclass(frozen=True, slots=True)
-class SynthesisOutcome:
+class SynthesisOutcome(msgspec.Struct, frozen=True):
     """The outcome of `make_supervisor`.
 
     Attributes:
@@ -94,8 +85,7 @@ class SynthesisOutcome:
     accepted: tuple[Diagnostic, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class SynthesisProblem:
+class SynthesisProblem(msgspec.Struct, frozen=True):
     """A model without errors, ready for synthesis.
 
     Attributes:
@@ -266,6 +256,17 @@ def _supervised(
     certificate = msgspec.structs.replace(certificate, controller=properties.certified())
     strategy = None
     if model.has_goals and deployment is Deployment.CONTROLLER:
+        # Models without goals do not wait for what goals need.
+        from robosc.certification.goals import goal_explanation
+        from robosc.certification.strategies import verify_strategy
+        from robosc.strategies import (
+            blame_goals,
+            goal_findings,
+            goals_and_missions,
+            put_off_findings,
+            synthesize_strategy,
+        )
+
         on_progress(Progress("strategy", counted(problem.system.obligations.aims)))
         found = synthesize_strategy(
             problem.system, result.added, engine=engine, should_stop=should_stop, on_progress=report

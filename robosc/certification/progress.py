@@ -1,11 +1,11 @@
 """Progress of long work, for callers who follow it and may stop it."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+
+import msgspec
 
 
-@dataclass(frozen=True, slots=True)
-class Progress:
+class Progress(msgspec.Struct, frozen=True):
     """Progress of long work.
 
     Attributes:

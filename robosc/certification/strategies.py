@@ -4,8 +4,9 @@ Where the search on sets is given up, more positions are looked at one by one.
 """
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+import msgspec
 
 from robosc.automata.executable import ExecutableSystem
 from robosc.automata.state import subjects
@@ -25,8 +26,7 @@ _FIRST_DIVISOR = 10
 """Divisor of the limit of positions: without missions, so many are looked at before sets of positions are tried."""
 
 
-@dataclass(frozen=True, slots=True)
-class GoalCheck:
+class GoalCheck(msgspec.Struct, frozen=True):
     """Outcome of the check of a strategy.
 
     Attributes:

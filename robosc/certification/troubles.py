@@ -5,7 +5,8 @@ Each says what would follow, and how to mend the model, as far as a mend was tri
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
 from contextlib import suppress
-from dataclasses import dataclass, replace
+
+import msgspec
 
 from robosc import explanation as explanations
 from robosc.automata.compile import State
@@ -30,8 +31,7 @@ MAXIMUM_NODES = 50_000
 """Nodes of a synthesis beyond which none of these searches, each of which takes some more of them, is begun."""
 
 
-@dataclass(frozen=True, slots=True)
-class Synthesized:
+class Synthesized(msgspec.Struct, frozen=True):
     """A synthesis whose result is told.
 
     Attributes:
@@ -174,7 +174,7 @@ def without_consequences(model: Model, answers: Answers, forbidden: Collection[s
         leading = [item.event for item in behaviour.transitions if item.target == state] if behaviour else []
         return bool(leading) and all(event in forbidden for event in leading)
 
-    return replace(
+    return msgspec.structs.replace(
         answers,
         never=tuple(item for item in answers.never if item.event not in forbidden),
         unreached=tuple(item for item in answers.unreached if not is_consequence(*item)),

@@ -4,7 +4,9 @@ If-updates and assignments of several variables become conditional expressions. 
 implication. Algebraic variables and constants are replaced by their expressions where they are used.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+
+import msgspec
 
 from robosc.automata import (
     Assignment,
@@ -45,8 +47,7 @@ MAXIMUM_VALUES = 2**20
 """Values of a variable's type beyond which it is refused."""
 
 
-@dataclass(frozen=True, slots=True)
-class Exclusion:
+class Exclusion(msgspec.Struct, frozen=True):
     """An event that is allowed only where a condition is true."""
 
     event: Entity
@@ -55,8 +56,7 @@ class Exclusion:
     at: Location
 
 
-@dataclass(slots=True)
-class Lowering:
+class Lowering(msgspec.Struct):
     """Parts of a system, gathered component by component.
 
     Attributes:
@@ -76,16 +76,16 @@ class Lowering:
 
     scopes: Scopes
     typing: Typing
-    events: list[Event] = field(default_factory=list)
-    automata: list[Automaton] = field(default_factory=list)
-    places: dict[str, Location] = field(default_factory=dict)
-    inputs: list[InputVariable] = field(default_factory=list)
-    exclusions: list[Exclusion] = field(default_factory=list)
-    invariants: list[tuple[Expression, Location]] = field(default_factory=list)
-    plant_invariants: list[Expression] = field(default_factory=list)
-    initial: list[Expression] = field(default_factory=list)
-    marker: list[Expression] = field(default_factory=list)
-    depends: dict[tuple[str, str], dict[tuple[str, str], Location]] = field(default_factory=dict)
+    events: list[Event] = msgspec.field(default_factory=list)
+    automata: list[Automaton] = msgspec.field(default_factory=list)
+    places: dict[str, Location] = msgspec.field(default_factory=dict)
+    inputs: list[InputVariable] = msgspec.field(default_factory=list)
+    exclusions: list[Exclusion] = msgspec.field(default_factory=list)
+    invariants: list[tuple[Expression, Location]] = msgspec.field(default_factory=list)
+    plant_invariants: list[Expression] = msgspec.field(default_factory=list)
+    initial: list[Expression] = msgspec.field(default_factory=list)
+    marker: list[Expression] = msgspec.field(default_factory=list)
+    depends: dict[tuple[str, str], dict[tuple[str, str], Location]] = msgspec.field(default_factory=dict)
 
     # Findings
 

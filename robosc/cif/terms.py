@@ -5,8 +5,9 @@ An expression that synthesis does not support is an error only where it is used,
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any
+
+import msgspec
 
 from robosc.cif.types import BOOL, UNKNOWN, CifType, integer
 from robosc.expressions import Binary, Conditional, Constant, EnumValue, Expression, Unary, children
@@ -18,16 +19,14 @@ MAXIMUM_SIZE = 20_000
 MAXIMUM_DEPTH = 400
 
 
-@dataclass(frozen=True, slots=True)
-class Problem:
+class Problem(msgspec.Struct, frozen=True):
     """A part of an expression that synthesis cannot take."""
 
     message: str
     location: Location
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Term:
+class Term(msgspec.Struct, frozen=True, eq=False):
     """Meaning of an expression.
 
     Attributes:

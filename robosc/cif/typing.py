@@ -1,6 +1,6 @@
 """Types of CIF's names: the type of each declaration, with its static value or the expression that it becomes."""
 
-from dataclasses import replace
+from msgspec.structs import replace
 
 from robosc.cif import syntax
 from robosc.cif.expression_typing import NAMELESS, ExpressionTyping

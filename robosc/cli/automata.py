@@ -2,8 +2,9 @@
 
 import argparse
 import sys
-from dataclasses import dataclass
 from typing import TYPE_CHECKING, Protocol
+
+import msgspec
 
 from robosc.cli.arguments import SYNTHESIS_STATES
 from robosc.cli.machine import THIS_MACHINE, Machine, watched
@@ -422,8 +423,7 @@ class _Outcome(Protocol):
         """Explanation of what is to blame."""
 
 
-@dataclass(frozen=True, slots=True)
-class WithoutSupervisor:
+class WithoutSupervisor(msgspec.Struct, frozen=True):
     """Outcome of a command for which there is no supervisor."""
 
     status: "SynthesisStatus"

@@ -2,8 +2,9 @@
 
 import argparse
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import TYPE_CHECKING
+
+import msgspec
 
 from robosc.certification.reasons import reasons_json
 from robosc.cli import automata, synth
@@ -106,8 +107,7 @@ def _checked(bundle: Bundle) -> "Findings":
     return Findings(found.diagnostics, bundle, found.accepted)
 
 
-@dataclass(frozen=True, slots=True)
-class _Synthesized:
+class _Synthesized(msgspec.Struct, frozen=True):
     """Result of checking and synthesis.
 
     Attributes:

@@ -7,9 +7,10 @@ if its command is called or all commands are listed.
 
 import argparse
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
+
+import msgspec
 
 from robosc.cli.output import UsageError
 
@@ -21,8 +22,7 @@ ENTRY_POINT_GROUP = "robosc.commands"
 _HELP = ("-h", "--help")
 
 
-@dataclass(frozen=True, slots=True)
-class Plugin:
+class Plugin(msgspec.Struct, frozen=True):
     """A command of another package.
 
     Attributes:

@@ -2,8 +2,9 @@
 
 import time
 from collections.abc import Callable
-from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING
+
+import msgspec
 
 if TYPE_CHECKING:
     from robosc.synthesis import Statistics
@@ -11,6 +12,7 @@ if TYPE_CHECKING:
 _NAMES = {
     "engine": "engine",
     "search": "search",
+    "kernel": "kernel",
     "closure": "order of steps",
     "state_bits": "state bits",
     "iterations": "rounds",
@@ -19,8 +21,7 @@ _NAMES = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Figures:
+class Figures(msgspec.Struct, frozen=True):
     """Figures of a synthesis.
 
     Attributes:
@@ -35,8 +36,20 @@ class Figures:
         """Return the figures as JSON values; None without a synthesis."""
         if self.statistics is None:
             return None
-        figures = asdict(self.statistics) | {"seconds": round(self.seconds, 3)}
+        # Not at the beginning: `robosc check` loads nothing else that needs this slow module.
+        from dataclasses import asdict
+
+        figures = asdict(self.statistics) | {"kernel": self._kernel(), "seconds": round(self.seconds, 3)}
         return {name: figures[name] for name in _NAMES}
+
+    def _kernel(self) -> str:
+        """Return the part that the kernel had in work on the diagrams."""
+        from robosc.synthesis.compiled import left_aside
+
+        if self.statistics is not None and self.statistics.engine != "cudd":
+            return "not used: it is for the engine cudd"
+        problem = left_aside()
+        return f"not used, which is slower: {problem}" if problem else "used"
 
     def __str__(self) -> str:
         figures, width = self.document() or {}, max(map(len, _NAMES.values()))

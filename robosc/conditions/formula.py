@@ -10,8 +10,9 @@ Sources: R. K. Brayton, "Factoring logic functions", IBM Journal of Research and
 from collections import Counter
 from collections.abc import Callable, Hashable, Iterable, Iterator, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
 from functools import lru_cache, partial
+
+import msgspec
 
 from robosc.conditions.cover import MAXIMUM_CUBES, Words, cover
 from robosc.conditions.literals import Vocabulary, joined, operands, spine
@@ -43,16 +44,14 @@ STEPS = 30_000
 """Steps that the search for one formula may take: some hundredths of a second."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Literal:
+class _Literal(msgspec.Struct, frozen=True):
     """A test of one place."""
 
     variable: int
     mask: int
 
 
-@dataclass(frozen=True, slots=True)
-class _Group:
+class _Group(msgspec.Struct, frozen=True):
     """Parts joined by one operator: at least two."""
 
     operator: BinaryOperator

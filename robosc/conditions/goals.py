@@ -1,7 +1,8 @@
 """Goals, visits and assumptions in the words of the language, and what a strategy chooses for each goal and visit."""
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+
+import msgspec
 
 from robosc.conditions.rendering import Formulas, in_words
 from robosc.expressions import Expression
@@ -13,8 +14,7 @@ Formula = tuple[str, DecisionDiagram, Expression | None]
 """Event with a condition on it, and the condition's formula where there is one that reads well."""
 
 
-@dataclass(frozen=True, slots=True)
-class GoalInWords:
+class GoalInWords(msgspec.Struct, frozen=True):
     """Goal, or visit of a mission, with what the strategy chooses to approach it.
 
     Attributes:

@@ -1,9 +1,10 @@
 """Tests that a place of the state has one of some values, in the model's words, with their lengths."""
 
 from collections.abc import Collection, Hashable, Iterable, Iterator
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Literal
+
+import msgspec
 
 from robosc.expressions import (
     Binary,
@@ -40,8 +41,7 @@ def merged(runs: Iterable[range]) -> Indices:
     return tuple(found)
 
 
-@dataclass(frozen=True, slots=True)
-class Membership:
+class Membership(msgspec.Struct, frozen=True):
     """A test whether a place holds one of some values.
 
     Attributes:

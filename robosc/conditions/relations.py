@@ -11,9 +11,11 @@ of differences and sums of two); sums of more places are bounded in the same way
 """
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
 from itertools import combinations, product
 from typing import Literal
+
+import msgspec
+from msgspec.structs import replace
 
 from robosc.conditions.cover import Words, cover
 from robosc.conditions.literals import Size, size
@@ -38,8 +40,7 @@ Form = tuple[tuple[int, int], ...]
 """A sum of places: each with 1, or with -1 where it is subtracted; the first one, in the model's text, with 1."""
 
 
-@dataclass(frozen=True, slots=True)
-class Relation:
+class Relation(msgspec.Struct, frozen=True):
     """A comparison of a sum of places with a number.
 
     Attributes:
@@ -63,8 +64,7 @@ class Relation:
         return replace(self, operator=_OPPOSITE[self.operator])
 
 
-@dataclass(frozen=True, slots=True)
-class Description:
+class Description(msgspec.Struct, frozen=True):
     """Condition that is true where some relations are, tests of single places are, and something else is not.
 
     Attributes:

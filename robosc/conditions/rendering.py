@@ -7,7 +7,8 @@ which `[n]` stands for line n. Each line is written only once, so the text is ne
 import re
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass
+
+import msgspec
 
 from robosc.conditions.formula import OPERANDS, formula_in
 from robosc.conditions.literals import Indices, Membership, Vocabulary, merged, operands
@@ -27,8 +28,7 @@ Target = bool | int
 """Target of a case: the outcome, or the number of a line."""
 
 
-@dataclass(frozen=True, slots=True)
-class Line:
+class Line(msgspec.Struct, frozen=True):
     """One node of a diagram.
 
     Attributes:

@@ -24,8 +24,9 @@ state the environment may send a message or answer, and any enabled request may 
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
 from itertools import product
+
+import msgspec
 
 from robosc.automata import ExecutableSystem, System
 from robosc.automata.compile import NO_DATA, Function, State, compile_expression, subjects_read
@@ -49,8 +50,7 @@ Move = tuple[tuple[str, ...], bool, Node]
 """Events, True if this can happen under every setting, and the state before any silent step."""
 
 
-@dataclass(frozen=True, slots=True)
-class Goal:
+class Goal(msgspec.Struct, frozen=True):
     """An action with requirements, whose goal the executor watches.
 
     Attributes:
@@ -93,8 +93,7 @@ class Goal:
         return mask | self.holding(state)
 
 
-@dataclass(frozen=True, slots=True)
-class SilentRun:
+class SilentRun(msgspec.Struct, frozen=True):
     """Silent steps in the executor's order, to the end.
 
     Attributes:

@@ -12,8 +12,9 @@ It shares nothing with the synthesis of strategies but the automata and what is 
 
 from collections import defaultdict
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from operator import ge
+
+import msgspec
 
 from robosc.automata.compile import NO_DATA, Function, State, compile_expression, subjects_read
 from robosc.automata.executable import ExecutableSystem
@@ -40,8 +41,7 @@ Position = tuple[Node, Memory, int]
 """A stable state, what is remembered of goals, and the goal that is approached."""
 
 
-@dataclass(frozen=True, slots=True)
-class MissedGoal:
+class MissedGoal(msgspec.Struct, frozen=True):
     """Run under a strategy that misses a goal for ever.
 
     Attributes:
@@ -56,8 +56,7 @@ class MissedGoal:
     state: State
 
 
-@dataclass(frozen=True, slots=True)
-class StrategyCheck:
+class StrategyCheck(msgspec.Struct, frozen=True):
     """Outcome of a check.
 
     Attributes:
@@ -75,8 +74,7 @@ class StrategyCheck:
     put_off: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class _Group:
+class _Group(msgspec.Struct, frozen=True):
     """Conditions that read the same of the state and the memory.
 
     Attributes:
@@ -91,7 +89,7 @@ class _Group:
     functions: tuple[Function, ...]
     looks: tuple[int, ...]
     held: tuple[int, ...]
-    known: dict[tuple[Value | None, ...], tuple[bool, ...]] = field(default_factory=dict)
+    known: dict[tuple[Value | None, ...], tuple[bool, ...]] = msgspec.field(default_factory=dict)
 
     def of(self, look: _Look, state: State, memory: Memory) -> tuple[bool, ...]:
         """Return for each condition True if it is true; the arguments are those of `_Judgements.of`."""

@@ -9,9 +9,10 @@ written differently are taken to be independent, although they may read the same
 
 import math
 from collections.abc import Hashable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
 from itertools import pairwise, product
 from math import prod
+
+import msgspec
 
 from robosc.automata.compile import Carried, Path
 from robosc.automata.inputs import valuations
@@ -46,8 +47,7 @@ MAXIMUM_CASES = 256
 """Cases of a message's data beyond which searches on sets of states take the data of its events as independent."""
 
 
-@dataclass(frozen=True, slots=True)
-class PossibleData:
+class PossibleData(msgspec.Struct, frozen=True):
     """Data that an event can carry.
 
     Attributes:
@@ -146,8 +146,7 @@ class _Terms:
                 return [False, True]
 
 
-@dataclass(slots=True)
-class _Reading:
+class _Reading(msgspec.Struct):
     """A datum that is computed from terms.
 
     Attributes:
@@ -158,8 +157,8 @@ class _Reading:
     """
 
     path: Path
-    slots: list[tuple[Hashable, IntegerType | None]] = field(default_factory=list)
-    rules: list[tuple[Expression, str]] = field(default_factory=list)
+    slots: list[tuple[Hashable, IntegerType | None]] = msgspec.field(default_factory=list)
+    rules: list[tuple[Expression, str]] = msgspec.field(default_factory=list)
     default: str | None = None
 
     def value(self, known: Mapping[Hashable, Value | None]) -> tuple[Value | None, bool]:

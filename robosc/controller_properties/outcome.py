@@ -1,13 +1,12 @@
 """Findings about a controller: plain values."""
 
-from dataclasses import dataclass
+import msgspec
 
 from robosc.automata.compile import State
 from robosc.supervisor import ControllerProperties, PropertyResult
 
 
-@dataclass(frozen=True, slots=True)
-class Livelock:
+class Livelock(msgspec.Struct, frozen=True):
     """Silent steps that do not end.
 
     Attributes:
@@ -24,8 +23,7 @@ class Livelock:
         return len(self.trace), len(self.cycle)
 
 
-@dataclass(frozen=True, slots=True)
-class Order:
+class Order(msgspec.Struct, frozen=True):
     """Silent steps in one order.
 
     Attributes:
@@ -41,8 +39,7 @@ class Order:
     asked: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Conflict:
+class Conflict(msgspec.Struct, frozen=True):
     """Silent steps whose order matters.
 
     Attributes:
@@ -56,8 +53,7 @@ class Conflict:
     other: Order
 
 
-@dataclass(frozen=True, slots=True)
-class Blocking:
+class Blocking(msgspec.Struct, frozen=True):
     """A state from which no marked state can be reached under control.
 
     Attributes:
@@ -69,8 +65,7 @@ class Blocking:
     states: tuple[State, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class ForbiddenCancel:
+class ForbiddenCancel(msgspec.Struct, frozen=True):
     """A cancel that the executor has asked for and that the supervisor forbids.
 
     Attributes:
@@ -88,8 +83,7 @@ class ForbiddenCancel:
     fallen: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Properties:
+class Properties(msgspec.Struct, frozen=True):
     """The properties of a controller.
 
     Attributes:

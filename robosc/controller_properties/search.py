@@ -6,8 +6,9 @@ problems in connexion with graphs", Numerische Mathematik 1, 1959, pp. 269-271),
 
 from collections import defaultdict
 from collections.abc import Callable
-from dataclasses import dataclass, field
 from heapq import heappop, heappush
+
+import msgspec
 
 from robosc.controller_properties.confluence import ConfluenceSearch
 from robosc.controller_properties.controller import Controller, Node
@@ -21,8 +22,7 @@ MAXIMUM_EFFORT = 5_000_000
 """Maximum number of moves of a search, multiplied by the places of a state: some seconds of work."""
 
 
-@dataclass(slots=True)
-class Searched:
+class Searched(msgspec.Struct):
     """Findings of a search.
 
     Attributes:
@@ -40,11 +40,10 @@ class Searched:
     livelock: Livelock | None = None
     conflict: Conflict | None = None
     blocking: Blocking | None = None
-    forbidden: dict[str, ForbiddenCancel] = field(default_factory=dict)
+    forbidden: dict[str, ForbiddenCancel] = msgspec.field(default_factory=dict)
 
 
-@dataclass(slots=True)
-class _Graph:
+class _Graph(msgspec.Struct):
     """Stable states by number, with their connections.
 
     Attributes:
@@ -56,12 +55,12 @@ class _Graph:
         good: States that are marked, or that pass a marked state on a way that exists under every setting.
     """
 
-    nodes: list[Node] = field(default_factory=list)
-    numbers: dict[Node, int] = field(default_factory=dict)
-    distances: list[int] = field(default_factory=list)
-    parents: list[tuple[int | None, tuple[str, ...]]] = field(default_factory=list)
-    before: defaultdict[int, list[int]] = field(default_factory=lambda: defaultdict(list))
-    good: set[int] = field(default_factory=set)
+    nodes: list[Node] = msgspec.field(default_factory=list)
+    numbers: dict[Node, int] = msgspec.field(default_factory=dict)
+    distances: list[int] = msgspec.field(default_factory=list)
+    parents: list[tuple[int | None, tuple[str, ...]]] = msgspec.field(default_factory=list)
+    before: defaultdict[int, list[int]] = msgspec.field(default_factory=lambda: defaultdict(list))
+    good: set[int] = msgspec.field(default_factory=set)
 
     def meet(self, node: Node, parent: int | None, events: tuple[str, ...]) -> tuple[int, bool]:
         """The number of a state that events reach, and whether they are the shortest way so far."""

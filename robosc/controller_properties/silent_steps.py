@@ -11,9 +11,10 @@ model:
 """
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
-from dataclasses import dataclass
 from itertools import product
 from math import prod
+
+import msgspec
 
 from robosc.automata.compile import NO_DATA, Function, State, compile_expression, subjects_read
 from robosc.automata.state import Subject, subject_domain, subjects
@@ -142,8 +143,7 @@ def _has_cycle(steps: _Steps, width: int, states: Iterable[State]) -> bool:
     return len(done) < len(after)
 
 
-@dataclass(frozen=True, slots=True)
-class _Step:
+class _Step(msgspec.Struct, frozen=True):
     """A silent step.
 
     Attributes:

@@ -7,8 +7,8 @@ from enum import StrEnum
 
 from robosc.dd_modules import has_cudd
 from robosc.doctor.machine import Machine
-from robosc.kernel import kernel_problem
 from robosc.python_versions import FIX, unsupported
+from robosc.synthesis.compiled import left_aside
 
 _IMPORT_S = 30.0
 _SERVER_S = 20.0
@@ -157,7 +157,7 @@ def _packages(machine: Machine, needed: frozenset[Purpose], *, all_parts: bool) 
 
 
 def _kernel() -> Finding:
-    problem = kernel_problem()
+    problem = left_aside()
     if not problem:
         return Finding("kernel", Grade.OK, "the inner loops of synthesis are in C")
     return Finding(
@@ -196,9 +196,14 @@ def _required(requirements: Iterable[str], extra: str) -> list[tuple[str, str]]:
     return sorted(found)
 
 
-def _is_enough(version: str, bound: str) -> bool:
-    """Return True if a version is at least that of a bound `>=`; other bounds are not judged."""
-    return not bound.startswith(">=") or _numbers(version) >= _numbers(bound[2:])
+def _is_enough(version: str, bounds: str) -> bool:
+    """Return True if a version is within bounds `>=` and `<`, separated by commas; other bounds are not judged."""
+    return all(
+        _numbers(version) >= _numbers(bound[2:])
+        if bound.startswith(">=")
+        else not bound.startswith("<") or bound.startswith("<=") or _numbers(version) < _numbers(bound[1:])
+        for bound in map(str.strip, bounds.split(","))
+    )
 
 
 def _numbers(version: str) -> tuple[int, ...]:

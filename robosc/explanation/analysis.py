@@ -8,10 +8,12 @@ and closed under uncontrollable events, so the state would be good.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
 from enum import StrEnum
 from functools import cached_property
 from typing import Any
+
+import msgspec
+from msgspec.structs import replace
 
 from robosc.automata.compile import State
 from robosc.automata.state import subjects
@@ -43,8 +45,7 @@ class BlockingCauseKind(StrEnum):
     """The event can lead to a state that must be avoided."""
 
 
-@dataclass(frozen=True, slots=True)
-class BlockingCause:
+class BlockingCause(msgspec.Struct, frozen=True):
     """A cause that keeps an event from happening in some states.
 
     Attributes:
@@ -68,8 +69,7 @@ class BlockingCause:
     condition: int | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Counterexample:
+class Counterexample(msgspec.Struct, frozen=True):
     """A run into trouble, with a description of the trouble.
 
     Attributes:
@@ -101,8 +101,7 @@ class Counterexample:
         return not (self.invariants or self.leaving or self.forbidden)
 
 
-@dataclass(frozen=True, slots=True)
-class Detour:
+class Detour(msgspec.Struct, frozen=True):
     """A run of the plants alone, and its first event that is not allowed.
 
     Attributes:

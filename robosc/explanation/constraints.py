@@ -8,8 +8,10 @@ range are unchanged, and the other states become safe. So emptiness is monotone,
 """
 
 from collections.abc import Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from enum import StrEnum
+
+import msgspec
 
 from robosc.automata.state import Subject
 from robosc.automata.structure import Assignment, Automaton, System
@@ -32,8 +34,7 @@ class ConstraintKind(StrEnum):
     """Marking: an automaton must reach its marked locations again, or the system a state in which its marker holds."""
 
 
-@dataclass(frozen=True, slots=True)
-class RelaxableConstraint:
+class RelaxableConstraint(msgspec.Struct, frozen=True):
     """A part that can be left out of a problem.
 
     Attributes:

@@ -4,7 +4,6 @@ Their texts are for a terminal: a thought a line, places as `file:line:column`.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass
 from typing import Any
 
 import msgspec
@@ -30,8 +29,7 @@ MAXIMUM_VALUES = 30
 """Values of a state that are shown."""
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class EmptyExplanation:
+class EmptyExplanation(msgspec.Struct, frozen=True):
     """Explanation why there is no supervisor.
 
     Attributes:
@@ -60,8 +58,7 @@ class EmptyExplanation:
         return html_text(str(self))
 
 
-@dataclass(frozen=True, slots=True, repr=False)
-class Explanation:
+class Explanation(msgspec.Struct, frozen=True):
     """Explanation of what synthesis did to a model.
 
     Attributes:

@@ -3,14 +3,13 @@
 They travel from a service to its client, so they are frozen values of plain types that msgspec can validate.
 """
 
-from dataclasses import dataclass
+import msgspec
 
 from robosc.expressions import Value
 from robosc.source import Location
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class Part(msgspec.Struct, frozen=True):
     """A part of the model.
 
     Attributes:
@@ -25,8 +24,7 @@ class Part:
     location: Location | None
 
 
-@dataclass(frozen=True, slots=True)
-class StateValues:
+class StateValues(msgspec.Struct, frozen=True):
     """One state, as `robosc explore` names it.
 
     Attributes:
@@ -41,8 +39,7 @@ class StateValues:
     communications: dict[str, str]
 
 
-@dataclass(frozen=True, slots=True)
-class Path:
+class Path(msgspec.Struct, frozen=True):
     """A run, and where it ends.
 
     Attributes:
@@ -56,8 +53,7 @@ class Path:
     state: StateValues
 
 
-@dataclass(frozen=True, slots=True)
-class Reason:
+class Reason(msgspec.Struct, frozen=True):
     """Reason why an event cannot happen in some state.
 
     Attributes:
@@ -75,8 +71,7 @@ class Reason:
     trouble: "CounterexampleReport | None" = None
 
 
-@dataclass(frozen=True, slots=True)
-class Stopped:
+class Stopped(msgspec.Struct, frozen=True):
     """A way to some goal by the behaviours alone, and where it is stopped.
 
     Attributes:
@@ -92,8 +87,7 @@ class Stopped:
     reasons: tuple[Reason, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class CounterexampleReport:
+class CounterexampleReport(msgspec.Struct, frozen=True):
     """A run into trouble.
 
     Attributes:
@@ -115,8 +109,7 @@ class CounterexampleReport:
     stopped: Stopped | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Blamed:
+class Blamed(msgspec.Struct, frozen=True):
     """A part of the model that is to blame.
 
     Attributes:
@@ -128,8 +121,7 @@ class Blamed:
     suffices: bool | None
 
 
-@dataclass(frozen=True, slots=True)
-class EventReport:
+class EventReport(msgspec.Struct, frozen=True):
     """Report on what restricts an event.
 
     Attributes:
@@ -151,8 +143,7 @@ class EventReport:
     unfound: str = ""
 
 
-@dataclass(frozen=True, slots=True)
-class EventHere:
+class EventHere(msgspec.Struct, frozen=True):
     """Report on whether an event can happen in one state, and why not."""
 
     event: str
@@ -161,8 +152,7 @@ class EventHere:
     reasons: tuple[Reason, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class StateReport:
+class StateReport(msgspec.Struct, frozen=True):
     """Report on what can happen in one state.
 
     Attributes:
@@ -176,8 +166,7 @@ class StateReport:
     events: tuple[EventHere, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Remark:
+class Remark(msgspec.Struct, frozen=True):
     """A remark on the controlled system for its author.
 
     Attributes:

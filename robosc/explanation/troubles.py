@@ -4,7 +4,8 @@
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+
+import msgspec
 
 from robosc.automata.compile import State
 from robosc.automata.state import subjects
@@ -19,8 +20,7 @@ from robosc.synthesis.result import SynthesisProgress
 from robosc.synthesis.workspace import workspace
 
 
-@dataclass(frozen=True, slots=True)
-class Trouble:
+class Trouble(msgspec.Struct, frozen=True):
     """Trouble that an event leads into.
 
     Attributes:

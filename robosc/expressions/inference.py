@@ -6,8 +6,9 @@ another front end), which may be wrong.
 
 import math
 from collections.abc import Mapping
-from dataclasses import dataclass, field
 from typing import assert_never
+
+import msgspec
 
 from robosc.errors import InvalidExpressionError
 from robosc.expressions import (
@@ -47,8 +48,7 @@ _LOGIC = frozenset({"or", "and", "implies"})
 _ORDER = frozenset({"<", "<=", ">", ">="})
 
 
-@dataclass(frozen=True, slots=True)
-class Scope:
+class Scope(msgspec.Struct, frozen=True):
     """Names that expressions may use.
 
     Attributes:
@@ -66,7 +66,7 @@ class Scope:
     enums: Mapping[str, EnumType]
     enum_values: Mapping[str, frozenset[str]]
     objects: Mapping[str, Mapping[str, Type]]
-    data: Mapping[tuple[PathStep, ...], Type] = field(default_factory=dict)
+    data: Mapping[tuple[PathStep, ...], Type] = msgspec.field(default_factory=dict)
     has_whole_division: bool = False
 
     def infer(self, expression: Expression, received: Type | None = None, elements: tuple[Type, ...] = ()) -> Type:

@@ -5,13 +5,13 @@ lines, each after a blank. `deploy/collect_interfaces.py` writes the files.
 """
 
 from collections.abc import Mapping
-from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
+from pkgutil import get_data
+
+import msgspec
 
 
-@dataclass(frozen=True, slots=True)
-class Distribution:
+class Distribution(msgspec.Struct, frozen=True):
     """A ROS distribution.
 
     Attributes:
@@ -44,8 +44,9 @@ DISTRIBUTIONS = (JAZZY, KILTED, LYRICAL, HUMBLE, NOETIC)
 
 @cache
 def _definitions(distribution: Distribution) -> Mapping[str, str]:
-    text = (files(__package__) / "shipped" / distribution.file).read_text(encoding="utf-8")
-    return read_shipped(text, {} if distribution.base is None else distribution.base.definitions)
+    # Not importlib.resources, whose readers load all that zip archives need.
+    content = get_data(__package__, f"shipped/{distribution.file}") or b""
+    return read_shipped(content.decode(), {} if distribution.base is None else distribution.base.definitions)
 
 
 @cache

@@ -1105,6 +1105,34 @@ PyObject *diagram_release(PyObject *module, PyObject *arguments) {
     Py_RETURN_NONE;
 }
 
+/* Layout: what robosc/synthesis/layout.py compares with dd */
+
+PyObject *diagram_manager(PyObject *module, PyObject *arguments) {
+    (void)module;
+    PyObject *bdd;
+    if (!PyArg_ParseTuple(arguments, "O", &bdd)) {
+        return NULL;
+    }
+    return PyLong_FromUnsignedLongLong((unsigned long long)(uintptr_t)manager_of(bdd));
+}
+
+PyObject *diagram_look(PyObject *module, PyObject *arguments) {
+    (void)module;
+    PyObject *bdd;
+    unsigned long long f;
+    if (!PyArg_ParseTuple(arguments, "OK", &bdd, &f)) {
+        return NULL;
+    }
+    DdManager *manager = manager_of(bdd);
+    DdNode *node = (DdNode *)(uintptr_t)f, *low, *high;
+    int level = level_of(manager, node);
+    if (level == INT_MAX) {
+        return Py_BuildValue("iKK", -1, 0ULL, 0ULL);
+    }
+    split(manager, node, level, &low, &high);
+    return Py_BuildValue("iKK", level, (unsigned long long)(uintptr_t)low, (unsigned long long)(uintptr_t)high);
+}
+
 PyObject *diagram_connect(PyObject *module, PyObject *arguments) {
     (void)module;
     const char *path;

@@ -17,6 +17,11 @@ PyObject *diagram_without(PyObject *module, PyObject *arguments);
 PyObject *diagram_separated(PyObject *module, PyObject *arguments);
 PyObject *diagram_extract(PyObject *module, PyObject *arguments);
 PyObject *diagram_release(PyObject *module, PyObject *arguments);
+PyObject *diagram_manager(PyObject *module, PyObject *arguments);
+PyObject *diagram_look(PyObject *module, PyObject *arguments);
+
+/* Memory that may not be there: layout.c */
+PyObject *layout_bytes_at(PyObject *module, PyObject *arguments);
 
 /* Decision diagrams over many values: spaces.c */
 PyObject *space_make_store(PyObject *module, PyObject *arguments);

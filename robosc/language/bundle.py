@@ -5,9 +5,10 @@ Libraries of a text are found without reading it by the grammar, so of broken te
 
 import os
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 from types import MappingProxyType
+
+import msgspec
 
 from robosc.errors import LanguageError
 from robosc.language.interfaces import find_interfaces, nearby_folders
@@ -78,8 +79,7 @@ def _folders(model: Path, library_paths: Iterable[Path]) -> tuple[Path, ...]:
     return tuple(dict.fromkeys(place for place in places if place.is_dir()))
 
 
-@dataclass(frozen=True, slots=True)
-class _Candidate:
+class _Candidate(msgspec.Struct, frozen=True):
     """A file that may hold a library.
 
     Attributes:

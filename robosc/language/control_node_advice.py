@@ -5,9 +5,11 @@ component. Some nodes need no replacement, because the executor already does the
 """
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
 from enum import Enum, auto
 from itertools import chain, count
+
+import msgspec
+from msgspec.structs import replace
 
 from robosc.language.control_node_states import FALLBACKS, TooLargeError, negation, states_of
 from robosc.language.control_nodes import Declared, Family, Leaf, Node, is_free
@@ -66,8 +68,7 @@ _TOO_LARGE = (
 )
 
 
-@dataclass(frozen=True, slots=True)
-class _Part:
+class _Part(msgspec.Struct, frozen=True):
     """A node in this language.
 
     Attributes:

@@ -8,9 +8,10 @@ py_trees and Nav2, and the containers of SMACH, by their names there.
 """
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from enum import StrEnum, auto
 from functools import cached_property
+
+import msgspec
 
 from robosc.language.tokens import Kind, Tokens
 from robosc.language.words import RESERVED_WORDS, STARTS
@@ -93,8 +94,7 @@ def family_of(word: str) -> Family | None:
     return None
 
 
-@dataclass(frozen=True, slots=True)
-class Leaf:
+class Leaf(msgspec.Struct, frozen=True):
     """Child that has no children.
 
     Attributes:
@@ -114,8 +114,7 @@ class Leaf:
     is_known: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Node:
+class Node(msgspec.Struct, frozen=True):
     """Control node.
 
     Attributes:

@@ -7,7 +7,8 @@ grammar `tests/support/robosc.tx`.
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+
+import msgspec
 
 from robosc.errors import Diagnostic, RelatedPlace, sorted_diagnostics
 from robosc.language import syntax
@@ -40,8 +41,7 @@ type _Nested = dict[str, _Nested | str]
 """Text of each property of an object, by its name."""
 
 
-@dataclass(frozen=True, slots=True)
-class Parsed:
+class Parsed(msgspec.Struct, frozen=True):
     """Result of parsing a text.
 
     Attributes:
@@ -620,8 +620,7 @@ def _nested_text(nested: _Nested | str) -> str:
     return "{ " + ", ".join(f"{name}: {_nested_text(inner)}" for name, inner in nested.items()) + " }"
 
 
-@dataclass(frozen=True, slots=True)
-class _WithList:
+class _WithList(msgspec.Struct, frozen=True):
     """Content of a `with` list."""
 
     identifier: syntax.Text | None

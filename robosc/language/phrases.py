@@ -6,8 +6,9 @@ plain English; each stands in the family of those that mean the same.
 
 import re
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from enum import StrEnum, auto
+
+import msgspec
 
 
 class Link(StrEnum):
@@ -165,8 +166,7 @@ MOODS: dict[tuple[str, ...], Mood] = {
 _LONGEST = max(map(len, (*PHRASES, *MOODS)))
 
 
-@dataclass(frozen=True, slots=True)
-class Time:
+class Time(msgspec.Struct, frozen=True):
     """A time in a sentence.
 
     Attributes:

@@ -1,7 +1,8 @@
 """Requirements that sentences of other languages mean: conditions, permissions, cancels, orders and choices."""
 
 from collections.abc import Container, Sequence
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from robosc.language.control_node_advice import Place, advise
 from robosc.language.control_node_states import negation

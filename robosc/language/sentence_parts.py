@@ -1,7 +1,9 @@
 """Parts of sentences of other languages: what stands between their phrases, as conditions and requests of the text."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+
+import msgspec
+from msgspec.structs import replace
 
 from robosc.language.control_node_states import negation
 from robosc.language.control_nodes import Declared
@@ -19,8 +21,7 @@ SEPARATORS = {"{": "then", "}": "", ",": "then", ":": "then"}
 """Signs that part a sentence, with the words that they stand for."""
 
 
-@dataclass(frozen=True, slots=True)
-class Advice:
+class Advice(msgspec.Struct, frozen=True):
     """Advice on a sentence.
 
     Attributes:
@@ -44,8 +45,7 @@ class Advice:
     age: tuple[str, str] | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Operand:
+class Operand(msgspec.Struct, frozen=True):
     """A part of a sentence.
 
     Attributes:

@@ -4,9 +4,10 @@
 """
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import pairwise
+
+import msgspec
 
 from robosc.language.tokens import Kind, Tokens
 from robosc.language.words import spelled
@@ -17,8 +18,7 @@ _ITEMS = frozenset({"on", "transition", "state", "initial", "marked", "variable"
 """Tokens with which a transition ends."""
 
 
-@dataclass(slots=True)
-class Message:
+class Message(msgspec.Struct):
     """A communication.
 
     Attributes:
@@ -32,8 +32,8 @@ class Message:
     name: str
     kind: str
     component: str
-    states: dict[str, str] = field(default_factory=dict)
-    variables: dict[str, str] = field(default_factory=dict)
+    states: dict[str, str] = msgspec.field(default_factory=dict)
+    variables: dict[str, str] = msgspec.field(default_factory=dict)
 
     @property
     def is_requested(self) -> bool:
@@ -41,8 +41,7 @@ class Message:
         return self.kind != "outgoing"
 
 
-@dataclass(slots=True)
-class Part:
+class Part(msgspec.Struct):
     """A component.
 
     Attributes:
@@ -51,13 +50,12 @@ class Part:
         variables: Types of its variables by name.
     """
 
-    states: list[str] = field(default_factory=list)
-    marked: set[str] = field(default_factory=set)
-    variables: dict[str, str] = field(default_factory=dict)
+    states: list[str] = msgspec.field(default_factory=list)
+    marked: set[str] = msgspec.field(default_factory=set)
+    variables: dict[str, str] = msgspec.field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class Place:
+class Place(msgspec.Struct, frozen=True):
     """Place of a token among the components.
 
     Attributes:

@@ -6,7 +6,9 @@ its own line. Errors cannot be accepted.
 
 import re
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+
+import msgspec
+from msgspec.structs import replace
 
 from robosc.errors import Diagnostic, Severity, sorted_diagnostics
 from robosc.language.tokens import COMMENT
@@ -58,8 +60,7 @@ _COMMENT = re.compile(rf"\"(?:[^\"\\\n]|\\.)*+\"|'(?:[^'\\\n]|\\.)*+'|(?P<commen
 _ACCEPTANCE = re.compile(r"//\s*robosc:\s*accept\s+(?P<code>[\w-]+)\s*(?::\s*(?P<reason>.*\S)?\s*)?$")
 
 
-@dataclass(frozen=True, slots=True)
-class Acceptance:
+class Acceptance(msgspec.Struct, frozen=True):
     """A comment that accepts a finding.
 
     Attributes:

@@ -2,10 +2,10 @@
 
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Iterator, Mapping, Set
-from dataclasses import dataclass, replace
 from itertools import islice
 
 import msgspec
+from msgspec.structs import replace
 
 from robosc.errors import RelatedPlace
 from robosc.expressions import (
@@ -63,8 +63,7 @@ _MAXIMUM_SHOWN = 10
 """Names that one finding lists."""
 
 
-@dataclass(frozen=True, slots=True)
-class BehaviourTree:
+class BehaviourTree(msgspec.Struct, frozen=True):
     """A behaviour as written, sorted into its parts.
 
     Attributes:
@@ -171,8 +170,7 @@ _OPPOSITE = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class Uses:
+class Uses(msgspec.Struct, frozen=True):
     """Uses of communications in a robot, as written.
 
     Attributes:

@@ -2,7 +2,8 @@
 
 from collections import Counter
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+
+import msgspec
 
 from robosc.errors import Diagnostic, InternalError, LanguageError, RelatedPlace, Severity, sorted_diagnostics
 from robosc.expressions import BooleanType, ObjectType
@@ -64,8 +65,7 @@ from robosc.model.units import Libraries, Part, Unit, make_unit, parts_of
 from robosc.source import Bundle, Location
 
 
-@dataclass(frozen=True, slots=True)
-class Checked:
+class Checked(msgspec.Struct, frozen=True):
     """Result of checking a bundle.
 
     Attributes:
@@ -79,7 +79,7 @@ class Checked:
     model: Model | None
     diagnostics: tuple[Diagnostic, ...]
     places: Places | None = None
-    bindings: Bindings = field(default_factory=Bindings)
+    bindings: Bindings = msgspec.field(default_factory=Bindings)
     accepted: tuple[Diagnostic, ...] = ()
 
     @property
@@ -103,8 +103,7 @@ class Checked:
         raise LanguageError([library, *self.diagnostics])
 
 
-@dataclass(frozen=True, slots=True)
-class Inspected:
+class Inspected(msgspec.Struct, frozen=True):
     """Facts about a bundle, whatever is wrong with it, for editors.
 
     Attributes:
@@ -123,8 +122,8 @@ class Inspected:
     parts: tuple[Part, ...] = ()
     scopes: RobotScopes | None = None
     units: tuple[Unit, ...] = ()
-    communications: Mapping[str, Communication] = field(default_factory=dict)
-    fields: Mapping[str, Mapping[str, Field]] = field(default_factory=dict)
+    communications: Mapping[str, Communication] = msgspec.field(default_factory=dict)
+    fields: Mapping[str, Mapping[str, Field]] = msgspec.field(default_factory=dict)
 
 
 def check(bundle: Bundle) -> Checked:
@@ -481,15 +480,14 @@ class _RobotChecker:
             )
 
 
-@dataclass(frozen=True, slots=True)
-class _Unknown:
+class _Unknown(msgspec.Struct, frozen=True):
     """Report a communication that a behaviour names and that no component has."""
 
     part: Part
     robot: Unit
     communications: Mapping[str, Communication]
     findings: Findings
-    reported: set[str] = field(default_factory=set)
+    reported: set[str] = msgspec.field(default_factory=set)
 
     def __call__(self, name: syntax.Name) -> None:
         if self.part.unit is self.robot:

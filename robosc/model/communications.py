@@ -1,9 +1,9 @@
 """Builds and checks the communications of a robot, and what crosses the middleware."""
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 
 import msgspec
+from msgspec.structs import replace
 
 from robosc.errors import RelatedPlace
 from robosc.expressions import BooleanType, DoubleType, EnumType, IntegerType, NoneType, ObjectType, StringType, Type
@@ -35,8 +35,7 @@ _DIRECTIONS = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class CommunicationTree:
+class CommunicationTree(msgspec.Struct, frozen=True):
     """A communication as written, and the component that it belongs to."""
 
     part: Part

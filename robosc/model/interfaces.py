@@ -7,7 +7,9 @@ depend on the packages that are installed where it is read.
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+
+import msgspec
+from msgspec.structs import replace
 
 from robosc.expressions import Type
 from robosc.interfaces import DISTRIBUTIONS, INTERFACE_KINDS, Field, Part
@@ -35,8 +37,7 @@ _WORDS = {"msg": "message", "srv": "service", "action": "action"}
 _ARTICLES = {"msg": "a message", "srv": "a service", "action": "an action"}
 
 
-@dataclass(frozen=True, slots=True)
-class _Outcome:
+class _Outcome(msgspec.Struct, frozen=True):
     """Outcome of the comparisons that nodes of one kind make at their start.
 
     Attributes:
@@ -53,8 +54,7 @@ class _Outcome:
 type _ByLanguage = Mapping[Language, tuple[Fault, ...]]
 
 
-@dataclass(frozen=True, slots=True)
-class _Linked:
+class _Linked(msgspec.Struct, frozen=True):
     """A communication with the interface that it is linked to.
 
     Attributes:

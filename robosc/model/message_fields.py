@@ -5,9 +5,10 @@ that of C++ nodes, which their compilers make.
 """
 
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from dataclasses import field as dataclass_field
 from enum import StrEnum
+
+import msgspec
+from msgspec.structs import replace
 
 from robosc.errors import RelatedPlace
 from robosc.expressions import (
@@ -56,8 +57,7 @@ class Language(StrEnum):
     CPP = "C++"
 
 
-@dataclass(frozen=True, slots=True)
-class Fault:
+class Fault(msgspec.Struct, frozen=True):
     """A difference that keeps a node from starting.
 
     Attributes:
@@ -85,8 +85,7 @@ class Fault:
     needless: tuple[str, str] | None = None
 
 
-@dataclass(frozen=True, slots=True)
-class Message:
+class Message(msgspec.Struct, frozen=True):
     """A part of an interface.
 
     Attributes:
@@ -98,8 +97,7 @@ class Message:
     part: Part
 
 
-@dataclass(frozen=True, slots=True)
-class Comparison:
+class Comparison(msgspec.Struct, frozen=True):
     """Differences between a type and a message.
 
     Attributes:
@@ -107,8 +105,8 @@ class Comparison:
         unknown: Messages whose definition is not known, each with a place where it matters.
     """
 
-    faults: list[Fault] = dataclass_field(default_factory=list)
-    unknown: dict[str, Location] = dataclass_field(default_factory=dict)
+    faults: list[Fault] = msgspec.field(default_factory=list)
+    unknown: dict[str, Location] = msgspec.field(default_factory=dict)
 
     def add(self, *faults: Fault) -> None:
         """Add faults, as far as there may be more."""

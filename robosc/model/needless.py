@@ -5,7 +5,6 @@ an object type of its own.
 """
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, field
 
 import msgspec
 
@@ -116,8 +115,7 @@ def _names_in(tree: object) -> Iterator[str]:
             stack += [getattr(node, name) for name in node.__struct_fields__]
 
 
-@dataclass(frozen=True, slots=True)
-class Needed:
+class Needed(msgspec.Struct, frozen=True):
     """Parts of a model as they are without needless properties.
 
     Attributes:
@@ -130,7 +128,7 @@ class Needed:
     communications: tuple[Communication, ...]
     enums: tuple[EnumDefinition, ...]
     objects: tuple[ObjectDefinition, ...]
-    origins: Mapping[str, str] = field(default_factory=dict)
+    origins: Mapping[str, str] = msgspec.field(default_factory=dict)
 
 
 def without(

@@ -1,6 +1,6 @@
 """Outcomes of communications, for advice where one is written instead of a value."""
 
-from dataclasses import dataclass, field
+import msgspec
 
 from robosc.expressions import BooleanType, Type
 from robosc.language.phrases import OUTCOMES
@@ -9,8 +9,7 @@ DATA_ELSEWHERE = frozenset("msg message data payload result response feedback ev
 """Words of other languages for received data."""
 
 
-@dataclass(frozen=True, slots=True)
-class Outcome:
+class Outcome(msgspec.Struct, frozen=True):
     """Outcome of a communication.
 
     Attributes:
@@ -25,8 +24,8 @@ class Outcome:
     is_requested: bool
     has_data: bool
     component: str
-    kept: dict[str, Type | None] = field(default_factory=dict)
-    states: dict[str, tuple[str, str]] = field(default_factory=dict)
+    kept: dict[str, Type | None] = msgspec.field(default_factory=dict)
+    states: dict[str, tuple[str, str]] = msgspec.field(default_factory=dict)
     free: str = ""
 
     def value(self, steps: tuple[str, ...], wanted: Type | None) -> str:

@@ -1,12 +1,11 @@
 """Places of the parts of a checked model in the text, for findings of later stages."""
 
-from dataclasses import dataclass, field
+import msgspec
 
 from robosc.source import Location
 
 
-@dataclass(frozen=True, slots=True)
-class Places:
+class Places(msgspec.Struct, frozen=True):
     """Locations by the names of the model; lists follow the model's own order.
 
     Attributes:
@@ -31,20 +30,20 @@ class Places:
     """
 
     robot: Location
-    components: dict[str, Location] = field(default_factory=dict)
-    communications: dict[str, Location] = field(default_factory=dict)
-    states: dict[tuple[str, str], Location] = field(default_factory=dict)
-    variables: dict[tuple[str, str], Location] = field(default_factory=dict)
-    enums: dict[str, Location] = field(default_factory=dict)
-    objects: dict[str, Location] = field(default_factory=dict)
-    transitions: dict[str, tuple[Location, ...]] = field(default_factory=dict)
-    requirements: list[Location] = field(default_factory=list)
-    provides: list[Location] = field(default_factory=list)
-    invariants: list[Location] = field(default_factory=list)
-    goals: list[Location] = field(default_factory=list)
-    assumptions: list[Location] = field(default_factory=list)
-    missions: list[Location] = field(default_factory=list)
-    visits: list[tuple[Location, ...]] = field(default_factory=list)
-    preferences: list[Location] = field(default_factory=list)
-    limits: list[Location] = field(default_factory=list)
-    identifiers: dict[str, Location] = field(default_factory=dict)
+    components: dict[str, Location] = msgspec.field(default_factory=dict)
+    communications: dict[str, Location] = msgspec.field(default_factory=dict)
+    states: dict[tuple[str, str], Location] = msgspec.field(default_factory=dict)
+    variables: dict[tuple[str, str], Location] = msgspec.field(default_factory=dict)
+    enums: dict[str, Location] = msgspec.field(default_factory=dict)
+    objects: dict[str, Location] = msgspec.field(default_factory=dict)
+    transitions: dict[str, tuple[Location, ...]] = msgspec.field(default_factory=dict)
+    requirements: list[Location] = msgspec.field(default_factory=list)
+    provides: list[Location] = msgspec.field(default_factory=list)
+    invariants: list[Location] = msgspec.field(default_factory=list)
+    goals: list[Location] = msgspec.field(default_factory=list)
+    assumptions: list[Location] = msgspec.field(default_factory=list)
+    missions: list[Location] = msgspec.field(default_factory=list)
+    visits: list[tuple[Location, ...]] = msgspec.field(default_factory=list)
+    preferences: list[Location] = msgspec.field(default_factory=list)
+    limits: list[Location] = msgspec.field(default_factory=list)
+    identifiers: dict[str, Location] = msgspec.field(default_factory=dict)

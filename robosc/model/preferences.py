@@ -1,14 +1,14 @@
 """Preferences among requests, and whether they contradict each other."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
+
+import msgspec
 
 from robosc.model.structure import Preference
 
 
-@dataclass(frozen=True, slots=True)
-class Contradiction:
+class Contradiction(msgspec.Struct, frozen=True):
     """Circle of preferences.
 
     Attributes:

@@ -2,7 +2,8 @@
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+
+import msgspec
 
 from robosc.errors import RelatedPlace
 from robosc.language import syntax
@@ -19,8 +20,7 @@ from robosc.model.units import Libraries, Part, Unit
 _Item = syntax.Requirement | syntax.Invariant | syntax.Provide | syntax.Limit
 
 
-@dataclass(frozen=True, slots=True)
-class _Offer:
+class _Offer(msgspec.Struct, frozen=True):
     """Items that a library may bring, by what a component must have for it; with each item its place in the text.
 
     Attributes:
@@ -29,13 +29,13 @@ class _Offer:
         read: The components that each invariant reads, by its place.
     """
 
-    by_communication: defaultdict[str, list[tuple[int, syntax.Requirement | syntax.Provide | syntax.Limit]]] = field(
+    by_communication: defaultdict[str, list[tuple[int, syntax.Requirement | syntax.Provide | syntax.Limit]]] = (
+        msgspec.field(default_factory=lambda: defaultdict(list))
+    )
+    by_component: defaultdict[str, list[tuple[int, syntax.Invariant]]] = msgspec.field(
         default_factory=lambda: defaultdict(list)
     )
-    by_component: defaultdict[str, list[tuple[int, syntax.Invariant]]] = field(
-        default_factory=lambda: defaultdict(list)
-    )
-    read: dict[int, frozenset[str]] = field(default_factory=dict)
+    read: dict[int, frozenset[str]] = msgspec.field(default_factory=dict)
 
     @classmethod
     def of(cls, unit: Unit) -> "_Offer":

@@ -1,7 +1,8 @@
 """The scopes of a robot: which names each of its files can use."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from robosc.expressions import Type
 from robosc.language import syntax

@@ -1,7 +1,9 @@
 """Meanings that a name can have at one place of a model."""
 
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field, replace
+
+import msgspec
+from msgspec.structs import replace
 
 from robosc.expressions import EnumType, Type
 from robosc.model.outcomes import Outcome
@@ -11,8 +13,7 @@ from robosc.model.units import Libraries, Unit
 from robosc.source import Location
 
 
-@dataclass(frozen=True, slots=True)
-class ComponentNames:
+class ComponentNames(msgspec.Struct, frozen=True):
     """Names that can be read of a component from outside.
 
     Attributes:
@@ -26,12 +27,11 @@ class ComponentNames:
     name: str
     states: frozenset[str]
     variables: Mapping[str, Type | None]
-    declared: Mapping[str, Location] = field(default_factory=dict)
-    places: Mapping[str, Location] = field(default_factory=dict)
+    declared: Mapping[str, Location] = msgspec.field(default_factory=dict)
+    places: Mapping[str, Location] = msgspec.field(default_factory=dict)
 
 
-@dataclass(frozen=True, slots=True)
-class Scope:
+class Scope(msgspec.Struct, frozen=True):
     """The names of one place.
 
     Attributes:
@@ -55,13 +55,13 @@ class Scope:
     own: ComponentNames | None = None
     received: Type | None = None
     sender: str = ""
-    outcomes: Mapping[str, Outcome] = field(default_factory=dict)
+    outcomes: Mapping[str, Outcome] = msgspec.field(default_factory=dict)
     absent: frozenset[str] = frozenset()
-    constants: Mapping[str, Typed | None] = field(default_factory=dict)
-    ambiguous: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
-    component_places: Mapping[str, Location] = field(default_factory=dict)
-    constant_places: Mapping[str, Location] = field(default_factory=dict)
-    _values: dict[str, tuple[EnumType, ...]] = field(default_factory=dict)
+    constants: Mapping[str, Typed | None] = msgspec.field(default_factory=dict)
+    ambiguous: Mapping[str, tuple[str, ...]] = msgspec.field(default_factory=dict)
+    component_places: Mapping[str, Location] = msgspec.field(default_factory=dict)
+    constant_places: Mapping[str, Location] = msgspec.field(default_factory=dict)
+    _values: dict[str, tuple[EnumType, ...]] = msgspec.field(default_factory=dict)
 
     def with_received(self, received: Type | None, sender: str = "") -> "Scope":
         """The same names, with `value` of another type and communication."""

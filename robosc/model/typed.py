@@ -1,6 +1,6 @@
 """Typed expressions: compatibility of types, and the types and bounds of results."""
 
-from dataclasses import dataclass
+import msgspec
 
 from robosc.errors import InternalError
 from robosc.expressions import (
@@ -26,8 +26,7 @@ from robosc.expressions.bounds import call_bounds
 from robosc.expressions.evaluate import evaluate
 
 
-@dataclass(frozen=True, slots=True)
-class Typed:
+class Typed(msgspec.Struct, frozen=True):
     """A resolved expression, its type, and for a bounded integer the values it can have.
 
     Attributes:

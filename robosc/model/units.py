@@ -1,8 +1,9 @@
 """Files as units of definitions, and where each component of a robot comes from."""
 
 from collections.abc import Collection, Iterator
-from dataclasses import dataclass
 from itertools import count
+
+import msgspec
 
 from robosc.errors import RelatedPlace
 from robosc.language import Parsed, parse, syntax
@@ -14,8 +15,7 @@ _MAXIMUM_SHOWN = 6
 """Imports of a cycle that are reported."""
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class Unit:
+class Unit(msgspec.Struct, frozen=True, eq=False):
     """A robot or a library; compared by identity.
 
     Attributes:
@@ -37,8 +37,7 @@ class Unit:
         return f"{self.tree.name.text}.{name}" if self.tree.is_library else name
 
 
-@dataclass(frozen=True, slots=True)
-class Part:
+class Part(msgspec.Struct, frozen=True):
     """A component of the robot.
 
     Attributes:

@@ -12,13 +12,11 @@ TEXT_NAME = "model.rscd"
 """Name of a model that is given as a text, in findings about it."""
 
 
-class LoadedModel(Bundle):
+class LoadedModel(Bundle, frozen=True):
     """Texts of a model and of the libraries that it imports: read, not yet checked.
 
     It is a `robosc.source.Bundle`, so every function that takes the texts of a model takes it.
     """
-
-    __slots__ = ()
 
     @property
     def name(self) -> str:
@@ -46,13 +44,11 @@ class LoadedModel(Bundle):
         return page(checked.model, checked.diagnostics)
 
 
-class LoadedAutomata(LoadedModel):
+class LoadedAutomata(LoadedModel, frozen=True):
     """Text of automata (CIF, libFAUDES, Supremica), with the files that it imports.
 
     `load` returns it for such a file; its synthesis is a `SystemSynthesis`.
     """
-
-    __slots__ = ()
 
     def _repr_markdown_(self) -> str:
         return f"```\n{self.main.text.rstrip()}\n```\n"

@@ -10,8 +10,9 @@ too many cases, their data is taken to be independent, so the surroundings can d
 """
 
 from collections.abc import Collection, Sequence
-from dataclasses import dataclass
 from typing import Any
+
+import msgspec
 
 from robosc.automata import ExecutableSystem, System
 from robosc.automata.goal_memory import Cancel, Obligations
@@ -33,8 +34,7 @@ _REMEMBERED = 8
 """Predicates of which it is remembered from where moves lead into them."""
 
 
-@dataclass(frozen=True, slots=True)
-class Happening:
+class Happening(msgspec.Struct, frozen=True):
     """An event of a batch, as one message can bring it about.
 
     Attributes:
@@ -75,8 +75,7 @@ def message_cases(executable: ExecutableSystem, system: System, batch: Sequence[
     ]
 
 
-@dataclass(frozen=True, slots=True)
-class _Part:
+class _Part(msgspec.Struct, frozen=True):
     """An event of a batch, as one message can bring it about.
 
     Attributes:

@@ -6,7 +6,6 @@ without it. So what the search by halves has found is tried item by item, too.
 """
 
 from collections.abc import Callable, Collection, Iterable, Iterator, Sequence
-from dataclasses import dataclass
 
 import msgspec
 
@@ -33,8 +32,7 @@ MAXIMUM_CANDIDATES = 10
 """Assumptions that are tried together, the likeliest first: each doubles the memory of the game."""
 
 
-@dataclass(frozen=True, slots=True)
-class GoalBlame:
+class GoalBlame(msgspec.Struct, frozen=True):
     """Blame for goals that cannot be reached together.
 
     Attributes:
@@ -139,8 +137,7 @@ def blame_goals(
     )
 
 
-@dataclass(frozen=True, slots=True)
-class _Trials:
+class _Trials(msgspec.Struct, frozen=True):
     """Syntheses of the model with less required, or more assumed.
 
     Attributes:

@@ -11,8 +11,9 @@ counterstrategies", FMCAD 2009, pp. 152-159.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any, Self
+
+import msgspec
 
 from robosc.automata import System
 from robosc.automata.compile import NO_DATA, State, compile_expression
@@ -27,8 +28,7 @@ Rank = tuple[int, int]
 """Number of a stage, and of a layer in it: the surroundings move to lower ones."""
 
 
-@dataclass(frozen=True, slots=True)
-class CounterStage:
+class CounterStage(msgspec.Struct, frozen=True):
     """Positions in which the surroundings deny one goal.
 
     Attributes:
@@ -44,8 +44,7 @@ class CounterStage:
     layers: tuple[tuple[Any, ...], ...]
 
 
-@dataclass(frozen=True, slots=True)
-class CounterStrategy:
+class CounterStrategy(msgspec.Struct, frozen=True):
     """Counter-strategy of the surroundings, from the position in which the executor begins.
 
     Attributes:
@@ -100,8 +99,7 @@ def oppose(
     return tuple(stages)
 
 
-@dataclass(frozen=True, slots=True)
-class _Surroundings:
+class _Surroundings(msgspec.Struct, frozen=True):
     """Moves as the surroundings see them.
 
     Attributes:

@@ -1,6 +1,7 @@
 """Findings about goals, missions and assumptions: what cannot be reached, is not needed, or can be broken."""
 
 from collections.abc import Iterable, Sequence
+from typing import TYPE_CHECKING
 
 from robosc.automata.goal_memory import Aim, AimKind
 from robosc.conditions.goals import assumption_text
@@ -8,15 +9,17 @@ from robosc.errors import Diagnostic, RelatedPlace, Severity
 from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Location
-from robosc.strategies.blame import GoalBlame
-from robosc.strategies.synthesize import StrategyResult
+
+if TYPE_CHECKING:
+    from robosc.strategies.blame import GoalBlame
+    from robosc.strategies.synthesize import StrategyResult
 
 MAXIMUM_RELATED = 5
 """Related places of one kind that a finding shows."""
 
 
 def goal_findings(
-    aims: Sequence[Aim], places: Places, result: StrategyResult, blame: GoalBlame | None = None
+    aims: Sequence[Aim], places: Places, result: "StrategyResult", blame: "GoalBlame | None" = None
 ) -> tuple[Diagnostic, ...]:
     """Return the diagnostics about a model's goals, missions and assumptions.
 
@@ -76,7 +79,7 @@ def goal_findings(
 
 
 def put_off_findings(
-    aims: Sequence[Aim], places: Places, result: StrategyResult, put_off: Iterable[int]
+    aims: Sequence[Aim], places: Places, result: "StrategyResult", put_off: Iterable[int]
 ) -> tuple[Diagnostic, ...]:
     """Return the diagnostics about visits that the robot may leave unmade for ever by its own doing.
 
@@ -127,7 +130,7 @@ def goals_and_missions(model: Model) -> str:
     return " and ".join(word for word, items in (("goals", model.goals), ("missions", model.missions)) if items)
 
 
-def _impossible(places: Places, result: StrategyResult) -> Diagnostic:
+def _impossible(places: Places, result: "StrategyResult") -> Diagnostic:
     """Return the finding about assumptions that cannot come true."""
     first, *others = (places.assumptions[number] for number in result.impossible)
     what = "these assumptions cannot come true together" if others else "this assumption cannot come true"
@@ -142,7 +145,7 @@ def _impossible(places: Places, result: StrategyResult) -> Diagnostic:
     )
 
 
-def _unreached(aims: Sequence[Aim], places: Places, result: StrategyResult, blame: GoalBlame | None) -> Diagnostic:
+def _unreached(aims: Sequence[Aim], places: Places, result: "StrategyResult", blame: "GoalBlame | None") -> Diagnostic:
     """Return the finding about what cannot be reached together.
 
     It stands at the last visit of a mission where there is one: the others are those that come before it.
@@ -179,7 +182,7 @@ def _unreached(aims: Sequence[Aim], places: Places, result: StrategyResult, blam
     return Diagnostic(Severity.ERROR, "unreachable-goal", message, _place(places, first), advice, related)
 
 
-def _blamed(blame: GoalBlame, *, is_hopeless: bool) -> str:
+def _blamed(blame: "GoalBlame", *, is_hopeless: bool) -> str:
     """Return the end of a message: which requirements are to blame."""
     count = len(blame.requirements) + len(blame.invariants)
     if not blame.is_known:

@@ -14,8 +14,9 @@ algorithm for the evaluation of fixpoint expressions", Theoretical Computer Scie
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any, Protocol
+
+import msgspec
 
 
 class Arena(Protocol):
@@ -42,8 +43,7 @@ class TwoSidedArena(Arena, Protocol):
         """Return the positions from which a move of either side can lead into a predicate."""
 
 
-@dataclass(frozen=True, slots=True)
-class Approach:
+class Approach(msgspec.Struct, frozen=True):
     """A step towards a goal: positions that a round of the least fixed point has added.
 
     Attributes:
@@ -62,8 +62,7 @@ class Approach:
     onwards: tuple[Any, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Solution:
+class Solution(msgspec.Struct, frozen=True):
     """Winning positions of the controller, and how it wins.
 
     Attributes:
@@ -199,8 +198,7 @@ def leading(arena: TwoSidedArena, found: Any, within: Any, check_stop: Callable[
     return found
 
 
-@dataclass(frozen=True, slots=True)
-class _Search:
+class _Search(msgspec.Struct, frozen=True):
     """Search for the positions from which a goal is approached.
 
     Attributes:
@@ -218,7 +216,7 @@ class _Search:
     winning: Any
     false: Any
     check_stop: Callable[[], object]
-    known: dict[Any, tuple[Any, Any]] = field(default_factory=dict)
+    known: dict[Any, tuple[Any, Any]] = msgspec.field(default_factory=dict)
 
     def approach(self, reached: Any, before: Sequence[Approach]) -> list[Approach]:
         """Return the steps towards a goal; the positions of the last one are all from which it is approached.
@@ -277,8 +275,7 @@ class _Search:
             staying = narrowed
 
 
-@dataclass(frozen=True, slots=True)
-class _EarnestSearch(_Search):
+class _EarnestSearch(_Search, frozen=True):
     """Search that can also look at what both sides can do together."""
 
     arena: TwoSidedArena

@@ -6,9 +6,10 @@ for several long tours would be as many nodes as they have stages in all combina
 """
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import reduce
 from typing import Any
+
+import msgspec
 
 from robosc.automata.goal_memory import MEMORY, Obligations
 from robosc.automata.state import Subject
@@ -20,8 +21,7 @@ MAXIMUM_TOGETHER = 400
 """Combinations of stages of tours that are followed together; the others are followed one by one."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Part:
+class _Part(msgspec.Struct, frozen=True):
     """Places of the memory that are written together.
 
     Attributes:

@@ -1,9 +1,10 @@
 """Modes of a strategy: what the controller requests to get to one goal, step by step."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import Any
+
+import msgspec
 
 from robosc.automata.goal_memory import Aim
 from robosc.strategies.arena import ControllerArena
@@ -13,8 +14,7 @@ Requests = dict[str, Any]
 """For each request the positions in which it is chosen."""
 
 
-@dataclass(frozen=True, slots=True)
-class ModeGame:
+class ModeGame(msgspec.Struct, frozen=True):
     """A mode of the strategy, on positions.
 
     Attributes:

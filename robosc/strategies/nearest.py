@@ -1,9 +1,10 @@
 """The nearest to a goal that can be reached, where the goal itself cannot be, whatever the surroundings do."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import partial
 from typing import Any
+
+import msgspec
 
 from robosc.automata import ExecutableSystem
 from robosc.automata.compile import State
@@ -21,8 +22,7 @@ LIMIT = 20_000
 """Positions beyond which the search is given up."""
 
 
-@dataclass(frozen=True, slots=True)
-class Nearest:
+class Nearest(msgspec.Struct, frozen=True):
     """The nearest to a goal.
 
     Attributes:

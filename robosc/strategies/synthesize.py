@@ -6,8 +6,10 @@ goal: that the mission is not at it any more.
 """
 
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
+
+import msgspec
+from msgspec.structs import replace
 
 from robosc.automata import ExecutableSystem
 from robosc.automata.goal_memory import holds
@@ -28,8 +30,7 @@ from robosc.synthesis.simplify import Simplifier
 from robosc.synthesis.workspace import Workspace, workspace
 
 
-@dataclass(frozen=True, slots=True)
-class StrategyResult:
+class StrategyResult(msgspec.Struct, frozen=True):
     """Outcome of the synthesis of a strategy.
 
     Attributes:

@@ -8,8 +8,10 @@ for a model.
 import re
 from collections.abc import Iterable, Iterator, Mapping, Set
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
 from math import isfinite
+
+import msgspec
+from msgspec.structs import replace
 
 from robosc.automata.structure import System
 from robosc.errors import InvalidExpressionError, InvalidSupervisorError
@@ -74,8 +76,7 @@ _DATA = {
 """Flags for request, response and feedback: True if it carries data."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Names:
+class _Names(msgspec.Struct, frozen=True):
     """Items that are looked up again and again, by name.
 
     Attributes:

@@ -9,7 +9,8 @@ pp. 677-691, section 4 (the order of a comparison's and an adder's inputs).
 
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass
+
+import msgspec
 
 from robosc.automata.state import Subject, subject_domain, subjects
 from robosc.automata.structure import System
@@ -36,8 +37,7 @@ Datum = tuple[str, tuple[PathStep, ...]]
 _COMPARISONS = frozenset({"=", "!=", "<", "<=", ">", ">="})
 
 
-@dataclass(frozen=True, slots=True)
-class Blocks:
+class Blocks(msgspec.Struct, frozen=True):
     """Places and data whose bits stand between each other.
 
     Attributes:

@@ -1,7 +1,8 @@
 """Nondeterministic choices between edges, for target languages without nondeterminism."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
+
+import msgspec
 
 from robosc.automata.structure import System
 from robosc.synthesis.engines import EngineOptions
@@ -9,8 +10,7 @@ from robosc.synthesis.transitions import choices
 from robosc.synthesis.workspace import workspace
 
 
-@dataclass(frozen=True, slots=True)
-class EdgeChoice:
+class EdgeChoice(msgspec.Struct, frozen=True):
     """A location in which an automaton has several edges to take for an event.
 
     Attributes:

@@ -6,15 +6,9 @@ from types import ModuleType
 from typing import Any, NamedTuple
 
 from robosc.dd_modules import load_dd
-from robosc.kernel import kernel_module
+from robosc.kernel import kernel_module, kernel_problem
 from robosc.synthesis.engines import Manager, is_compiled
-
-_LAYOUT = (56, 64)
-"""Bytes of a manager and of a predicate of dd.cudd as the kernel knows them: those of dd 0.6."""
-
-_NODE_OFFSET = 2
-"""The number of a predicate in dd is the address of its node and this; 0 and 1 are its constants."""
-
+from robosc.synthesis.layout import NODE_OFFSET, address_of, layout_problem
 
 TOTAL = 2
 """Reason for which a predicate is not taken apart: more ranges in all than there may be."""
@@ -36,22 +30,29 @@ class Extracted(NamedTuple):
 
 def kernel_of(manager: Manager) -> "Kernel | None":
     """Return the kernel for a manager, or None where only Python can work with it."""
-    module = _connected() if is_compiled(manager) else None
+    module = _connected()[0] if is_compiled(manager) else None
     return None if module is None else Kernel(module, manager)
 
 
+def left_aside() -> str:
+    """Return the reason why the kernel leaves diagrams of CUDD to Python; empty if it does not."""
+    return _connected()[1]
+
+
 @cache
-def _connected() -> ModuleType | None:
-    """Return the kernel with the CUDD inside dd; None where there is no kernel, or another dd than it knows."""
-    module, cudd = kernel_module(), load_dd("cudd")
-    if module is None or (cudd.BDD.__basicsize__, cudd.Function.__basicsize__) != _LAYOUT:
-        return None
+def _connected() -> tuple[ModuleType | None, str]:
+    """Return the kernel with the CUDD inside dd; None and the reason where there is none, or another dd."""
+    module = kernel_module()
+    if module is None:
+        return None, kernel_problem()
     try:
+        cudd = load_dd("cudd")
         module.connect(cudd.__file__)
-    except ImportError:
-        # This build of dd keeps the functions of CUDD to itself.
-        return None
-    return module
+    except ImportError as error:
+        # It is not there, or this build of dd keeps the functions of CUDD to itself.
+        return None, str(error)
+    problem = layout_problem(module, cudd)
+    return (None, problem) if problem else (module, "")
 
 
 class Kernel:
@@ -69,11 +70,11 @@ class Kernel:
     @staticmethod
     def address(predicate: Any) -> int:
         """Return the address of a predicate's node; 0 for None. It stays that while the predicate is there."""
-        return 0 if predicate is None else int(predicate) - _NODE_OFFSET
+        return 0 if predicate is None else address_of(predicate)
 
     def predicate(self, address: int) -> Any:
         """Return the predicate of a node."""
-        return self._manager._add_int(address + _NODE_OFFSET)  # type: ignore[attr-defined]
+        return self._manager._add_int(address + NODE_OFFSET)  # type: ignore[attr-defined]
 
     def restrict(self, predicate: Any, care: Any) -> Any:
         """Return what `nodes.restrict` does."""

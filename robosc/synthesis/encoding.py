@@ -10,9 +10,10 @@ side by side: see `blocks`.
 
 from collections import defaultdict
 from collections.abc import Callable, Collection, Iterable, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
+
+import msgspec
 
 from robosc.automata.state import Subject, initial_values, subject_domain, subject_type, subjects
 from robosc.automata.structure import InputVariable, System
@@ -27,8 +28,7 @@ _FRAMES_PER_LEVEL = 4
 """The plain engine and the walks of `nodes` and `diagrams` go down a level at a time."""
 
 
-@dataclass(frozen=True, slots=True)
-class Bits:
+class Bits(msgspec.Struct, frozen=True):
     """The variables that encode one value of a finite domain.
 
     Attributes:

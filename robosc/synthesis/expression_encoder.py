@@ -5,8 +5,9 @@ have. Partitions are exact for every operation, and small because only variables
 Their arithmetic is that of `robosc.expressions.values` itself.
 """
 
-from dataclasses import dataclass
 from typing import Any
+
+import msgspec
 
 from robosc.automata.state import Subject
 from robosc.errors import InternalError, UnsupportedModelError
@@ -43,24 +44,21 @@ _NEGATED = frozenset({"!=", "<=", ">="})
 """Comparisons that are worked out as the negation of `=`, or of `<` one way or the other."""
 
 
-@dataclass(frozen=True, slots=True)
-class Truth:
+class Truth(msgspec.Struct, frozen=True):
     """A boolean: where it is true and where it is false; elsewhere it is unknown."""
 
     true: Any
     false: Any
 
 
-@dataclass(frozen=True, slots=True)
-class Number:
+class Number(msgspec.Struct, frozen=True):
     """An integer: its value, and where it is known."""
 
     vector: Vector
     known: Any
 
 
-@dataclass(frozen=True, slots=True)
-class Partition:
+class Partition(msgspec.Struct, frozen=True):
     """A value of any kind: where it has each of its values; elsewhere it is unknown."""
 
     cases: tuple[tuple[Value, Any], ...]

@@ -1,15 +1,15 @@
 """Images of sets of states under an event, forwards or backwards, as operations of an engine one after the other."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from typing import Any
+
+import msgspec
 
 from robosc.synthesis.engines import Manager
 from robosc.synthesis.nodes import met, renamed
 
 
-@dataclass(frozen=True, slots=True, kw_only=True)
-class Image:
+class Image(msgspec.Struct, frozen=True, kw_only=True):
     """Function from sets of states to sets of states: the operations below, in this order.
 
     Attributes:
@@ -28,10 +28,10 @@ class Image:
     relation: Any
     inside: Any = None
     needed: Any = None
-    constants: Mapping[str, bool] = field(default_factory=dict)
-    functions: Mapping[str, Any] = field(default_factory=dict)
+    constants: Mapping[str, bool] = msgspec.field(default_factory=dict)
+    functions: Mapping[str, Any] = msgspec.field(default_factory=dict)
     hidden: Sequence[str] = ()
-    names: Mapping[str, str] = field(default_factory=dict)
+    names: Mapping[str, str] = msgspec.field(default_factory=dict)
     outside: Any = None
 
     def __call__(self, states: Any) -> Any:

@@ -1,7 +1,8 @@
 """Questions about a controlled system, and their answers, as plain values."""
 
-from dataclasses import dataclass
 from enum import StrEnum
+
+import msgspec
 
 from robosc.automata.structure import EventCondition
 
@@ -19,8 +20,7 @@ class Cause(StrEnum):
     """Synthesis keeps from it: it is uncontrollable, blocks, or leads to where a variable can leave its range."""
 
 
-@dataclass(frozen=True, slots=True)
-class NeverEnabled:
+class NeverEnabled(msgspec.Struct, frozen=True):
     """An event that can never happen.
 
     Attributes:
@@ -38,8 +38,7 @@ class NeverEnabled:
     invariants: tuple[int, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Restriction:
+class Restriction(msgspec.Struct, frozen=True):
     """Event conditions and invariants that stand or fall together, such as all those of one written requirement.
 
     Attributes:
@@ -54,8 +53,7 @@ class Restriction:
     watched: tuple[EventCondition, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class Questions:
+class Questions(msgspec.Struct, frozen=True):
     """Questions about the controlled system.
 
     Attributes:
@@ -79,8 +77,7 @@ class Questions:
     silent: tuple[str, ...] = ()
 
 
-@dataclass(frozen=True, slots=True)
-class EnabledTogether:
+class EnabledTogether(msgspec.Struct, frozen=True):
     """Two rivals that can both happen in one state.
 
     Attributes:
@@ -94,8 +91,7 @@ class EnabledTogether:
     trace: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Unprompted:
+class Unprompted(msgspec.Struct, frozen=True):
     """An event that can happen again and again without a prompt.
 
     Attributes:
@@ -109,8 +105,7 @@ class Unprompted:
     loop: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class Answers:
+class Answers(msgspec.Struct, frozen=True):
     """Answers that were found; each part in the order of its questions.
 
     Attributes:

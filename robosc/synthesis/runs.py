@@ -9,8 +9,9 @@ events: its runs are still possible, but they may not be shortest.
 
 from bisect import bisect_left
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from typing import Any
+
+import msgspec
 
 from robosc.automata.compile import State
 from robosc.errors import InternalError
@@ -25,8 +26,7 @@ MAXIMUM_EFFORT = 1_000_000
 """Nodes of all rings together, counted once for each event: up to about a second with the faster engine."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Layer:
+class _Layer(msgspec.Struct, frozen=True):
     """One step outwards.
 
     Attributes:
@@ -38,8 +38,7 @@ class _Layer:
     events: Sequence[Steps]
 
 
-@dataclass(frozen=True, slots=True)
-class SystemRun:
+class SystemRun(msgspec.Struct, frozen=True):
     """A run of a system.
 
     Attributes:

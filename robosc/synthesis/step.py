@@ -1,12 +1,12 @@
 """Steps: the states that events add to a set of states, for every kind of closure."""
 
 from collections.abc import Callable
-from dataclasses import dataclass
 from typing import Any
 
+import msgspec
 
-@dataclass(frozen=True, slots=True)
-class Step:
+
+class Step(msgspec.Struct, frozen=True):
     """Contribution of one event to a set of states.
 
     Attributes:

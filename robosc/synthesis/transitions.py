@@ -8,9 +8,10 @@ are then computed by substitution, so backward images need no next-state variabl
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from copy import copy
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Any, Self
+
+import msgspec
 
 from robosc.automata.semantics import plant_invariants_on
 from robosc.automata.state import Subject
@@ -21,8 +22,7 @@ from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.image import Image
 
 
-@dataclass(frozen=True, slots=True)
-class Transition:
+class Transition(msgspec.Struct, frozen=True):
     """Effect of one event; predicates are over current-state variables and `hidden` ones.
 
     Attributes:
@@ -49,8 +49,7 @@ class Transition:
     hidden: tuple[str, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Arc:
+class _Arc(msgspec.Struct, frozen=True):
     """An edge with the predicate where it is taken, what it writes and where it leaves a range."""
 
     taken: Any

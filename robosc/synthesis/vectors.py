@@ -5,14 +5,14 @@ around: the width of a result always suffices for its bounds.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Any
+
+import msgspec
 
 from robosc.synthesis.engines import Manager
 
 
-@dataclass(frozen=True, slots=True)
-class Vector:
+class Vector(msgspec.Struct, frozen=True):
     """An integer that depends on the state.
 
     Attributes:

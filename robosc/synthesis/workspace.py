@@ -2,7 +2,8 @@
 
 from collections.abc import Callable, Collection, Iterable, Iterator
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+
+import msgspec
 
 from robosc.automata.state import Subject
 from robosc.automata.structure import System
@@ -21,8 +22,7 @@ from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.result import SynthesisProgress
 
 
-@dataclass(frozen=True, slots=True)
-class Workspace:
+class Workspace(msgspec.Struct, frozen=True):
     """An encoded system.
 
     Attributes:

@@ -1,7 +1,9 @@
 """A target's refusal of a model: some warnings of the check are errors for a target."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+
+from msgspec.structs import replace
 
 from robosc.errors import Diagnostic, Severity
 from robosc.targets.registry import errors_for

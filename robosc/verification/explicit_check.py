@@ -6,8 +6,9 @@ permissive, a new explicit synthesis is compared with the supervisor.
 """
 
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass
 from enum import StrEnum
+
+import msgspec
 
 from robosc.automata.compile import State
 from robosc.automata.controlled import Added
@@ -33,8 +34,7 @@ class CheckOutcome(StrEnum):
     NOT_CHECKED = "not checked"
 
 
-@dataclass(frozen=True, slots=True)
-class Failure:
+class Failure(msgspec.Struct, frozen=True):
     """Reason why a property does not hold.
 
     Attributes:
@@ -54,8 +54,7 @@ class Failure:
     is_shortest: bool = True
 
 
-@dataclass(frozen=True, slots=True)
-class Verification:
+class Verification(msgspec.Struct, frozen=True):
     """The outcome of a verification.
 
     Attributes:
@@ -171,8 +170,7 @@ def failure(
     return Failure(property_, trace, state, reason, f"{reason} in {where}", is_shortest)
 
 
-@dataclass(frozen=True, slots=True)
-class _FailureSearch:
+class _FailureSearch(msgspec.Struct, frozen=True):
     """Looks for the first failure of each kind, nearest to the initial state."""
 
     found: Reached

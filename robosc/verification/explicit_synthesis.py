@@ -7,7 +7,8 @@ automata", IEEE T-ASE 8(3), 2011, pp. 560-569, Algorithm 1.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass
+
+import msgspec
 
 from robosc.automata.compile import State
 from robosc.automata.controlled import STOP_INTERVAL, TRANSITIONS_PER_STATE
@@ -16,8 +17,7 @@ from robosc.automata.structure import System
 from robosc.errors import SynthesisCancelled
 
 
-@dataclass(frozen=True, slots=True)
-class ExplicitSupervisor:
+class ExplicitSupervisor(msgspec.Struct, frozen=True):
     """The maximally permissive supervisor of a system.
 
     Attributes:
@@ -39,8 +39,7 @@ class ExplicitSupervisor:
         return (state, event) in self.allowed
 
 
-@dataclass(frozen=True, slots=True)
-class _Step:
+class _Step(msgspec.Struct, frozen=True):
     """One event in one state, with every state that it can lead to (numbers)."""
 
     event: str
@@ -48,8 +47,7 @@ class _Step:
     targets: tuple[int, ...]
 
 
-@dataclass(frozen=True, slots=True)
-class _Graph:
+class _Graph(msgspec.Struct, frozen=True):
     """Explored states, the initial ones first, and their steps."""
 
     states: tuple[State, ...]

@@ -4,15 +4,15 @@ It is the same fixed point as in `explicit_synthesis`, for about ten times as ma
 """
 
 from array import array
-from dataclasses import dataclass
+
+import msgspec
 
 from robosc.automata.semantics import TooManyChoicesError
 from robosc.verification.packing import EventTable, Packing
 from robosc.verification.search import Effort
 
 
-@dataclass(frozen=True, slots=True)
-class Allowed:
+class Allowed(msgspec.Struct, frozen=True):
     """States and steps that a supervisor can allow.
 
     Attributes:

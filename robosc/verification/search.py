@@ -2,7 +2,8 @@
 
 from array import array
 from collections.abc import Callable
-from dataclasses import dataclass
+
+import msgspec
 
 from robosc.automata.controlled import TRANSITIONS_PER_STATE, Added
 from robosc.automata.semantics import TooManyChoicesError
@@ -60,8 +61,7 @@ class Effort:
         )
 
 
-@dataclass(frozen=True, slots=True)
-class Reached:
+class Reached(msgspec.Struct, frozen=True):
     """The controlled system; a state's number is its place in `codes`.
 
     Attributes:

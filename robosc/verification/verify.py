@@ -1,7 +1,8 @@
 """Verification of a supervisor of any size: state by state if it is small enough, else on sets of states."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+
+import msgspec
 
 from robosc.automata.controlled import TRANSITIONS_PER_STATE
 from robosc.automata.decision import Decision
@@ -13,8 +14,7 @@ DEFAULT_STATES = 200_000
 """States up to which the controlled system is searched one by one: some seconds."""
 
 
-@dataclass(frozen=True, slots=True)
-class Limits:
+class Limits(msgspec.Struct, frozen=True):
     """Limits of a check; all is counted, so that it ends alike on every machine.
 
     Attributes:
@@ -35,8 +35,7 @@ class Limits:
         return cls(states, states // 4, 25 * states, states // 10)
 
 
-@dataclass(frozen=True, slots=True)
-class VerificationReport:
+class VerificationReport(msgspec.Struct, frozen=True):
     """Findings of a check, and their method.
 
     Attributes:

@@ -6,8 +6,10 @@ The right result is worked out here, without a server: by the same functions tha
 import hashlib
 import random
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cache
+
+from msgspec.structs import replace
 
 import robosc
 from robosc.language import load_bundle

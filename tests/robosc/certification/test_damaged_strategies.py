@@ -1,7 +1,8 @@
 """Strategies that somebody tampered with: the verifier finds each that may miss a goal, and passes the others."""
 
 from collections import Counter
-from dataclasses import replace
+
+from msgspec.structs import replace
 
 from robosc.certification.supervisor_file import verify_supervisor_file
 from robosc.errors import InvalidSupervisorError

@@ -4,6 +4,7 @@ from dataclasses import replace
 from functools import partial
 
 import pytest
+from msgspec import structs
 
 from robosc.certification import make_supervisor
 from robosc.certification.goals import GoalExplanation, NearestPlace
@@ -91,7 +92,7 @@ WHY = GoalExplanation((GOAL,), False, (FIRST,), True, ("A.near leads to A.far",)
         ),
         # A server's text shows what it is.
         (
-            replace(WHY, goals=(replace(GOAL, text="\x1b[2J"),), blamed=(), helpful=()),
+            replace(WHY, goals=(structs.replace(GOAL, text="\x1b[2J"),), blamed=(), helpful=()),
             [
                 "can be kept from coming true:",
                 "  m.rscd:3:5: \\x1b[2J",

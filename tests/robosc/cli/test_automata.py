@@ -113,13 +113,14 @@ def test_synth(model: str, capsys: pytest.CaptureFixture[str]) -> None:
 def test_figures_of_the_synthesis(model: str, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = run(capsys, "synth", model, "--statistics")
     assert status == 0
-    lines = [line.split(maxsplit=1) for line in out.splitlines()[-7:]]
+    lines = [line.split(maxsplit=1) for line in out.splitlines()[-8:]]
     assert ["search", "backwards"] in lines
     assert ["rounds", "1"] in lines
     status, out, _ = run(capsys, "synth", model, "--json", "--statistics")
     found = json.loads(out)["statistics"]
     assert (found["search"], found["state_bits"], found["iterations"]) == ("backwards", 2, 1)
     assert found["seconds"] >= 0
+    assert found["kernel"].startswith(("used", "not used"))
     Path(model).write_text(f"{TANK}marked false;\n")
     status, out, _ = run(capsys, "synth", model, "--statistics")
     assert status == 1

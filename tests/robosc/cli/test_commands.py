@@ -392,14 +392,27 @@ def test_nothing_forges_a_line_or_moves_the_cursor(capsys: pytest.CaptureFixture
     assert not [line for line in error.splitlines() if line.startswith(("error: fake", "fake"))]
 
 
-def test_what_check_does_not_need_is_not_imported() -> None:
+SLOW = ("dataclasses", "importlib.resources", "inspect", "jinja2", "robosc.execution", "robosc.strategies.synthesize")
+
+
+@pytest.mark.parametrize(
+    ("command", "needless"),
+    [("check", (*SLOW, "dd", "robosc.synthesis", "typing_extensions")), ("synth", ("jinja2", *SLOW[-2:]))],
+)
+def test_what_a_command_does_not_need_is_not_imported(command: str, needless: tuple[str, ...]) -> None:
     """A cold start pays only for what a command uses."""
     code = (
-        "import sys; from robosc.cli.main import main; main(['check', sys.argv[1]]);"
-        "print([m for m in ('dd', 'jinja2', 'robosc.synthesis', 'robosc.execution') if m in sys.modules])"
+        "import atexit, sys; before = set(sys.modules); names = sys.argv.pop().split();"
+        "from robosc.cli.command import entry;"
+        "atexit.register(lambda: print([name for name in names if name in set(sys.modules) - before]));"
+        "entry()"
     )
     result = subprocess.run(
-        [sys.executable, "-c", code, LINE_FOLLOWER], capture_output=True, text=True, timeout=60, check=True
+        [sys.executable, "-c", code, command, LINE_FOLLOWER, " ".join(needless)],
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
     )
     assert result.stdout.splitlines()[-1] == "[]"
 

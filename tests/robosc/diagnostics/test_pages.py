@@ -4,10 +4,10 @@ import os
 import re
 import subprocess
 import sys
-from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from msgspec.structs import replace
 
 from robosc.automata import to_automata
 from robosc.certification import OutcomeStatus, make_supervisor

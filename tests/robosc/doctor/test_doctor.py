@@ -20,7 +20,7 @@ from robosc.python_versions import NEWEST, OLDEST, unsupported
 ROOT = Path(__file__).parents[3]
 
 REQUIREMENTS = (
-    "dd>=0.6",
+    "dd<0.7,>=0.6",
     "msgspec>=0.19",
     "grpcio>=1.85.1; extra == 'client'",
     "grpcio>=1.85.1; extra == 'server'",
@@ -102,7 +102,7 @@ class MadeUp(Machine):
 
 @pytest.fixture
 def machine(monkeypatch: pytest.MonkeyPatch) -> MadeUp:
-    monkeypatch.setattr("robosc.doctor.checks.kernel_problem", lambda: "")
+    monkeypatch.setattr("robosc.doctor.checks.left_aside", lambda: "")
     return MadeUp()
 
 
@@ -129,6 +129,7 @@ MISSING = [
     (Purpose.SYNTH, "Python", "python_version", (3, 14, 0)),
     (Purpose.SYNTH, "robosc", "versions", {"dd": "0.6.0"}),
     (Purpose.SYNTH, "robosc", "versions", {**VERSIONS, "dd": "0.5.99"}),
+    (Purpose.SYNTH, "robosc", "versions", {**VERSIONS, "dd": "0.7"}),
     (Purpose.SERVER, "extra server", "versions", {**VERSIONS, "sqlalchemy": "2.0.35"}),
     (Purpose.BRIDGE, "extra bridge", "versions", {key: VERSIONS[key] for key in VERSIONS if key != "pyserial"}),
     (Purpose.VIEW, "extra view", "versions", {key: VERSIONS[key] for key in VERSIONS if key != "aiohttp"}),
@@ -161,7 +162,7 @@ def test_without_the_kernel_the_report_says_where_to_read_about_it(
     machine: MadeUp, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert "kernel" not in problems(machine, Purpose.SYNTH)
-    monkeypatch.setattr("robosc.doctor.checks.kernel_problem", lambda: "it was not made")
+    monkeypatch.setattr("robosc.doctor.checks.left_aside", lambda: "it was not made")
     found = problems(machine, Purpose.SYNTH)["kernel"]
     assert (found.grade, found.fix) == (Grade.NOTE, "docs/install.md, 'The kernel'")
     assert found.message.endswith("it was not made")

@@ -8,6 +8,7 @@ from itertools import combinations
 from random import Random
 
 import pytest
+from msgspec import structs
 
 from robosc.automata import EventCondition, Semantics, System
 from robosc.automata.compile import NO_DATA, State, compile_expression
@@ -294,7 +295,7 @@ def test_beyond_the_effort_a_trace_is_still_a_run(monkeypatch: pytest.MonkeyPatc
     """Traces may be longer then, and are the same for both engines."""
     for seed in range(25):
         system = random_system(seed)
-        questions = replace(random_questions(system, seed), restrictions=())
+        questions = structs.replace(random_questions(system, seed), restrictions=())
         shortest = synthesize(system, questions=questions).answers.together
         for effort in (0, 300):
             monkeypatch.setattr("robosc.synthesis.runs.MAXIMUM_EFFORT", effort)

@@ -1,7 +1,6 @@
 """The kernel does what its twins in Python do, operation by operation, and leaves nothing behind."""
 
 import gc
-import importlib.util
 import shutil
 import subprocess
 import sys
@@ -30,7 +29,6 @@ from robosc.synthesis.step import Step
 from support.effort import examples
 from support.families import FAMILIES
 
-TOP = Path(__file__).parents[3]
 PLACES = ("a", "b", "c", "d", "e", "f")
 HIDDEN = ("h", "i")
 ORDER = (*(name for place in PLACES for name in (place, place + "'")), *HIDDEN)
@@ -325,13 +323,13 @@ class TestLeftAside:
         assert kernel_problem() == "it was made from other sources"
 
     def test_of_another_dd(self, monkeypatch: pytest.MonkeyPatch) -> None:
-        monkeypatch.setattr(compiled, "_LAYOUT", (64, 64))
-        assert kernel_problem() == ""
+        monkeypatch.setattr(compiled, "layout_problem", lambda module, cudd: "another layout")
+        assert (kernel_problem(), compiled.left_aside()) == ("", "another layout")
         assert kernel_of(make_manager("cudd")) is None
 
     def test_not_made(self, monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setitem(sys.modules, "robosc.kernel._kernel", None)
-        assert kernel_problem() == "it was not made: there was no C compiler"
+        assert kernel_problem() == compiled.left_aside() == "it was not made: there was no C compiler"
 
 
 @pytest.mark.usefixtures("looked_for_anew")
@@ -342,6 +340,7 @@ def test_a_dd_that_keeps_cudd_to_itself_is_left_to_python(monkeypatch: pytest.Mo
     hiding = SimpleNamespace(BDD=cudd.BDD, Function=cudd.Function, __file__=module.__file__)
     monkeypatch.setattr(compiled, "load_dd", lambda name: hiding)
     assert kernel_of(make_manager("cudd")) is None
+    assert "has no Cudd_Ref" in compiled.left_aside()
 
 
 def test_a_library_without_cudd_is_refused() -> None:
@@ -356,16 +355,6 @@ def test_a_library_without_cudd_is_refused() -> None:
 
 
 # Making it
-
-
-@pytest.fixture(scope="module")
-def build() -> ModuleType:
-    """The hook that makes it, which is no part of the package."""
-    spec = importlib.util.spec_from_file_location("build_kernel", TOP / "deploy" / "build_kernel.py")
-    assert spec is not None and spec.loader is not None
-    module = importlib.util.module_from_spec(spec)
-    spec.loader.exec_module(module)
-    return module
 
 
 def test_it_is_made_without_a_warning(build: ModuleType, tmp_path: Path) -> None:

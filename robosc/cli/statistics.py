@@ -12,6 +12,7 @@ _NAMES = {
     "engine": "engine",
     "search": "search",
     "closure": "order of steps",
+    "parts": "independent parts",
     "state_bits": "state bits",
     "iterations": "rounds",
     "peak_nodes": "peak nodes",

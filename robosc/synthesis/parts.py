@@ -1,9 +1,10 @@
 """Synthesis of a system of many independent parts: each by itself, which gives the same as all of them together."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from math import prod
 
+from robosc.automata.compile import subjects_read
 from robosc.automata.parts import independent_parts
 from robosc.automata.structure import System
 from robosc.synthesis.engines import EngineOptions
@@ -49,17 +50,20 @@ def synthesize_in_parts(
     parts = [system]
     if len(system.automata) >= smallest:
         parts = list(independent_parts(system, _together(system, questions)))
+
+    def of(part: System, asked: Questions) -> SynthesisResult:
+        return synthesize(part, engine=engine, questions=asked, should_stop=should_stop, on_progress=on_progress)
+
     if len(parts) == 1:
-        return synthesize(
-            system, engine=engine, questions=questions, should_stop=should_stop, on_progress=on_progress
-        )
+        return of(system, questions)
     made: list[tuple[_Part, SynthesisResult]] = []
     for part in _asked(system, parts, questions):
-        result = synthesize(
-            part.system, engine=engine, questions=part.questions, should_stop=should_stop, on_progress=on_progress
-        )
+        result = of(part.system, part.questions)
         if result.status is SynthesisStatus.EMPTY:
             return result
+        if result.initial is not None:
+            # One diagram says where the whole may begin.
+            return of(system, questions)
         made.append((part, result))
     return _whole(system, made, questions)
 
@@ -85,46 +89,53 @@ def _asked(system: System, parts: list[System], questions: Questions) -> Iterato
         own = conditions[part_of_event[condition.event]]
         own[place] = len(own)
     invariants: list[dict[int, int]] = [{} for _ in parts]
-    for number, part in enumerate(parts):
-        left = list(part.invariants)
-        for place, invariant in enumerate(system.invariants):
-            if left and left[0] is invariant:
-                invariants[number][place] = len(invariants[number])
-                left.pop(0)
+    part_of_invariant: list[int] = []
+    for place, invariant in enumerate(system.invariants):
+        number = part_of_automaton[next(iter(subjects_read(invariant))).automaton]
+        invariants[number][place] = len(invariants[number])
+        part_of_invariant.append(number)
     restrictions: list[list[int]] = [[] for _ in parts]
     for place, item in enumerate(questions.restrictions):
-        events = list(_events_of(system, item))
-        numbers = {part_of_event[event] for event in events}
-        numbers |= {number for number, own in enumerate(invariants) if own.keys() & set(item.invariants)}
-        for number in sorted(numbers):
+        numbers = {part_of_event[event] for event in _events_of(system, item)}
+        numbers |= {part_of_invariant[invariant] for invariant in item.invariants}
+        # The first part answers for a restriction of nothing.
+        for number in numbers or {0}:
             restrictions[number].append(place)
+
+    def of_events(events: Iterable[str]) -> list[tuple[str, ...]]:
+        found: list[list[str]] = [[] for _ in parts]
+        for event in events:
+            found[part_of_event[event]].append(event)
+        return list(map(tuple, found))
+
+    events, prompted, silent = map(of_events, (questions.events, questions.prompted, questions.silent))
+    prompts, changing = of_events(questions.prompts), of_events(questions.changing)
+    rivals: list[list[tuple[str, ...]]] = [[] for _ in parts]
+    for group in filter(None, questions.rivals):
+        rivals[part_of_event[group[0]]].append(group)
+    locations: list[list[tuple[str, str]]] = [[] for _ in parts]
+    for location in questions.locations:
+        locations[part_of_automaton[location[0]]].append(location)
     for number, part in enumerate(parts):
-
-        def is_own(event: str, number: int = number) -> bool:
-            return part_of_event.get(event) == number
-
-        yield _Part(
-            part,
-            Questions(
-                events=tuple(filter(is_own, questions.events)),
-                restrictions=tuple(
-                    replace(
-                        questions.restrictions[place],
-                        conditions=tuple(conditions[number][item] for item in questions.restrictions[place].conditions),
-                        invariants=tuple(invariants[number][item] for item in questions.restrictions[place].invariants),
-                    )
-                    for place in restrictions[number]
-                ),
-                rivals=tuple(group for group in questions.rivals if group and is_own(group[0])),
-                locations=tuple(item for item in questions.locations if part_of_automaton[item[0]] == number),
-                prompted=tuple(filter(is_own, questions.prompted)),
-                prompts=frozenset(filter(is_own, questions.prompts)),
-                changing=frozenset(filter(is_own, questions.changing)),
-                silent=tuple(filter(is_own, questions.silent)),
-            ),
-            tuple(restrictions[number]),
-            tuple(invariants[number]),
+        own_restrictions = (
+            replace(
+                questions.restrictions[place],
+                conditions=tuple(conditions[number][item] for item in questions.restrictions[place].conditions),
+                invariants=tuple(invariants[number][item] for item in questions.restrictions[place].invariants),
+            )
+            for place in restrictions[number]
         )
+        own_questions = Questions(
+            events=events[number],
+            restrictions=tuple(own_restrictions),
+            rivals=tuple(rivals[number]),
+            locations=tuple(locations[number]),
+            prompted=prompted[number],
+            prompts=frozenset(prompts[number]),
+            changing=frozenset(changing[number]),
+            silent=silent[number],
+        )
+        yield _Part(part, own_questions, tuple(restrictions[number]), tuple(invariants[number]))
 
 
 def _whole(system: System, made: list[tuple[_Part, SynthesisResult]], questions: Questions) -> SynthesisResult:
@@ -155,9 +166,7 @@ def _whole(system: System, made: list[tuple[_Part, SynthesisResult]], questions:
         iterations=max(item.iterations for item in figures),
         peak_nodes=max(item.peak_nodes for item in figures),
         states=prod(item.states for item in figures),
-        search=Search.BACKWARDS
-        if all(item.search is Search.BACKWARDS for item in figures)
-        else Search.REACHABLE_FIRST,
+        search=Search.BACKWARDS if all(item.search is Search.BACKWARDS for item in figures) else Search.REACHABLE_FIRST,
         parts=len(figures),
     )
     return SynthesisResult(

@@ -284,7 +284,7 @@ class Steps:
         )
         """States that have all that the event writes as a constant: it leads to no other ones."""
         self.made: dict[str, Any] = {}
-        """What was made of the event, by name, for as long as its conditions and data stay as they are."""
+        """Predicates made of the event, by name, for as long as its conditions and data stay as they are."""
 
     @property
     def bad(self) -> Any:

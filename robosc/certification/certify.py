@@ -1,5 +1,6 @@
 """The certificate: the result of the independent verifier for a supervisor that has just been synthesized."""
 
+from collections import Counter
 from collections.abc import Callable
 
 from robosc._version import __version__
@@ -10,7 +11,7 @@ from robosc.source import Bundle
 from robosc.supervisor import Certificate, CheckResult
 from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisResult
-from robosc.verification import CheckOutcome, Limits, verify
+from robosc.verification import CheckOutcome, Limits, Verification, VerificationReport, verify
 
 
 def certify(
@@ -38,23 +39,31 @@ def certify(
         SynthesisCancelled: `should_stop` became true.
         InternalError: The verifier found fault with the result.
     """
-    system = semantics.system
-    report = verify(
-        system,
-        state_predicates(system, result.added),
-        limits,
-        expected_states=result.statistics.states,
-        engine=result.statistics.engine,
-        semantics=semantics,
-        should_stop=should_stop,
-        on_progress=on_progress,
-    )
-    found = report.verification
-    if found.failures or found.states not in (None, result.statistics.states):
-        raise InternalError(
-            f"the verifier refuses the supervisor: {found.message or 'another number of states'}"
-            + (f" after {', '.join(found.trace)}" if found.trace else "")
+
+    def report_of(part: Semantics, made: SynthesisResult) -> VerificationReport:
+        report = verify(
+            part.system,
+            state_predicates(part.system, made.added),
+            limits,
+            expected_states=made.statistics.states,
+            engine=made.statistics.engine,
+            semantics=part,
+            should_stop=should_stop,
+            on_progress=on_progress,
         )
+        found = report.verification
+        if found.failures or found.states not in (None, made.statistics.states):
+            raise InternalError(
+                f"the verifier refuses the supervisor: {found.message or 'another number of states'}"
+                + (f" after {', '.join(found.trace)}" if found.trace else "")
+            )
+        return report
+
+    if result.parts:
+        report = _together([report_of(Semantics(part), made) for part, made in result.parts])
+    else:
+        report = report_of(semantics, result)
+    found = report.verification
     return Certificate(
         engine_version=__version__,
         bundle_sha256=bundle.digest,
@@ -67,6 +76,35 @@ def certify(
         states=str(result.statistics.states),
         transitions=None if found.transitions is None else str(found.transitions),
     )
+
+
+def _together(reports: list[VerificationReport]) -> VerificationReport:
+    """The report of independent parts: the whole has a property if each of them has it."""
+    found = [report.verification for report in reports]
+
+    def all_of(outcomes: list[CheckOutcome]) -> CheckOutcome:
+        return CheckOutcome.PASSED if set(outcomes) == {CheckOutcome.PASSED} else CheckOutcome.NOT_CHECKED
+
+    states: int | None = 1
+    transitions: int | None = 0
+    for item in found:
+        if states is None or item.states is None:
+            states = transitions = None
+            continue
+        if transitions is not None:
+            transitions = None if item.transitions is None else transitions * item.states + item.transitions * states
+        states *= item.states
+    methods = Counter(report.method for report in reports)
+    method = "; ".join(f"{count} independent parts each by: {text}" for text, count in methods.items())
+    verification = Verification(
+        states,
+        transitions,
+        all_of([item.safe for item in found]),
+        all_of([item.controllable for item in found]),
+        all_of([item.nonblocking for item in found]),
+        all_of([item.maximally_permissive for item in found]),
+    )
+    return VerificationReport(verification, method)
 
 
 def _result(outcome: CheckOutcome) -> CheckResult:

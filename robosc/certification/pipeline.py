@@ -40,7 +40,7 @@ from robosc.synthesis import (
     SynthesisStatus,
     findings,
     questions_about,
-    synthesize,
+    synthesize_in_parts,
 )
 from robosc.verification import DEFAULT_STATES, CheckOutcome, Limits
 
@@ -197,7 +197,7 @@ def _supervised(
     def report(progress: SynthesisProgress) -> None:
         on_progress(Progress("synthesis", str(progress)))
 
-    result = synthesize(
+    result = synthesize_in_parts(
         system,
         engine=engine,
         questions=questions_about(model, system, deployment),

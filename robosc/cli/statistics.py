@@ -14,6 +14,7 @@ _NAMES = {
     "search": "search",
     "kernel": "kernel",
     "closure": "order of steps",
+    "parts": "independent parts",
     "state_bits": "state bits",
     "iterations": "rounds",
     "peak_nodes": "peak nodes",

@@ -3,6 +3,7 @@
 from robosc.synthesis.choices import EdgeChoice, edge_choices
 from robosc.synthesis.engines import EngineOptions, UnknownEngineError, engine_names, register, resolve_engine
 from robosc.synthesis.findings import findings, questions_about
+from robosc.synthesis.parts import synthesize_in_parts
 from robosc.synthesis.questions import Answers, Cause, EnabledTogether, NeverEnabled, Questions, Restriction
 from robosc.synthesis.result import Statistics, SynthesisProgress, SynthesisResult, SynthesisStatus
 from robosc.synthesis.synthesize import synthesize
@@ -28,4 +29,5 @@ __all__ = [
     "register",
     "resolve_engine",
     "synthesize",
+    "synthesize_in_parts",
 ]

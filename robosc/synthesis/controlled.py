@@ -8,7 +8,7 @@ from robosc.errors import InternalError
 from robosc.expressions import Expression
 from robosc.synthesis.causes import Causes
 from robosc.synthesis.expression_encoder import ExpressionEncoder
-from robosc.synthesis.fixed_point import FixedPoint, Problem, SolvedProblem, allowed, initial_states, safe_states
+from robosc.synthesis.fixed_point import FixedPoint, Problem, SolvedProblem, allowed, initial_states
 from robosc.synthesis.questions import Answers, EnabledTogether, NeverEnabled, Questions, Restriction, Unprompted
 from robosc.synthesis.runs import ShortestRuns, SystemRun
 from robosc.synthesis.transitions import Steps
@@ -29,7 +29,10 @@ class ControlledSystem(SolvedProblem):
         self._encoder = ExpressionEncoder(self.encoding)
         self._steps = {steps.event.name: steps for steps in self.problem.steps}
         self._causes = Causes(self.encoding, self.monitor, self.problem, self.good, self.reachable)
+        self._fixed_point = FixedPoint(self.encoding, self.monitor)
         self._known: dict[str, Any] = {}
+        self._held: dict[int, Any] = {}
+        """Predicates of the system's own conditions, by their identity: they stay as long as the system does."""
         self._effort = 0
 
     def answers(self, questions: Questions) -> Answers:
@@ -101,7 +104,10 @@ class ControlledSystem(SolvedProblem):
 
     def _holds(self, condition: Expression) -> Any:
         self.monitor.check_stop()
-        return self._encoder.holds(condition)
+        found = self._held.get(id(condition))
+        if found is None:
+            found = self._held[id(condition)] = self._encoder.holds(condition)
+        return found
 
     def _supervisor_disables(self) -> bool:
         return any(
@@ -127,11 +133,24 @@ class ControlledSystem(SolvedProblem):
     def _is_the_same_without(self, restrictions: Sequence[Restriction]) -> bool:
         """Return True if the controlled system of the problem without some restrictions allows nothing more."""
         problem = self._without(restrictions)
-        good = FixedPoint(self.encoding, self.monitor).solution(problem, known=self.good)
+        good = self._fixed_point.solution(problem, known=self.good)
+        if good.states == self.good:
+            changed = [steps for steps in problem.steps if steps is not self._steps[steps.event.name]]
+        else:
+            # An event that changes what they read is the likeliest to be allowed where it was not.
+            read = self._read(restrictions)
+            changed = sorted(problem.steps, key=lambda steps: -len(read.intersection(steps.changed)))
         return all(
             self.reachable & steps.plant & allowed(steps, good.states) == self._possible(steps.event.name)
-            for steps in problem.steps
+            for steps in changed
         )
+
+    def _read(self, restrictions: Sequence[Restriction]) -> set[str]:
+        """The variables that restrictions read."""
+        system = self.encoding.system
+        conditions = [system.conditions[place].condition for item in restrictions for place in item.conditions]
+        invariants = [system.invariants[place] for item in restrictions for place in item.invariants]
+        return set().union(*(self._manager.support(self._holds(item)) for item in (*conditions, *invariants)))
 
     def _without(self, restrictions: Sequence[Restriction]) -> Problem:
         """The problem without some restrictions; what they are watched for stays as it is."""
@@ -148,8 +167,10 @@ class ControlledSystem(SolvedProblem):
             under_what_is_left(steps) if steps.event.name in touched else steps for steps in self.problem.steps
         )
         dropped = {place for item in restrictions for place in item.invariants}
-        invariants = [item for place, item in enumerate(system.invariants) if place not in dropped]
-        return Problem(steps, safe_states(self.encoding, invariants) if dropped else self.problem.safe)
+        if not dropped:
+            return Problem(steps, self.problem.safe)
+        left_over = (self._holds(item) for place, item in enumerate(system.invariants) if place not in dropped)
+        return Problem(steps, self.encoding.all_of([self.encoding.valid_states(), *left_over]))
 
     # Prompts
 

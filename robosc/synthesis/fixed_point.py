@@ -176,7 +176,10 @@ class FixedPoint:
             return GoodStates(good, rounds, f"there is no initial state{where}")
         if self._is_lost(good):
             return GoodStates(good, rounds, "the initial state is against a state invariant")
+        nothing = self._encoding.manager.false
         for steps in problem.steps:
+            if steps.bad == nothing:
+                continue
             good = good & ~steps.bad
             if self._is_lost(good):
                 return GoodStates(good, rounds, f"{steps.event.name} can do harm in the initial state already")
@@ -209,17 +212,16 @@ class FixedPoint:
         return closure.of((good & self.marked) | known, "coreachability")
 
     def _towards(self, steps: Steps, good: Any) -> Step:
-        source, names = self._source(steps, good)
-        return Step(steps.backwards(source), names, source & steps.sources)
+        def make() -> Step:
+            source, names = self._source(steps, good)
+            return Step(steps.backwards(source), names, source & steps.sources)
+
+        return _kept(steps, "towards", make)
 
     def _controllable(self, problem: Problem, good: Any) -> Any:
         """The states of `good` that no run of uncontrollable events leaves."""
         closure = self._closure(
-            (
-                Step(steps.backwards(), steps.names, steps.sources)
-                for steps in self._each(problem)
-                if not steps.event.is_controllable
-            ),
+            (self._towards(steps, good) for steps in self._each(problem) if not steps.event.is_controllable),
             self._encoding.manager.true,
         )
         # Once the initial state is among them there is nothing left to find out.
@@ -235,8 +237,11 @@ class FixedPoint:
         return start | closure.of(start & good, "reachability")
 
     def _onwards(self, steps: Steps, good: Any) -> Step:
-        source, names = self._source(steps, good)
-        return Step(steps.forwards(source), names, steps.arrival)
+        def make() -> Step:
+            source, names = self._source(steps, good)
+            return Step(steps.forwards(source), names, steps.arrival)
+
+        return _kept(steps, "onwards", make)
 
     def _source(self, steps: Steps, good: Any) -> tuple[Any, frozenset[str]]:
         """Return the predicate of where an event may happen, and the variables that decide that.
@@ -259,6 +264,16 @@ class FixedPoint:
         for steps in problem.steps:
             self._monitor.check_stop()
             yield steps
+
+
+def _kept(steps: Steps, name: str, make: Callable[[], Step]) -> Step:
+    """Return the step of an event, which is made once if the states to stay in do not decide about it."""
+    if steps.event.is_controllable and not steps.is_deterministic:
+        return make()
+    if name not in steps.made:
+        steps.made[name] = make()
+    found: Step = steps.made[name]
+    return found
 
 
 def allowed(steps: Steps, good: Any) -> Any:

@@ -58,6 +58,8 @@ def hyperedges(system: System) -> tuple[frozenset[Subject], ...]:
             for update in edge.updates:
                 together.add(Subject(automaton.name, update.variable))
                 together |= subjects_read(update.expression)
+    for item in system.plant_conditions:
+        touched[item.event] |= subjects_read(item.condition)
     found.update((frozenset(touched[event.name]), None) for event in system.events)
     on_events = (item.condition for item in (*system.conditions, *system.plant_conditions))
     for condition in (*on_events, *system.invariants, *system.plant_invariants):

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, field
 from enum import StrEnum
 
+from robosc.automata.structure import System
 from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.synthesis.questions import Answers
 
@@ -64,6 +65,7 @@ class Statistics:
         states: Reachable states of the controlled system, exact; 0 where there is no supervisor.
         search: Direction of the search for good states.
         closure: Order of steps.
+        parts: Number of independent parts that were synthesized one by one; their rounds and nodes are the most of one.
     """
 
     engine: str
@@ -73,6 +75,7 @@ class Statistics:
     states: int
     search: Search = Search.BACKWARDS
     closure: Closure = Closure.SATURATION
+    parts: int = 1
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,6 +89,7 @@ class SynthesisResult:
         statistics: Figures.
         reason: Reason why there is no supervisor, in words; empty where there is one.
         answers: Answers to the other questions about the controlled system; empty where there is none.
+        parts: Independent parts of the system with their results, where it was synthesized part by part.
     """
 
     status: SynthesisStatus
@@ -94,3 +98,4 @@ class SynthesisResult:
     reason: str = ""
     answers: Answers = field(default_factory=Answers)
     initial: DecisionDiagram | None = None
+    parts: "tuple[tuple[System, SynthesisResult], ...]" = ()

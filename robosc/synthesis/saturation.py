@@ -183,8 +183,8 @@ class CompiledSaturation:
         self._manager = manager
         self._within = within
         self._monitor = monitor
-        # Predicates whose addresses the kernel has.
-        self._kept: list[Any] = []
+        # The kernel has the addresses of what the steps keep.
+        self._steps = steps
         self._groups = tuple(
             (top, tuple(self._passed(step, step.add) for step in group if isinstance(step.add, Image)))
             for top, group in _grouped(levels, steps)
@@ -206,26 +206,30 @@ class CompiledSaturation:
         return states
 
     def _passed(self, step: Step, image: Image) -> tuple[object, ...]:
+        if step.compiled is None:
+            step.compiled = self._compiled(step, image)
+        return step.compiled[0]
+
+    def _compiled(self, step: Step, image: Image) -> tuple[tuple[object, ...], tuple[Any, ...]]:
         manager = self._manager
         constants = manager.cube(image.constants) if image.constants else None
         hidden = manager.cube(dict.fromkeys(image.hidden, True)) if image.hidden else None
         names = {name: manager.var(new) for name, new in image.names.items()}
-        return (
-            self._address(image.inside),
-            self._address(image.needed),
-            self._address(constants),
+        address = self._kernel.address
+        passed = (
+            address(image.inside),
+            address(image.needed),
+            address(constants),
             self._substitutions(image.functions),
-            self._address(image.relation),
-            self._address(hidden),
+            address(image.relation),
+            address(hidden),
             self._substitutions(names),
-            self._address(image.outside),
-            self._address(step.room),
+            address(image.outside),
+            address(step.room),
         )
+        return passed, (constants, hidden, *names.values())
 
     def _substitutions(self, functions: Mapping[str, Any]) -> tuple[tuple[int, int], ...]:
-        pairs = ((self._manager.var(name), function) for name, function in functions.items())
-        return tuple((self._address(variable), self._address(function)) for variable, function in pairs)
-
-    def _address(self, predicate: Any) -> int:
-        self._kept.append(predicate)
-        return self._kernel.address(predicate)
+        # The manager keeps its variables.
+        address = self._kernel.address
+        return tuple((address(self._manager.var(name)), address(function)) for name, function in functions.items())

@@ -1,23 +1,26 @@
 """Steps: the states that events add to a set of states, for every kind of closure."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, field
 from typing import Any
 
-import msgspec
 
-
-class Step(msgspec.Struct, frozen=True):
+@dataclass(eq=False, slots=True)
+class Step:
     """Contribution of one event to a set of states.
 
     Attributes:
         add: The states that it leads to from a set of states; from two sets, what it leads to from each of them.
         names: The current-state variables that it reads or changes: all of them.
         room: Predicate over these variables that is true of all that it ever leads to; None if there is none.
+        compiled: The step for the kernel, with the predicates that are in it, once it has been made; many closures
+            have the same steps.
     """
 
     add: Callable[[Any], Any]
     names: frozenset[str]
     room: Any = None
+    compiled: tuple[tuple[object, ...], tuple[Any, ...]] | None = field(default=None, init=False, repr=False)
 
     def grown(self, states: Any, within: Any, new: Any) -> Any:
         """Return some states and what the event adds to them of those within a predicate, led from new ones."""

@@ -282,17 +282,22 @@ class Steps:
             self._manager.var(name) if value else ~self._manager.var(name) for name, value in self._constants.items()
         )
         """States that have all that the event writes as a constant: it leads to no other ones."""
+        self.made: dict[str, Any] = {}
+        """Predicates made of the event, by name, for as long as its conditions and data stay as they are."""
 
     @property
     def bad(self) -> Any:
         """States in which the event, uncontrollable, can do harm at once."""
         if self.event.is_controllable:
             return self._manager.false
-        return self.leaving | (self.plant & ~self.condition)
+        if "bad" not in self.made:
+            self.made["bad"] = self.leaving | (self.plant & ~self.condition)
+        return self.made["bad"]
 
     def under(self, condition: Any) -> Self:
         """The same event under other event conditions."""
         other = copy(self)
+        other.made = {}
         other.condition = condition & self._transition.watched
         read = self._manager.support(other.condition)
         other.names = self.names | (frozenset(self._state_names) & read)
@@ -301,6 +306,7 @@ class Steps:
     def carrying(self, data: Any) -> Self:
         """The same event with some of its data, or in some states, alone: a predicate; `plant` stays that of all."""
         other = copy(self)
+        other.made = {}
         # They are made on first use.
         other.__dict__.pop("_relation", None)
         other.__dict__.pop("_predecessors", None)

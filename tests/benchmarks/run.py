@@ -31,12 +31,25 @@ import goal_checks
 import goals
 import gr1
 import language
+import large_robots
 import strategies
 import synthesis
 from service import call_cpu, isolation, load, task_cpu
 
 _MODULES = (
-    *(cold_start, conditions, editor, execution, goal_checks, goals, gr1, language, strategies, synthesis),
+    *(
+        cold_start,
+        conditions,
+        editor,
+        execution,
+        goal_checks,
+        goals,
+        gr1,
+        language,
+        large_robots,
+        strategies,
+        synthesis,
+    ),
     *(call_cpu, isolation, task_cpu),
     *(decoders, drive_bases, endurance, live_view, live_view_pixels, loop_period, maze, reaction, shipped, twin),
 )

@@ -124,7 +124,7 @@ def test_a_wrong_synthesis_is_caught(monkeypatch: pytest.MonkeyPatch) -> None:
         spoilt = tuple(AddedCondition(item.event, DecisionDiagram((), 1)) for item in result.added)
         return SynthesisResult(result.status, spoilt, result.statistics)
 
-    monkeypatch.setattr("robosc.certification.pipeline.synthesize", wrong)
+    monkeypatch.setattr("robosc.certification.pipeline.synthesize_in_parts", wrong)
     with pytest.raises(InternalError, match="the verifier refuses the supervisor: not safe"):
         make_supervisor(bundle_of(COUNTER))
 

@@ -7,8 +7,8 @@ from random import Random
 from hypothesis import given
 from hypothesis import strategies as st
 
-from robosc.automata import DiscreteVariable, System, to_automata
-from robosc.automata.state import subjects
+from robosc.automata import DiscreteVariable, EventCondition, System, to_automata
+from robosc.automata.state import Subject, subjects
 from robosc.expressions import Binary, BooleanType, Unary, VariableRead, conjunction
 from robosc.model.structure import Deployment
 from robosc.synthesis.order import block_order, force, hyperedges, slide, span
@@ -71,6 +71,15 @@ def test_what_an_event_touches_is_one_hyperedge() -> None:
     edges = {frozenset(map(str, edge)) for edge in hyperedges(system)}
     assert {"LidarSensor", "LidarSensor.ahead"} in edges
     assert {"LineDetector", "LidarSensor", "EmergencyStop"} in edges
+
+
+def test_what_plants_need_for_an_event_belongs_to_it() -> None:
+    flag = automaton("Feature", ["on -idle-> on"], variables=[DiscreteVariable("present", BooleanType(), (False,))])
+    lamp = automaton("Lamp", ["off -light-> lit", "lit -dim-> off"])
+    needed = EventCondition("light", VariableRead("Feature", "present"))
+    made = replace(system(flag, lamp), plant_conditions=(needed,))
+    assert frozenset({Subject("Lamp"), Subject("Feature", "present")}) in hyperedges(made)
+    assert hyperedges(system(flag, lamp)) == ()
 
 
 def test_what_a_long_condition_compares_stands_together() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 from robosc.execution.runtime.falling_conditions import held_ever, the_fallen
 from robosc.execution.runtime.protocol import ControlledSystem, RobotSide
@@ -98,7 +98,7 @@ class Goal:
     :ivar asked_s: Reading of the clock when its cancel was decided.
     :ivar is_cancel_sent: True if its server was asked to cancel it.
     :ivar is_overdue: True if it was reported that it has not ended in time after that.
-    :ivar deadline_s: Reading of the clock at which it counts as failed.
+    :ivar deadline_s: Reading of the clock at which it counts as failed, if nobody cancels it.
     :ivar held: Values for the requirements of the action: True if one held in a stable state since
         the request.
     """
@@ -133,6 +133,15 @@ class Goal:
         self.is_overdue = False
         self.deadline_s = deadline_s
         self.held = held
+
+    @property
+    def time_is_over_s(self) -> float:
+        """
+        Return the reading of the clock at which it fails unless it has ended; never may be.
+
+        A goal that is being cancelled does not fail: it may still move the robot.
+        """
+        return self.deadline_s if self.is_running and not self.is_cancelling else FOREVER
 
 
 class Goals:
@@ -196,17 +205,17 @@ class Goals:
         """Return every goal, in source order of the actions."""
         return list(self._goals.values())
 
-    def expired(self, now_s: float) -> List[Goal]:
-        """Return running goals whose time is over."""
-        return [
-            goal for goal in self._goals.values() if goal.is_running and now_s >= goal.deadline_s
-        ]
+    def expired(self, now_s: float) -> Iterator[Goal]:
+        """
+        Yield running goals whose time is over.
+
+        Each is looked at when its turn comes: what was done about one may cancel the next.
+        """
+        return (goal for goal in self.open_goals() if now_s >= goal.time_is_over_s)
 
     def deadline_s(self) -> float:
         """Return the reading of the clock, in seconds, at which the next goal is over its time."""
-        return min(
-            (goal.deadline_s for goal in self._goals.values() if goal.is_running), default=FOREVER
-        )
+        return min((goal.time_is_over_s for goal in self._goals.values()), default=FOREVER)
 
     def turned(self) -> List[Tuple[Goal, Tuple[int, ...]]]:
         """

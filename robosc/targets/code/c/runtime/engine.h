@@ -131,7 +131,7 @@ typedef struct {
 #endif
     robot_on_unknown_t on_unknown;
     uint64_t service_timeout_us;                          /* UINT64_MAX: none */
-    uint64_t action_timeout_us;                           /* UINT64_MAX: none */
+    uint64_t action_timeout_us;                           /* UINT64_MAX: none; not while a goal is being cancelled */
     uint64_t cancel_timeout_us;                           /* 0: never; a cancel that takes longer is reported */
 #if ROBOT_IS_LAYER
     uint64_t command_timeout_us;                          /* 0: never; what acts is released if nothing came */

@@ -37,6 +37,15 @@ static robot_goal_t *open_goal(robot_t *r, int action)
     return goal;
 }
 
+/* Return the time at which a goal fails unless it has ended. One that is being cancelled does not: it may still move the
+   robot. */
+static uint64_t time_is_over_from(const robot_t *r, int action)
+{
+    const robot_goal_t *goal = &r->goals[action];
+    const bool can_fail = goal->is_open && goal->is_running && goal->cancelling.why == ROBOT_CANCEL_NONE;
+    return can_fail ? goal->deadline_us : FOREVER;
+}
+
 /* Return the time at which the cancel of a goal is overdue. */
 static uint64_t overdue_from(const robot_t *r, int action)
 {

@@ -27,8 +27,8 @@ static uint64_t next_deadline(const robot_t *r)
 #endif
 #if ROBOT_ACTION_COUNT > 0
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        if (r->goals[action].is_open && r->goals[action].is_running && r->goals[action].deadline_us < next) {
-            next = r->goals[action].deadline_us;
+        if (time_is_over_from(r, action) < next) {
+            next = time_is_over_from(r, action);
         }
         if (overdue_from(r, action) < next) {
             next = overdue_from(r, action);
@@ -89,13 +89,8 @@ static bool expire(robot_t *r)
     }
 #endif
 #if ROBOT_ACTION_COUNT > 0
-    bool is_expired[ROBOT_ACTION_COUNT];
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        const robot_goal_t *goal = &r->goals[action];
-        is_expired[action] = goal->is_open && goal->is_running && r->now_us >= goal->deadline_us;
-    }
-    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        if (is_expired[action]) {
+        if (r->now_us >= time_is_over_from(r, action)) {
             r->goals[action].is_running = false;
             happened(r, ACTIONS[action].error, take_event(&r->state, ACTIONS[action].error));
             if (!settle(r, -1, &has_changed)) {

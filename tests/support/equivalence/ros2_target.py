@@ -214,6 +214,7 @@ def _parameters(scenario: Scenario, folder: Path, deployment: Deployment) -> dic
         **deciding(settings, deployment),
         "period": settings.period_s,
         "service_timeout": settings.service_timeout_s,
+        "cancel_timeout": settings.cancel_timeout_s,
         "on_unknown": settings.on_unknown,
         "log_folder": str(folder),
         "server_wait": LIMIT_S,

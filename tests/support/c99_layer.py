@@ -14,6 +14,7 @@ from robosc.execution.runtime.layer import (
     _NOT_FINITE,
     _NOT_KNOWN,
     _NOT_WITHIN,
+    _OLD_CALLS,
     _OLD_GOALS,
     _STILL_RUNNING,
     Layer,
@@ -40,6 +41,7 @@ REFUSALS = (
     _AT_REST[Status.NEW],
     _AT_REST[Status.WAITING],
     _OLD_GOALS,
+    _OLD_CALLS,
     _AT_REST[Status.STOPPED],
     _A_FAULT,
 )

@@ -23,10 +23,12 @@ class Call(NamedTuple):
 
     :ivar service: Name of the service.
     :ivar deadline_s: Reading of the clock at which it counts as failed.
+    :ivar is_left: True if the model started again without it.
     """
 
     service: str
     deadline_s: float
+    is_left: bool = False
 
 
 class Calls:
@@ -55,19 +57,14 @@ class Calls:
             raise
         return number
 
-    def close(self, number: int) -> Optional[str]:
-        """End a call: its service, or None if no such call is under way."""
-        call = self._calls.pop(number, None)
-        return None if call is None else call.service
+    def close(self, number: int) -> Optional[Call]:
+        """End a call; return it, or None if no such call is under way."""
+        return self._calls.pop(number, None)
 
     def find(self, number: int) -> Optional[str]:
-        """Return the service of a call; None if no such call is under way."""
+        """Return the service of a call; None if the model waits for no such call."""
         call = self._calls.get(number)
-        return None if call is None else call.service
-
-    def is_open(self, number: int) -> bool:
-        """Return True if a call is under way."""
-        return number in self._calls
+        return None if call is None or call.is_left else call.service
 
     def expired(self, now_s: float) -> List[int]:
         """Ids of the calls whose time is over."""
@@ -77,9 +74,13 @@ class Calls:
         """Return the reading of the clock, in seconds, at which the next call is over its time."""
         return min((call.deadline_s for call in self._calls.values()), default=FOREVER)
 
-    def clear(self) -> None:
-        """Forget all calls: their replies are unexpected from now on. Ids are not used again."""
-        self._calls.clear()
+    def leave_model(self) -> None:
+        """Let the model start again without its calls; their end is still awaited."""
+        self._calls = {number: call._replace(is_left=True) for number, call in self._calls.items()}
+
+    def left(self) -> Tuple[str, ...]:
+        """Return the services with a call from before the model started again."""
+        return tuple([call.service for call in self._calls.values() if call.is_left])
 
 
 class Goal:

@@ -126,8 +126,11 @@ def test_calls_under_way_at_a_restart_are_answered_with_a_default_response() -> 
     b = layer(SERVICE)
     b.call("ask", "a")
     assert b.during(b.executor.restart) == [("no answer", "ask", "a")]
+    assert b.call("ask", "b") == [("no answer", "ask", "b"), ("blocked", "/ask")]
+    assert b.entries("blocked")[-1]["why"] == "calls from before the restart have not been answered"
+    assert b.during(b.executor.restart) == []
     assert b.reply(1, YES) == []
-    assert b.call("ask", "b") == [("call", "ask", 2, None)]
+    assert b.call("ask", "c") == [("call", "ask", 2, None)]
 
 
 def test_calls_under_way_at_a_stop_are_still_answered() -> None:

@@ -1,3 +1,27 @@
+#if ROBOT_SERVICE_COUNT > 0
+/* Calls. */
+
+/* Return true if a call from before a restart is not over. */
+static bool is_any_call_old(const robot_t *r)
+{
+    for (int service = 0; service < ROBOT_SERVICE_COUNT; service++) {
+        if (r->calls[service].is_open && r->calls[service].is_old) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Begin a call with a new id. */
+static void open_call(robot_t *r, robot_call_t *call)
+{
+    call->is_open = true;
+    call->is_old = false;
+    call->id = r->next_call_id++;
+    call->deadline_us = later(r->now_us, r->settings.service_timeout_us);
+}
+#endif
+
 #if ROBOT_ACTION_COUNT > 0
 /* Goals. */
 

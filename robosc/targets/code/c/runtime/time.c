@@ -3,6 +3,9 @@
 static void update_may_request(robot_t *r)
 {
     r->may_request = r->is_started && !is_at_rest(r);
+#if ROBOT_SERVICE_COUNT > 0
+    r->may_request = r->may_request && !is_any_call_old(r);
+#endif
 #if ROBOT_ACTION_COUNT > 0
     r->may_request = r->may_request && !is_any_goal_old(r);
 #endif
@@ -82,9 +85,11 @@ static bool expire(robot_t *r)
             break;
         }
         r->calls[first].is_open = false;
-        happened(r, SERVICES[first].error, take_event(&r->state, SERVICES[first].error));
-        if (!settle(r, -1, &has_changed)) {
-            return false;
+        if (!r->calls[first].is_old) {
+            happened(r, SERVICES[first].error, take_event(&r->state, SERVICES[first].error));
+            if (!settle(r, -1, &has_changed)) {
+                return false;
+            }
         }
     }
 #endif
@@ -129,6 +134,7 @@ static bool check_time(robot_t *r)
     if (!expire(r)) {
         return false;
     }
+    update_may_request(r);
 #if ROBOT_HAS_STRATEGY
     expire_progress(r);
 #endif

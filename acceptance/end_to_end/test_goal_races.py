@@ -10,7 +10,7 @@ import pytest
 from robosc.supervisor import Supervisor
 from robosc.targets.ros2.runtime.clients import ActionGoals, ServiceCalls
 from robosc.targets.ros2.runtime.inquiry import Endpoints, Inquiry
-from support.goal_races import RACES, Race, World, driver_supervisor, run
+from support.goal_races import RACES, ExecutorWorld, Race, driver_supervisor, run
 from support.ros2 import Peer, environment, own_domain
 
 pytest.importorskip("rclpy", reason="ROS 2 (rclpy) is not installed")
@@ -23,7 +23,7 @@ QUIET_S = 0.3
 """Time without anything to read after which all that was sent has been."""
 
 
-class Real(World):
+class Real(ExecutorWorld):
     """Clients and servers on nodes of their own, each spun only when it is its turn."""
 
     def __init__(self, supervisor: Supervisor, servers: int, peer: Peer) -> None:

@@ -516,7 +516,7 @@ def test_a_prefix_goes_before_both_sides(porter: Porter) -> None:
             layer,
             lambda: porter.peer.publish("/robot1/supervised/cmd_vel", SENT["/supervised/cmd_vel"], linear={"x": 1.0}),
         )
-    assert porter.peer.values("/robot1/blocked")[0] == {"data": "/cmd_vel"}
+    assert json.loads(porter.peer.values("/robot1/blocked")[0]["data"])["identifier"] == "/cmd_vel"
     with porter.process("start", "--topic-prefix", "/robot1", "--print-remappings", name="printing") as printing:
         assert printing.wait() == 0
     assert "/robot1/cmd_vel:=/robot1/supervised/cmd_vel" in printing.stdout.split()

@@ -301,7 +301,7 @@ def test_a_prefix_goes_before_both_sides(porter: Porter) -> None:
         "a message held back",
         lambda: porter.peer.publish(velocity, "/robot1/supervised/cmd_vel"),
     )
-    assert blocked[0].data == "/cmd_vel"
+    assert json.loads(blocked[0].data)["identifier"] == "/cmd_vel"
     printing = porter.process(["-m", f"{PACKAGE}.start", "--topic-prefix", "/robot1", "--print-remappings"], "printing")
     assert printing.wait() == 0
     text = (porter.folder / "printing" / "stdout.txt").read_text()

@@ -60,15 +60,41 @@ robot Walker {
 """
 
 
+class Power:
+    """The robot's service.
+
+    Attributes:
+        calls: Number of the calls that have come.
+        answers: Future after which calls are answered.
+    """
+
+    def __init__(self, peer: Peer) -> None:
+        from rclpy.callback_groups import ReentrantCallbackGroup
+        from rclpy.task import Future
+        from std_srvs.srv import SetBool
+
+        self.calls = 0
+        self.answers = Future()
+        # A call that waits keeps nothing else waiting.
+        peer.node.create_service(SetBool, "/power", self._grant, callback_group=ReentrantCallbackGroup())
+
+    async def _grant(self, request: Any, response: Any) -> Any:
+        self.calls += 1
+        await self.answers
+        response.success = request.data
+        return response
+
+
 class Stage:
     """A managed node, a manager, and the robot around it."""
 
-    def __init__(self, peer: Peer, node: RosProcess) -> None:
+    def __init__(self, peer: Peer, node: RosProcess, power: Power) -> None:
         from geometry_msgs.msg import Twist
         from lifecycle_msgs.srv import ChangeState, GetState
 
         self.peer = peer
         self.node = node
+        self.power = power
         self.commands = peer.receive(Twist, "/cmd_vel")
         self._change = peer.node.create_client(ChangeState, f"/{PACKAGE}/change_state")
         self._get = peer.node.create_client(GetState, f"/{PACKAGE}/get_state")
@@ -141,26 +167,22 @@ def workspace(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(params=DISTRIBUTIONS)
 def start(request: pytest.FixtureRequest, workspace: Path, tmp_path: Path) -> Iterator[Callable[..., Stage]]:
-    from std_srvs.srv import SetBool
-
-    def grant(request: Any, response: Any) -> Any:
-        response.success = request.data
-        return response
-
     program, *words = distribution_command(request.param)
     with own_domain() as domain:
         variables = environment(domain, tmp_path)
         with Peer(domain, variables) as peer:
             nodes: list[RosProcess] = []
-            peer.node.create_service(SetBool, "/power", grant)
+            power = Power(peer)
 
-            def start_node(*parameters: str) -> Stage:
+            def start_node(*parameters: str, has_power: bool = True) -> Stage:
+                if has_power:
+                    power.answers.set_result(None)
                 parameters = ("period:=0.02", "server_wait:=0.0", *parameters)
                 arguments = itertools.chain.from_iterable(("-p", parameter) for parameter in parameters)
                 command = [*words, "-m", f"{PACKAGE}.node", "--ros-args", *arguments]
                 folder = tmp_path / str(len(nodes))
                 nodes.append(RosProcess(command, variables, folder, [workspace], program=program))
-                return Stage(peer, nodes[-1])
+                return Stage(peer, nodes[-1], power)
 
             yield start_node
             for node in nodes:
@@ -205,6 +227,21 @@ def test_activated_anew_it_begins_in_the_initial_state(start: Callable[..., Stag
     stage.halts()
     assert stage.change("deactivate") and stage.change("activate")
     stage.walks()
+
+
+def test_activated_anew_it_waits_for_the_answer_to_its_last_call(start: Callable[..., Stage]) -> None:
+    from diagnostic_msgs.msg import DiagnosticArray
+
+    stage = start("service_timeout:=1000.0", has_power=False)
+    reports = stage.peer.receive(DiagnosticArray, "/diagnostics")
+    stage.until(lambda: stage.power.calls == 1, "the call")
+    assert stage.change("deactivate") and stage.change("activate")
+    waits = "waiting for the end of calls from before the restart: power"
+    stage.until(lambda: any(waits in report.status[0].message for report in reports), "a warning")
+    assert stage.power.calls == 1
+    stage.power.answers.set_result(None)
+    stage.walks()
+    assert stage.power.calls == 2
 
 
 def test_what_came_while_it_was_inactive_is_known(start: Callable[..., Stage]) -> None:

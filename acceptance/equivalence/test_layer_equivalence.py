@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from robosc.model.structure import Deployment
 from robosc.supervisor import Supervisor
 from support import porter, porter_ros1
 from support.equivalence.python_targets import observe
@@ -16,6 +17,7 @@ from support.equivalence.ros2_target import ros2_target
 from support.equivalence.targets import Target, compare
 from support.equivalence.worlds import robot_supervisor
 from support.ros1 import missing
+from support.steward import LIMITED, REQUESTS, let_through, limited, steward
 
 # test_msgs has the only actions in a package index.
 HAS_ROS2 = all(find_spec(name) is not None for name in ("rclpy", "test_msgs"))
@@ -41,6 +43,24 @@ def test_every_kind_of_request(
     scenario = layer_node_scenario(supervisor, seed, steps)
     seen = observe(supervisor, scenario)
     assert {kind for item in seen for kind, _, _ in item.issued} >= LAYER_KINDS
+    compare(target(supervisor, tmp_path), scenario, seen)
+
+
+@pytest.mark.parametrize(
+    ("target", "on_ros1", "seed"),
+    [pytest.param(ros1_target, True, 32, marks=ROS1), pytest.param(ros2_target, False, 6, marks=ROS2)],
+)
+def test_calls_and_goals_that_share_a_name_and_are_refused(
+    target: MakeTarget, on_ros1: bool, seed: int, tmp_path: Path
+) -> None:
+    """What is let through, and as which request of the model, depends on the data, and so does what is refused."""
+    supervisor = steward(Deployment.LAYER, on_ros1=on_ros1)
+    scenario = layer_node_scenario(supervisor, seed, 180)
+    seen = observe(supervisor, scenario)
+    assert let_through(seen) == REQUESTS
+    assert limited(seen) == LIMITED
+    refused = {(kind, name) for item in seen for kind, name, _ in item.issued if kind in ("no answer", "reject")}
+    assert refused >= {("no answer", "up"), ("no answer", "far"), ("reject", "long")}
     compare(target(supervisor, tmp_path), scenario, seen)
 
 

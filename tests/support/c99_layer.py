@@ -15,6 +15,7 @@ from robosc.execution.runtime.layer import (
     _NOT_FINITE,
     _NOT_KNOWN,
     _NOT_WITHIN,
+    _OLD_CALLS,
     _OLD_GOALS,
     _STILL_RUNNING,
     _TOO_LONG,
@@ -43,6 +44,7 @@ REFUSALS = (
     _AT_REST[Status.NEW],
     _AT_REST[Status.WAITING],
     _OLD_GOALS,
+    _OLD_CALLS,
     _AT_REST[Status.STOPPED],
     _A_FAULT,
 )

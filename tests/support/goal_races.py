@@ -1,11 +1,11 @@
 """Races of goals and calls, as one table: what happens, in which order it is read, and what the model is told.
 
-Each row is for any world that has an action `/go` and a service `/reach` for `tests/models/driver`: clients of a
-generated node, an executor on a clock that is moved by hand, and servers that do what a row says.
+Each row is for any world that has an action `/go` and a service `/reach` for `tests/models/driver`: a generated node,
+or its clients with an executor on a clock that is moved by hand, and servers that do what a row says.
 """
 
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Mapping
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -32,63 +32,32 @@ def driver_supervisor(name: str) -> Supervisor:
 
 
 class World(ABC):
-    """An executor among clients and servers.
+    """A controller of the driver, among servers."""
 
-    Args:
-        supervisor: The driver's.
+    # The controller's side.
 
-    Attributes:
-        reports: Reports of the clients.
-    """
-
-    calls: Any
-    goals: Any
-
-    def __init__(self, supervisor: Supervisor) -> None:
-        self.time_ns = START_NS
-        self.clock = SimulatedClock(lambda: self.time_ns)
-        self.clock.monotonic()
-        self.reports = Reports()
-        self._log = MemoryLog()
-        self._executor = Executor(InterpretedSystem(supervisor), _Seam(self), SETTINGS, self.clock, self._log)
-        self._executor.start()
-
-    # The node's side.
-
+    @abstractmethod
     def press(self, button: str, is_down: bool = True) -> None:
-        """Say that a button is down or up, and decide."""
-        self._executor.receive(f"/{button}", is_down)
-        self._executor.tick()
+        """Say that a button is down or up."""
 
-    def deliver(self) -> None:
-        """Tell the executor what the clients reported."""
-        while self.reports.deliver(self._executor):
-            pass
-
+    @abstractmethod
     def pass_time(self, seconds: float) -> None:
-        """Let time pass for the executor; it may go back."""
-        self.time_ns += round(seconds * 1e9)
-        self._executor.watch()
-        self.deliver()
+        """Let time pass for the controller; it may go back."""
 
     @property
+    @abstractmethod
     def happened(self) -> list[str]:
         """The events of the action and the service, those of an error with their reason."""
-        return [
-            f"{entry['event']}: {entry['data']}" if entry["event"].endswith(".error") else entry["event"]
-            for entry in self._log.entries
-            if entry["kind"] == "event" and entry["event"].split(".")[0] in ("go", "reach")
-        ]
 
     @property
+    @abstractmethod
     def unexpected(self) -> int:
         """Number of replies and the like that nothing in the model is for."""
-        return self._executor.counters.unexpected
 
     @property
+    @abstractmethod
     def status(self) -> str:
         """Status of the executor."""
-        return self._executor.status.value
 
     # The servers' side; nothing of it is read before `read`.
 
@@ -114,13 +83,76 @@ class World(ABC):
 
     @abstractmethod
     def read(self) -> None:
-        """The clients read what has come, results before feedback, and the executor is told."""
+        """The clients read what has come, and the executor is told."""
+
+
+class ExecutorWorld(World):
+    """An executor in this process, on a clock that is moved by hand, among clients and servers.
+
+    Args:
+        supervisor: The driver's.
+
+    Attributes:
+        reports: Reports of the clients.
+    """
+
+    calls: Any
+    goals: Any
+
+    def __init__(self, supervisor: Supervisor) -> None:
+        self.time_ns = START_NS
+        self.clock = SimulatedClock(lambda: self.time_ns)
+        self.clock.monotonic()
+        self.reports = Reports()
+        self._log = MemoryLog()
+        self._executor = Executor(InterpretedSystem(supervisor), _Seam(self), SETTINGS, self.clock, self._log)
+        self._executor.start()
+
+    def press(self, button: str, is_down: bool = True) -> None:
+        """Say that a button is down or up, and decide."""
+        self._executor.receive(f"/{button}", is_down)
+        self._executor.tick()
+
+    def deliver(self) -> None:
+        """Tell the executor what the clients reported."""
+        while self.reports.deliver(self._executor):
+            pass
+
+    def pass_time(self, seconds: float) -> None:
+        """Let time pass for the executor; it may go back."""
+        self.time_ns += round(seconds * 1e9)
+        self._executor.watch()
+        self.deliver()
+
+    @property
+    def happened(self) -> list[str]:
+        """The events of the action and the service, those of an error with their reason."""
+        return events_of_servers(self._log.entries)
+
+    @property
+    def unexpected(self) -> int:
+        """Number of replies and the like that nothing in the model is for."""
+        return self._executor.counters.unexpected
+
+    @property
+    def status(self) -> str:
+        """Status of the executor."""
+        return self._executor.status.value
+
+
+def events_of_servers(entries: Iterable[Mapping[str, Any]]) -> list[str]:
+    """Return the events of the action and the service in a log, those of an error with their reason if it is known."""
+    return [
+        f"{entry['event']}: {entry['data']}" if entry["event"].endswith(".error") and entry["data"] else entry["event"]
+        for entry in entries
+        if entry["kind"] == "event" and entry["event"].split(".")[0] in ("go", "reach")
+    ]
 
 
 class _Seam:
     """The middleware of the executor: the world's clients."""
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: ExecutorWorld) -> None:
         self._world = world
 
     def prepare(self, communication: str, data: Any) -> Any:
@@ -261,6 +293,15 @@ RACES = (
 """The table."""
 
 
+def told_by(world: World) -> tuple[str, ...]:
+    """Return the events that the model was told, without resets, and without feedback that came before the end."""
+    told = [event for event in world.happened if not event.endswith(".reset")]
+    # Feedback may be read before the end, never after it.
+    ends = [number for number, event in enumerate(told) if not event.endswith((".request", ".feedback"))]
+    end = min(ends, default=len(told))
+    return tuple(event for number, event in enumerate(told) if not (event.endswith(".feedback") and number < end))
+
+
 def run(race: Race, world: World) -> None:
     """Let a race happen in a world, and look at what the model was told.
 
@@ -268,10 +309,6 @@ def run(race: Race, world: World) -> None:
         AssertionError: It was something else.
     """
     race.happens(world)
-    told = [event for event in world.happened if not event.endswith(".reset")]
-    # Feedback may be read before the end, never after it.
-    ends = [number for number, event in enumerate(told) if not event.endswith((".request", ".feedback"))]
-    told = [event for number, event in enumerate(told) if not (event.endswith(".feedback") and number < min(ends))]
-    assert tuple(told) == race.told
+    assert told_by(world) == race.told
     assert world.unexpected == race.unexpected
     assert world.status == "running"

@@ -55,6 +55,7 @@ class TwinCall:
     service: str
     caller: Any
     until: float
+    is_old: bool = False
 
 
 @dataclass
@@ -205,7 +206,7 @@ class LayerTwin:
 
     @property
     def may_request(self) -> bool:
-        are_all_new = not any(goal.is_old for goal in self.goals)
+        are_all_new = not any(call.is_old for call in self.calls) and not any(goal.is_old for goal in self.goals)
         return not self.reasons and self.seen.keys() >= self.sensors.keys() and are_all_new
 
     # Data from the caller.
@@ -321,6 +322,9 @@ class LayerTwin:
 
     def reply(self, call: TwinCall, data: Any) -> None:
         self.calls.remove(call)
+        if call.is_old:
+            self.unexpected += data is not None
+            return
         with self.guard():
             assert self.take(f"{call.service}.{'error' if data is None else 'response'}")
             self.settle()
@@ -376,11 +380,14 @@ class LayerTwin:
                 self.zero(identifier)
         for call in [item for item in self.calls if self.now >= item.until]:
             self.calls.remove(call)
+            if call.is_old:
+                continue
             assert self.take(f"{call.service}.error")
             self.reported.append(("no answer", call.service, call.caller))
             self.settle()
         for goal in self.sorted_goals():
-            if goal.runs_in_model and self.now >= goal.until:
+            # Who cancels a goal waits for its end.
+            if goal.runs_in_model and goal.asked is None and self.now >= goal.until:
                 goal.runs_in_model = False
                 assert self.take(f"{goal.action}.error")
                 self.settle()
@@ -408,8 +415,9 @@ class LayerTwin:
         self.reasons.clear()
         self.seen.clear()
         self.started = self.now
-        self.reported += [("no answer", call.service, call.caller) for call in self.calls]
-        self.calls.clear()
+        self.reported += [("no answer", call.service, call.caller) for call in self.calls if not call.is_old]
+        for call in self.calls:
+            call.is_old = True
         for goal in self.goals:
             goal.runs_in_model = False
             goal.is_old = True

@@ -240,6 +240,10 @@ class Peer:
         self.do("names")
         return self._reply("names")["names"]
 
+    def settle(self) -> None:
+        """Wait until it has done all that it was ordered to do."""
+        self.names()
+
     def values(self, topic: str) -> list[Any]:
         """The messages of a topic so far."""
         return [message for _, message in self.received[topic]]

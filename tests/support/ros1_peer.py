@@ -147,7 +147,6 @@ class Server(ActionServer):  # type: ignore[misc]
         report(action=self.name, goal=plain(handle.get_goal()))
 
     def cancel_came(self, handle: Any) -> None:
-        report(action=self.name, cancel=True)
         if self.ends_on_cancel:
             (self.running if handle in self.running else self.pending).remove(handle)
             handle.set_canceled()
@@ -159,10 +158,10 @@ class Server(ActionServer):  # type: ignore[misc]
             self.publish_status()
 
     def internal_cancel_callback(self, goal_id: Any) -> None:
+        # One that comes before its goal ends that later, and `cancel_came` is not asked.
+        report(action=self.name, cancel=True)
         if self.cancels:
             super().internal_cancel_callback(goal_id)
-        else:
-            report(action=self.name, cancel=True)
 
     def end(self, how: str, fields: Any) -> None:
         handle = self.pending.pop(0) if how == "rejected" else self.running.pop(0)

@@ -115,7 +115,9 @@ class Execution(_Section, frozen=True):
     ] = 10.0
     action_timeout_s: Annotated[
         Annotated[float, Meta(gt=0, le=86400)] | None,
-        Meta(description="Seconds after which a goal without a result fails; null: never."),
+        Meta(
+            description="Seconds after which a goal without a result fails, unless it is being cancelled; null: never."
+        ),
     ] = None
     cancel_timeout_s: Annotated[
         float,

@@ -99,7 +99,7 @@ class Callers:
 
         They ended in `error`, or before a restart.
         """
-        failed = [number for number in self._waiting_calls if not self._calls.is_open(number)]
+        failed = [number for number in self._waiting_calls if self._calls.find(number) is None]
         return [self._waiting_calls.pop(number) for number in failed]
 
     def close_failed_goals(self) -> List[CallerGoal]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Dict, List, NamedTuple, Optional, Sequence, Tuple
+from typing import Any, Dict, Iterator, List, NamedTuple, Optional, Sequence, Tuple
 
 from robosc.execution.runtime.falling_conditions import held_ever, the_fallen
 from robosc.execution.runtime.protocol import ControlledSystem, RobotSide
@@ -23,10 +23,12 @@ class Call(NamedTuple):
 
     :ivar service: Name of the service.
     :ivar deadline_s: Reading of the clock at which it counts as failed.
+    :ivar is_left: True if the model started again without it.
     """
 
     service: str
     deadline_s: float
+    is_left: bool = False
 
 
 class Calls:
@@ -55,19 +57,14 @@ class Calls:
             raise
         return number
 
-    def close(self, number: int) -> Optional[str]:
-        """End a call: its service, or None if no such call is under way."""
-        call = self._calls.pop(number, None)
-        return None if call is None else call.service
+    def close(self, number: int) -> Optional[Call]:
+        """End a call; return it, or None if no such call is under way."""
+        return self._calls.pop(number, None)
 
     def find(self, number: int) -> Optional[str]:
-        """Return the service of a call; None if no such call is under way."""
+        """Return the service of a call; None if the model waits for no such call."""
         call = self._calls.get(number)
-        return None if call is None else call.service
-
-    def is_open(self, number: int) -> bool:
-        """Return True if a call is under way."""
-        return number in self._calls
+        return None if call is None or call.is_left else call.service
 
     def expired(self, now_s: float) -> List[int]:
         """Ids of the calls whose time is over."""
@@ -77,9 +74,13 @@ class Calls:
         """Return the reading of the clock, in seconds, at which the next call is over its time."""
         return min((call.deadline_s for call in self._calls.values()), default=FOREVER)
 
-    def clear(self) -> None:
-        """Forget all calls: their replies are unexpected from now on. Ids are not used again."""
-        self._calls.clear()
+    def leave_model(self) -> None:
+        """Let the model start again without its calls; their end is still awaited."""
+        self._calls = {number: call._replace(is_left=True) for number, call in self._calls.items()}
+
+    def left(self) -> Tuple[str, ...]:
+        """Return the services with a call from before the model started again."""
+        return tuple([call.service for call in self._calls.values() if call.is_left])
 
 
 class Goal:
@@ -98,7 +99,7 @@ class Goal:
     :ivar asked_s: Reading of the clock when its cancel was decided.
     :ivar is_cancel_sent: True if its server was asked to cancel it.
     :ivar is_overdue: True if it was reported that it has not ended in time after that.
-    :ivar deadline_s: Reading of the clock at which it counts as failed.
+    :ivar deadline_s: Reading of the clock at which it counts as failed, if nobody cancels it.
     :ivar held: Values for the requirements of the action: True if one held in a stable state since
         the request.
     """
@@ -133,6 +134,15 @@ class Goal:
         self.is_overdue = False
         self.deadline_s = deadline_s
         self.held = held
+
+    @property
+    def time_is_over_s(self) -> float:
+        """
+        Return the reading of the clock at which it fails unless it has ended; never may be.
+
+        A goal that is being cancelled does not fail: it may still move the robot.
+        """
+        return self.deadline_s if self.is_running and not self.is_cancelling else FOREVER
 
 
 class Goals:
@@ -196,17 +206,17 @@ class Goals:
         """Return every goal, in source order of the actions."""
         return list(self._goals.values())
 
-    def expired(self, now_s: float) -> List[Goal]:
-        """Return running goals whose time is over."""
-        return [
-            goal for goal in self._goals.values() if goal.is_running and now_s >= goal.deadline_s
-        ]
+    def expired(self, now_s: float) -> Iterator[Goal]:
+        """
+        Yield running goals whose time is over.
+
+        Each is looked at when its turn comes: what was done about one may cancel the next.
+        """
+        return (goal for goal in self.open_goals() if now_s >= goal.time_is_over_s)
 
     def deadline_s(self) -> float:
         """Return the reading of the clock, in seconds, at which the next goal is over its time."""
-        return min(
-            (goal.deadline_s for goal in self._goals.values() if goal.is_running), default=FOREVER
-        )
+        return min((goal.time_is_over_s for goal in self._goals.values()), default=FOREVER)
 
     def turned(self) -> List[Tuple[Goal, Tuple[int, ...]]]:
         """

@@ -46,6 +46,7 @@ _TURNED = 'the supervisor cancelled it: a requirement no longer holds'
 _CAME_TO_REST = 'it was cancelled, because the robot was stopped'
 _STILL_RUNNING = 'its last goal may still be under way'
 _OLD_GOALS = 'goals from before the restart have not ended'
+_OLD_CALLS = 'calls from before the restart have not been answered'
 _AT_REST = {
     Status.NEW: 'not started',
     Status.WAITING: 'waiting for sensors',
@@ -346,6 +347,8 @@ class Layer(Runner):
             status = self.status
             if status is Status.WAITING and self._goals.left():
                 return _OLD_GOALS
+            if status is Status.WAITING and self._calls.left():
+                return _OLD_CALLS
             return _AT_REST[status]
         return None if is_finite(message) else _NOT_FINITE
 

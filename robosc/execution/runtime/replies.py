@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Optional
 
-from robosc.execution.runtime.calls import Calls, Goal, Goals, OUTCOMES
+from robosc.execution.runtime.calls import Call, Calls, Goal, Goals, OUTCOMES
 from robosc.execution.runtime.cancels import BY_NONE, Cancels
 from robosc.execution.runtime.recorder import Recorder
 from robosc.execution.runtime.steps import ExecutionError, Steps
@@ -38,9 +38,9 @@ class Replies:
         """
         Let the model start again without the calls and goals under way.
 
-        The end of goals is still awaited.
+        Their end is still awaited.
         """
-        self._calls.clear()
+        self._calls.leave_model()
         self._goals.leave_model()
 
     def deadline_s(self) -> float:
@@ -54,9 +54,10 @@ class Replies:
         Report the cancelled goals that should have ended by now.
         """
         for number in self._calls.expired(now_s):
-            service = self._calls.close(number)
-            self._steps.happen('{}.error'.format(service), None, 'timeout')
-            self._steps.settle()
+            call = self._calls.close(number)
+            if call is not None and not call.is_left:
+                self._steps.happen(call.service + '.error', None, 'timeout')
+                self._steps.settle()
         for goal in self._goals.expired(now_s):
             goal.is_running = False
             self._steps.happen(goal.action + '.error', None, 'timeout')
@@ -66,10 +67,13 @@ class Replies:
 
     def reply(self, request_id: int, data: Any) -> bool:
         """Take in the reply to a service call."""
-        service = self._close_call(request_id)
-        if service is None:
+        call = self._close_call(request_id)
+        if call is None:
             return False
-        self._steps.happen_with_data(service + '.response', data)
+        if call.is_left:
+            self._recorder.unexpected({'event': call.service + '.response'})
+            return False
+        self._steps.happen_with_data(call.service + '.response', data)
         return True
 
     def require_reply(self, request_id: int, data: Any) -> None:
@@ -89,10 +93,10 @@ class Replies:
 
     def call_failed(self, request_id: int, reason: str) -> bool:
         """Note that a service call will not be answered."""
-        service = self._close_call(request_id)
-        if service is None:
+        call = self._close_call(request_id)
+        if call is None or call.is_left:
             return False
-        self._steps.happen(service + '.error', None, reason)
+        self._steps.happen(call.service + '.error', None, reason)
         return True
 
     def goal_accepted(self, goal_id: int) -> None:
@@ -154,11 +158,11 @@ class Replies:
         if goal is not None and goal.is_running:
             self._steps.read(goal.action + kind, data)
 
-    def _close_call(self, request_id: int) -> Optional[str]:
-        service = self._calls.close(request_id)
-        if service is None:
+    def _close_call(self, request_id: int) -> Optional[Call]:
+        call = self._calls.close(request_id)
+        if call is None:
             self._recorder.unexpected({'what': 'a reply to no call'})
-        return service
+        return call
 
     def _find_goal(self, goal_id: int, what: str) -> Optional[Goal]:
         goal = self._goals.find(goal_id)

@@ -51,8 +51,8 @@ class Status(str, Enum):
     """Not started."""
     WAITING = 'waiting'
     """
-    No requests before the first message of every sensor with a maximum age, and before the goals
-    from before a restart have ended: the initial state knows nothing of them.
+    No requests before the first message of every sensor with a maximum age, and before the calls
+    and goals from before a restart have ended: the initial state knows nothing of them.
     """
     RUNNING = 'running'
     STOPPING = 'stopping'
@@ -197,6 +197,11 @@ class Runner:
         return self._goals.left()
 
     @property
+    def old_calls(self) -> Tuple[str, ...]:
+        """Return the services with a call from before a restart that is not over."""
+        return self._calls.left()
+
+    @property
     def counters(self) -> Counters:
         """Return counts of what went wrong so far."""
         return self._recorder.counters()
@@ -296,7 +301,9 @@ class Runner:
     def on_call_failed(self, request_id: int, reason: str) -> None:
         """Note that a service call has no reply: its server is absent, lost or refuses it."""
         self._look_at_clock()
-        if self._replies.call_failed(request_id, reason):
+        is_event = self._replies.call_failed(request_id, reason)
+        self._update_may_request()
+        if is_event:
             self._end_batch()
 
     @guarded
@@ -356,8 +363,8 @@ class Runner:
         """
         Begin again in the initial state, also after a fault.
 
-        Goals and calls under way belong to the old run. Nothing is requested before these goals
-        have ended.
+        Goals and calls under way belong to the old run. Nothing is requested before they have
+        ended, or the time for such a call is over.
         """
         self._now_s = self._recorder.began_s = self._clock.monotonic()
         if not self._safe_stop.reasons or self._safe_stop.unsent:
@@ -421,6 +428,7 @@ class Runner:
     def _end_what_is_over(self, now: float) -> None:
         """Handle replies and assumptions that did not come in time, and stale sensors."""
         self._replies.expire(now)
+        self._update_may_request()
         if self._progress is not None:
             self._progress.expire(now)
         for name, identifier in self._sensors.stale(now):
@@ -443,7 +451,9 @@ class Runner:
         self._steps.settle()
 
     def _take_reply(self, request_id: int, data: Any) -> None:
-        if self._replies.reply(request_id, data):
+        is_event = self._replies.reply(request_id, data)
+        self._update_may_request()
+        if is_event:
             self._end_batch()
 
     def _take_feedback(self, goal_id: int, data: Any) -> None:
@@ -468,6 +478,7 @@ class Runner:
             self._is_started
             and not self._safe_stop.reasons
             and self._sensors.are_all_seen()
+            and not self._calls.left()
             and not self._goals.left()
         )
 

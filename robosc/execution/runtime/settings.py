@@ -37,7 +37,8 @@ class Settings(NamedTuple):
         identifier.
     :ivar service_timeout_s: Seconds until a service call without a reply counts as failed; None:
         never.
-    :ivar action_timeout_s: Seconds until a goal without a result counts as failed; None: never.
+    :ivar action_timeout_s: Seconds until a goal without a result counts as failed, unless it is
+        being cancelled; None: never.
     :ivar cancel_timeout_s: Seconds after the cancel of a goal was decided until it is reported
         that the goal has not ended; 0: never.
     :ivar on_unknown: Reaction if an enum gets its default because a rule is unknown: `default`,

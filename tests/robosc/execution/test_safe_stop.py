@@ -357,14 +357,60 @@ def test_goals_of_the_old_run_are_nothing_to_the_new_one_but_must_end() -> None:
     assert b.tick()[-1] == ("goal", "go", 2, None)
 
 
-def test_calls_of_the_old_run_are_forgotten() -> None:
-    b = bench(ROBOT, policy="priority", priority=("ask",))
-    b.tick()
+def asking(**settings: Any) -> Bench:
+    """Restarted while a call was under way."""
+    b = bench(ROBOT, policy="priority", priority=("ask",), **settings)
+    assert b.tick()[0] == ("call", "ask", 1, None)
     b.executor.restart()
+    b.middleware.sent.clear()
+    return b
+
+
+def test_nothing_is_requested_after_a_restart_before_the_calls_of_the_last_run_are_answered() -> None:
+    b = asking()
+    # The initial state knows nothing of the call, and what it asked for may still go on.
+    assert b.system.enabled("move.request") and b.system.enabled("ask.request")
+    assert b.tick(3) == []
+    assert (b.status(), b.executor.old_calls) == (Status.WAITING, ("ask",))
+    before = len(b.events)
+    b.executor.on_reply(1, {})
+    assert (b.status(), b.executor.old_calls) == (Status.RUNNING, ())
+    assert b.events[before:] == []
+    assert b.variable("Wheels", "asked") is False
+    assert b.executor.counters.unexpected == 1
     assert b.tick()[0] == ("call", "ask", 2, None)
     b.executor.on_reply(1, {})
-    assert b.executor.counters.unexpected == 1
+    assert b.executor.counters.unexpected == 2
     assert b.system.location("ask") == "waiting"
+
+
+def test_a_call_of_the_last_run_that_fails_keeps_nothing_from_being_requested() -> None:
+    b = asking()
+    b.executor.on_call_failed(1, "lost")
+    assert (b.status(), b.executor.counters.unexpected) == (Status.RUNNING, 0)
+    assert b.events[1:] == []
+    assert b.tick()[0] == ("call", "ask", 2, None)
+
+
+def test_a_call_of_the_last_run_is_awaited_no_longer_than_its_time() -> None:
+    b = asking(service_timeout_s=1.0)
+    b.executor.restart()
+    assert b.tick(8) == []
+    b.clock.advance(0.25)
+    b.executor.watch()
+    assert (b.status(), b.events[1:]) == (Status.RUNNING, [])
+    assert b.tick()[0] == ("call", "ask", 2, None)
+    b = asking(service_timeout_s=None)
+    b.tick(1000)
+    assert b.status() is Status.WAITING
+
+
+def test_a_stop_is_not_ended_by_the_answer_to_a_call_of_the_last_run() -> None:
+    b = asking()
+    b.executor.stop("SIGINT")
+    b.executor.on_reply(1, {})
+    assert b.status() is Status.STOPPED
+    assert b.tick(3) == []
 
 
 def test_a_restart_forgets_whose_turn_it_was() -> None:

@@ -15,7 +15,7 @@ from robosc.targets.ros1.runtime.services import ServiceCalls as Ros1Calls
 from robosc.targets.ros2.runtime.clients import ActionGoals, ServiceCalls
 from robosc.targets.ros2.runtime.inquiry import Endpoints, Inquiry
 from support.action_servers import Asked, Process
-from support.goal_races import RACES, Race, World, driver_supervisor, run
+from support.goal_races import RACES, ExecutorWorld, Race, driver_supervisor, run
 
 LIMIT_S = 20.0
 
@@ -44,7 +44,7 @@ class Future:
             callback(self)
 
 
-class Ros2(World):
+class Ros2(ExecutorWorld):
     """The clients for ROS 2; what comes is read in the order of rclpy: goals, cancels, results, feedback."""
 
     def __init__(self, supervisor: Supervisor, servers: int) -> None:
@@ -123,7 +123,7 @@ class Ros2(World):
             self.deliver()
 
 
-class Ros1(World):
+class Ros1(ExecutorWorld):
     """The clients for ROS 1, whose goals are told of by status messages, results and feedback."""
 
     def __init__(self, supervisor: Supervisor, servers: int) -> None:
@@ -213,5 +213,5 @@ class Ros1(World):
 
 @pytest.mark.parametrize("race", RACES, ids=lambda race: race.name.replace(" ", "-"))
 @pytest.mark.parametrize(("world", "model"), [(Ros2, "driver"), (Ros1, "driver_ros1")])
-def test_races(race: Race, world: Callable[[Supervisor, int], World], model: str) -> None:
+def test_races(race: Race, world: Callable[[Supervisor, int], ExecutorWorld], model: str) -> None:
     run(race, world(driver_supervisor(model), race.servers))

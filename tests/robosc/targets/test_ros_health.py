@@ -149,6 +149,19 @@ def test_goals_from_before_a_restart_are_waited_for(clock: ManualClock) -> None:
     assert monitor.report()[:2] == (Level.WARN, "waiting for the end of goals from before the restart: navigate")
 
 
+def test_calls_from_before_a_restart_are_waited_for(clock: ManualClock) -> None:
+    middleware: Any = Silent()
+    system = InterpretedSystem(example_supervisor("navigation/navigation"))
+    executor = Executor(system, middleware, None, clock)
+    monitor = HealthMonitor(executor)
+    executor.start()
+    executor.tick()
+    executor.restart()
+    assert monitor.report()[:2] == (Level.WARN, "waiting for the end of calls from before the restart: calibrate")
+    executor.on_reply(1, {"success": True})
+    assert monitor.report().values["status"] == "running"
+
+
 def test_an_assumption_that_is_owed_for_too_long_is_a_warning_until_it_is_met(clock: ManualClock) -> None:
     middleware: Any = Silent()
     settings = Settings(assumption_timeout_s=2.0)

@@ -212,6 +212,7 @@ def node_parameters(scenario: Scenario, folder: Path, deployment: Deployment) ->
         **deciding(settings, deployment),
         "period": settings.period_s,
         "service_timeout": settings.service_timeout_s,
+        "cancel_timeout": settings.cancel_timeout_s,
         "on_unknown": settings.on_unknown,
         "max_age": [f"{topic}={age}" for topic, age in (settings.max_age_s or {}).items()] or [""],
         "log_folder": str(folder),
@@ -223,7 +224,13 @@ def deciding(settings: Settings, deployment: Deployment) -> dict[str, Any]:
     """The parameters about decisions; without a policy, the node has its own."""
     if deployment is Deployment.LAYER:
         return {"command_timeout": settings.command_timeout_s}
-    return {"every": settings.every, **({} if settings.policy is None else {"policy": settings.policy})}
+    found: dict[str, Any] = {"every": settings.every}
+    if settings.policy is not None:
+        found["policy"] = settings.policy
+    if settings.assumption_timeout_s != Settings().assumption_timeout_s:
+        # Only a node with a strategy has it.
+        found["assumption_timeout"] = settings.assumption_timeout_s
+    return found
 
 
 def given(interface: Interface, message: Any) -> dict[str, Any]:

@@ -66,7 +66,8 @@ class Sight:
         has_readings: True if the log reports, with an event of the environment, what the model reads of the data that
             came; else it reports the data as it came, which is not compared.
         has_requests: True if it reports, with a request, what the model knows of its data; a layer on a middleware
-            reports the whole message, which is not compared.
+            reports the whole message, which is not compared. Nor are the numbers that limits moved: a plain value is
+            the field of a message there.
     """
 
     topics: Mapping[str, str] | None = None
@@ -142,6 +143,8 @@ def _visible(log: Sequence[Entry], sight: Sight) -> list[Entry]:
     for is_controllable, is_shown in ((False, sight.has_readings), (True, sight.has_requests)):
         if not is_shown:
             log = [{**item, "data": None} if item.get("controllable") is is_controllable else item for item in log]
+    if not sight.has_requests:
+        log = [{**item, "limited": None} if "limited" in item else item for item in log]
     if sight.log_keys is None:
         return list(log)
     return [{key: value for key, value in item.items() if key in sight.log_keys} for item in log]

@@ -233,11 +233,17 @@ def _replies(model: Model, target: PythonTarget, dice: Random, drawn: Dice, outc
 
 def node_settings(model: Model, policy: str | None = "fair") -> dict[str, Any]:
     """Settings under which a node decides whenever something comes, and never else; None: under its own policy."""
+    settings = {"every": "event", "policy": policy, **_timeless(model)}
+    return {**settings, "assumption_timeout_s": 0.0} if model.assumptions else settings
+
+
+def _timeless(model: Model) -> dict[str, Any]:
+    """Settings under which a node does nothing because time passes: none passes for the reference."""
     sensors = {item.identifier for item in model.communications if item.max_age is not None}
     return {
-        "every": "event",
         "period_s": 3600.0,
-        "policy": policy,
+        "service_timeout_s": 3600.0,
+        "cancel_timeout_s": 0.0,
         # They must have been seen, but the test may take its time.
         "max_age_s": dict.fromkeys(sorted(sensors), 3600.0),
     }
@@ -354,13 +360,7 @@ def layer_node_scenario(supervisor: Supervisor, seed: int, length: int) -> Scena
 
 def layer_node_settings(model: Model) -> dict[str, Any]:
     """Settings under which a layer does nothing because time passes."""
-    sensors = {item.identifier for item in model.communications if item.max_age is not None}
-    return {
-        "period_s": 3600.0,
-        "command_timeout_s": 0.0,
-        "service_timeout_s": 3600.0,
-        "max_age_s": dict.fromkeys(sorted(sensors), 3600.0),
-    }
+    return {"command_timeout_s": 0.0, **_timeless(model)}
 
 
 def _with_numbers(data: Any, number: float) -> Any:

@@ -1,5 +1,6 @@
 """An existing controller on ROS 2 before a supervision layer: asks what a test says, remembers what it receives."""
 
+import json
 from collections.abc import Callable
 from typing import Any
 
@@ -53,9 +54,10 @@ class Ros2Caller:
                 self._hear(message_class, name, "pass", item.identifier)
             if item.published:
                 peer.publisher(message_class, name, _DEPTH)
-        peer.node.create_subscription(
-            String, BLOCKED, lambda message: self.issued.append(("blocked", message.data, {})), _DEPTH
-        )
+        peer.node.create_subscription(String, BLOCKED, self._note_blocked, _DEPTH)
+
+    def _note_blocked(self, message: Any) -> None:
+        self.issued.append(("blocked", json.loads(message.data)["identifier"], {}))
 
     def _hear(self, message_class: Any, name: str, kind: str, identifier: str) -> None:
         def hear(message: Any) -> None:
@@ -101,7 +103,13 @@ class Ros2Caller:
 
     def _call(self, name: str, number: int, data: Any) -> None:
         future = self._clients[name].call_async(self._filled(self._types[name].Request, data))
-        future.add_done_callback(lambda done: self._report("answer", name, number, self._given(done.result())))
+
+        def answered(done: Any) -> None:
+            parts = self._given(done.result())
+            # A default response says only why there is no other.
+            self._report("answer", name, number, {} if list(parts) == ["message"] else parts)
+
+        future.add_done_callback(answered)
 
     def _send(self, name: str, number: int, data: Any) -> None:
         def on_feedback(message: Any) -> None:

@@ -45,6 +45,9 @@ class Ros2Surroundings:
         self._folder = folder
         self._stack = ExitStack()
         self._issued: list[Issued] = []
+        # The first service or action of each identifier, which has the server, and that of each of them.
+        self._offered: dict[str, str] = {}
+        self._server_of: dict[str, str] = {}
         self._services: dict[str, HeldService] = {}
         self._actions: dict[str, HeldAction] = {}
         self._seen: dict[str, int] = {}
@@ -99,14 +102,18 @@ class Ros2Surroundings:
                 continue
             info = next(i for i in describe(self._supervisor).communications if i.name == item.name)
             is_action = item.kind is CommunicationKind.ACTION
+            offered = self._offered.setdefault(item.identifier, item.name)
+            self._server_of[item.name] = offered
             type_ = load_server(_ServerType(is_action, str(info.package), str(info.interface)))  # type: ignore[arg-type]
+            types[item.name] = type_
+            if offered != item.name:
+                continue
             self._seen[item.name] = 0
             if is_action:
                 # The end of a cancelled goal is a step of its own.
                 self._actions[item.name] = HeldAction(host, type_, item.identifier, ends_on_cancel=False)
             else:
                 self._services[item.name] = HeldService(host, type_, item.identifier)
-            types[item.name] = type_
         if self._is_layer:
             identifiers = {item.name: item.identifier for item in self._model.communications}
             self._caller = Ros2Caller(self._peer, list(topics(self._model)), types, identifiers, _given, _filled)
@@ -140,7 +147,7 @@ class Ros2Surroundings:
 
     def answer(self, action: Action) -> None:
         """Let a server do it."""
-        name = action.subject
+        name = self._server_of[action.subject]
         match action.do:
             case "reply":
                 self._services[name].answer(**_fields(self._response(name), action.data))
@@ -214,6 +221,7 @@ def _parameters(scenario: Scenario, folder: Path, deployment: Deployment) -> dic
         **deciding(settings, deployment),
         "period": settings.period_s,
         "service_timeout": settings.service_timeout_s,
+        "cancel_timeout": settings.cancel_timeout_s,
         "on_unknown": settings.on_unknown,
         "log_folder": str(folder),
         "server_wait": LIMIT_S,

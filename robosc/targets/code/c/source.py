@@ -180,11 +180,8 @@ def _tables(layout: Layout, numbers: dict[str, int]) -> list[str]:
         owners = [name for name, _ in layout.numbers]
         rows = [str(owners.index(item.name) if item.name in owners else 0) for item in layout.requests]
         lines += _table("int", "FIRST_NUMBERS", rows, "Each request's first number.")
-    in_layer = [f"{communication} communication"] if layout.is_layer else []
-    errors = [
-        [*([layout.communications[name]] if in_layer else []), layout.events[f"{name}.error"]] for name in services
-    ]
-    lines += _table([*in_layer, f"{event} error"], "SERVICES", errors)
+    errors = [[layout.communications[name], layout.events[f"{name}.error"]] for name in services]
+    lines += _table([f"{communication} communication", f"{event} error"], "SERVICES", errors)
     members = [f"{communication} communication", f"{event} cancel", f"{event} error", "int requirements"]
     ends = [
         [layout.communications[name], layout.events[f"{name}.cancel"], layout.events[f"{name}.error"],
@@ -395,11 +392,15 @@ def _replies(layout: Layout) -> list[list[str]]:
     for place, item in enumerate(layout.of_kind(CommunicationKind.SERVICE)):
         event = item.event(EventKind.RESPONSE)
         awaited = f"is_awaited = r->calls[{place}].is_awaited && r->calls[{place}].id == id;"
-        is_open = f" && r->calls[{place}].is_open && r->calls[{place}].id == id"
+        is_open = f" && r->calls[{place}].is_open && !r->calls[{place}].is_old && r->calls[{place}].id == id"
         body = [
             *_refused(layout, event, event_data(layout.model, event), "data", is_open),
             f"if (close_call(r, {place}, id)) {{",
-            *indent(taken(event)),
+            f"    if (r->calls[{place}].is_old) {{",
+            f"        unexpected(r, (int){layout.events[event]});",
+            "    } else {",
+            *indent(indent(taken(event))),
+            "    }",
             "}",
         ]
         answer = [f"answer_caller(r, {place}, is_awaited, message);"]

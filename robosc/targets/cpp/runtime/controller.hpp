@@ -544,6 +544,9 @@ private:
             if (!cancelled(Stage::OLD).empty()) {
                 middleware_.info("waiting for the end of the last goal of " + joined(cancelled(Stage::OLD)));
             }
+            if (!old_calls().empty()) {
+                middleware_.info("waiting for the end of the last call of " + joined(old_calls()));
+            }
         } else if (status == ROBOT_STATUS_RUNNING && reported_status_ <= ROBOT_STATUS_WAITING) {
             middleware_.info("running");
         }
@@ -677,6 +680,9 @@ private:
         } else if (status == ROBOT_STATUS_WAITING && !old_goals.empty()) {
             warnings.insert(
                 warnings.begin(), "waiting for the end of goals from before the restart: " + joined(old_goals));
+        } else if (status == ROBOT_STATUS_WAITING && !old_calls().empty()) {
+            warnings.insert(
+                warnings.begin(), "waiting for the end of calls from before the restart: " + joined(old_calls()));
         } else if (status == ROBOT_STATUS_WAITING) {
             warnings.insert(warnings.begin(), "waiting for the first message of every sensor with a maximum age");
         } else if (!news.empty()) {
@@ -1020,6 +1026,8 @@ private:
             return "waiting for sensors";
         case ROBOT_REFUSAL_OLD_GOALS:
             return "goals from before the restart have not ended";
+        case ROBOT_REFUSAL_OLD_CALLS:
+            return "calls from before the restart have not been answered";
         case ROBOT_REFUSAL_STOPPED:
             return "stopped";
         default:
@@ -1186,6 +1194,20 @@ private:
             return;
 #endif
         }
+    }
+
+    /* The services with a call from before a restart. */
+    Texts old_calls() const
+    {
+        Texts found;
+#if ROBOT_SERVICE_COUNT > 0
+        for (int service = 0; service < ROBOT_COMMUNICATION_COUNT; service++) {
+            if (robot_is_call_old(&robot_, static_cast<robot_communication_t>(service))) {
+                found.emplace_back(robot_communication_name(service));
+            }
+        }
+#endif
+        return found;
     }
 
     /* Stages of the cancel of a goal that has not ended. */

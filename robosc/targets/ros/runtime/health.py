@@ -132,6 +132,10 @@ class HealthMonitor:
             names = ', '.join(self._executor.old_goals)
             warnings.insert(0, f'waiting for the end of goals from before the restart: {names}')
             return Level.WARN, '; '.join(warnings)
+        if status is Status.WAITING and self._executor.old_calls:
+            names = ', '.join(self._executor.old_calls)
+            warnings.insert(0, f'waiting for the end of calls from before the restart: {names}')
+            return Level.WARN, '; '.join(warnings)
         if status is Status.WAITING:
             warnings.insert(0, 'waiting for the first message of every sensor with a maximum age')
             return Level.WARN, '; '.join(warnings)

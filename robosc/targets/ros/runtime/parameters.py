@@ -204,8 +204,8 @@ def declarations(
         Parameter(
             'action_timeout',
             0.0,
-            'Seconds after which a goal without a result has failed and is cancelled; 0 for '
-            'never.',
+            'Seconds after which a goal without a result has failed and is cancelled, unless it '
+            'is being cancelled already; 0 for never.',
             _SECONDS,
         ),
         Parameter(

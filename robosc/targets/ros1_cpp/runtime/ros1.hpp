@@ -14,6 +14,7 @@
 
 #include <ros/callback_queue.h>
 #include <ros/connection.h>
+#include <ros/poll_manager.h>
 #include <ros/ros.h>
 #include <ros/service_manager.h>
 #include <ros/service_server_link.h>
@@ -288,6 +289,23 @@ inline bool found_master()
         std::this_thread::sleep_for(std::chrono::milliseconds(100));
     }
     return true;
+}
+
+/* Let what was published arrive. roscpp sends in a thread of its own: it has sent it once it has turned twice, for it may
+   be in the midst of a turn. Who receives it needs time as well, for it may leave when the master says that this node has
+   gone. */
+inline void wait_until_delivered()
+{
+    const auto turns = std::make_shared<std::atomic<int>>(0);
+    const ros::PollManagerPtr& poll = ros::PollManager::instance();
+    const auto listener = poll->addPollThreadListener([turns] { ++*turns; });
+    const std::uint64_t limit = now_us() + CANCEL_WAIT_US;
+    while (*turns < 2 && now_us() < limit) {
+        poll->getPollSet().signal();
+        std::this_thread::sleep_for(std::chrono::milliseconds(1));
+    }
+    poll->removePollThreadListener(listener);
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
 }
 
 /* End the process at once. */

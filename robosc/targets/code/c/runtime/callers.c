@@ -41,7 +41,8 @@ static void finish(robot_t *r)
         int first = -1;
         for (int service = 0; service < ROBOT_SERVICE_COUNT; service++) {
             const robot_call_t *call = &r->calls[service];
-            if (call->is_awaited && !call->is_open && (first < 0 || call->id < r->calls[first].id)) {
+            const bool has_failed = !call->is_open || call->is_old;
+            if (call->is_awaited && has_failed && (first < 0 || call->id < r->calls[first].id)) {
                 first = service;
             }
         }

@@ -20,9 +20,7 @@ static bool send(robot_t *r, int request, const robot_request_t *data)
 #if ROBOT_SERVICE_COUNT > 0
     if (REQUESTS[request].service >= 0) {
         robot_call_t *call = &r->calls[REQUESTS[request].service];
-        call->is_open = true;
-        call->id = r->next_call_id++;
-        call->deadline_us = later(r->now_us, r->settings.service_timeout_us);
+        open_call(r, call);
         if (!callbacks->call(callbacks->context, call->id, data)) {
             call->is_open = false;
             return fault(r, ROBOT_FAULT_CALLBACK);

@@ -100,6 +100,7 @@ typedef enum {
     ROBOT_REFUSAL_NOT_STARTED,
     ROBOT_REFUSAL_WAITING,       /* for the first message of a sensor with a maximum age */
     ROBOT_REFUSAL_OLD_GOALS,     /* from before a restart, which have not ended */
+    ROBOT_REFUSAL_OLD_CALLS,     /* from before a restart, which have not been answered */
     ROBOT_REFUSAL_STOPPED,
     ROBOT_REFUSAL_FAULT          /* something failed while it was let through; the robot is stopped now */
 } robot_refusal_t;
@@ -145,7 +146,7 @@ typedef struct {
 #endif
     robot_on_unknown_t on_unknown;
     uint64_t service_timeout_us;                          /* UINT64_MAX: none */
-    uint64_t action_timeout_us;                           /* UINT64_MAX: none */
+    uint64_t action_timeout_us;                           /* UINT64_MAX: none; not while a goal is being cancelled */
     uint64_t cancel_timeout_us;                           /* 0: never; a cancel that takes longer is reported */
 #if ROBOT_IS_LAYER
     uint64_t command_timeout_us;                          /* 0: never; what acts is released if nothing came */
@@ -257,6 +258,7 @@ typedef struct {
 
 typedef struct {
     bool is_open;
+    bool is_old; /* it is of before a restart: nothing is requested until it is over */
     uint32_t id;
     uint64_t deadline_us;
 #if ROBOT_IS_LAYER
@@ -433,6 +435,9 @@ const char *robot_number_name(int number); /* of the request and its property: "
 
 /* A service call will not be answered: its server is absent or lost, or refuses it. */
 void robot_call_failed(robot_t *r, uint64_t now_us, uint32_t id);
+
+/* Return true if a call of a service from before a restart is not over: nothing is requested until it is. */
+bool robot_is_call_old(const robot_t *r, robot_communication_t service);
 #endif
 #if ROBOT_ACTION_COUNT > 0
 

@@ -1,3 +1,27 @@
+#if ROBOT_SERVICE_COUNT > 0
+/* Calls. */
+
+/* Return true if a call from before a restart is not over. */
+static bool is_any_call_old(const robot_t *r)
+{
+    for (int service = 0; service < ROBOT_SERVICE_COUNT; service++) {
+        if (r->calls[service].is_open && r->calls[service].is_old) {
+            return true;
+        }
+    }
+    return false;
+}
+
+/* Begin a call with a new id. */
+static void open_call(robot_t *r, robot_call_t *call)
+{
+    call->is_open = true;
+    call->is_old = false;
+    call->id = r->next_call_id++;
+    call->deadline_us = later(r->now_us, r->settings.service_timeout_us);
+}
+#endif
+
 #if ROBOT_ACTION_COUNT > 0
 /* Goals. */
 
@@ -35,6 +59,15 @@ static robot_goal_t *open_goal(robot_t *r, int action)
     goal->deadline_us = later(r->now_us, r->settings.action_timeout_us);
     get_requirements(&r->state, action, goal->held);
     return goal;
+}
+
+/* Return the time at which a goal fails unless it has ended. One that is being cancelled does not: it may still move the
+   robot. */
+static uint64_t time_is_over_from(const robot_t *r, int action)
+{
+    const robot_goal_t *goal = &r->goals[action];
+    const bool can_fail = goal->is_open && goal->is_running && goal->cancelling.why == ROBOT_CANCEL_NONE;
+    return can_fail ? goal->deadline_us : FOREVER;
 }
 
 /* Return the time at which the cancel of a goal is overdue. */

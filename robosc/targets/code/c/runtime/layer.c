@@ -27,6 +27,11 @@ static int refusal(const robot_t *r, const robot_sent_t *sent_by_caller)
         return (int)ROBOT_REFUSAL_OLD_GOALS;
     }
 #endif
+#if ROBOT_SERVICE_COUNT > 0
+    if (is_any_call_old(r)) {
+        return (int)ROBOT_REFUSAL_OLD_CALLS;
+    }
+#endif
     return (int)ROBOT_REFUSAL_WAITING;
 }
 
@@ -160,9 +165,7 @@ static void let_call_through(robot_t *r, int request, int why, uint32_t caller_i
         why = take_request(r, request, sent_by_caller);
     }
     if (why == LET_THROUGH) {
-        call->is_open = true;
-        call->id = r->next_call_id++;
-        call->deadline_us = later(r->now_us, r->settings.service_timeout_us);
+        open_call(r, call);
         if (callbacks->call(callbacks->context, call->id, service, sent_by_caller->message)) {
             call->is_awaited = true;
             call->caller_id = caller_id;

@@ -4,7 +4,7 @@ static bool begin(robot_t *r)
     r->is_started = true;
 #if ROBOT_SERVICE_COUNT > 0
     for (int service = 0; service < ROBOT_SERVICE_COUNT; service++) {
-        r->calls[service].is_open = false;
+        r->calls[service].is_old = true;
     }
 #endif
 #if ROBOT_ACTION_COUNT > 0
@@ -277,6 +277,17 @@ robot_fault_t robot_fault(const robot_t *r)
 {
     return r->fault;
 }
+#if ROBOT_SERVICE_COUNT > 0
+
+bool robot_is_call_old(const robot_t *r, robot_communication_t service)
+{
+    bool found = false;
+    for (int place = 0; place < ROBOT_SERVICE_COUNT; place++) {
+        found = found || (SERVICES[place].communication == service && r->calls[place].is_open && r->calls[place].is_old);
+    }
+    return found;
+}
+#endif
 #if ROBOT_ACTION_COUNT > 0
 
 robot_cancelling_t robot_cancelling(const robot_t *r, robot_communication_t action)

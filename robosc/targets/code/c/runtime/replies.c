@@ -55,6 +55,7 @@ static bool close_call(robot_t *r, int service, uint32_t id)
         return false;
     }
     call->is_open = false;
+    update_may_request(r);
     return true;
 }
 
@@ -65,7 +66,7 @@ void robot_call_failed(robot_t *r, uint64_t now_us, uint32_t id)
     for (int service = 0; service < ROBOT_SERVICE_COUNT; service++) {
         found = r->calls[service].is_open && r->calls[service].id == id ? service : found;
     }
-    if (close_call(r, found, id)) {
+    if (close_call(r, found, id) && !r->calls[found].is_old) {
         happened(r, SERVICES[found].error, take_event(&r->state, SERVICES[found].error));
         guard(r, end_batch(r));
     }

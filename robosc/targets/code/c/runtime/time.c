@@ -3,6 +3,9 @@
 static void update_may_request(robot_t *r)
 {
     r->may_request = r->is_started && !is_at_rest(r);
+#if ROBOT_SERVICE_COUNT > 0
+    r->may_request = r->may_request && !is_any_call_old(r);
+#endif
 #if ROBOT_ACTION_COUNT > 0
     r->may_request = r->may_request && !is_any_goal_old(r);
 #endif
@@ -27,8 +30,8 @@ static uint64_t next_deadline(const robot_t *r)
 #endif
 #if ROBOT_ACTION_COUNT > 0
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        if (r->goals[action].is_open && r->goals[action].is_running && r->goals[action].deadline_us < next) {
-            next = r->goals[action].deadline_us;
+        if (time_is_over_from(r, action) < next) {
+            next = time_is_over_from(r, action);
         }
         if (overdue_from(r, action) < next) {
             next = overdue_from(r, action);
@@ -82,20 +85,17 @@ static bool expire(robot_t *r)
             break;
         }
         r->calls[first].is_open = false;
-        happened(r, SERVICES[first].error, take_event(&r->state, SERVICES[first].error));
-        if (!settle(r, -1, &has_changed)) {
-            return false;
+        if (!r->calls[first].is_old) {
+            happened(r, SERVICES[first].error, take_event(&r->state, SERVICES[first].error));
+            if (!settle(r, -1, &has_changed)) {
+                return false;
+            }
         }
     }
 #endif
 #if ROBOT_ACTION_COUNT > 0
-    bool is_expired[ROBOT_ACTION_COUNT];
     for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        const robot_goal_t *goal = &r->goals[action];
-        is_expired[action] = goal->is_open && goal->is_running && r->now_us >= goal->deadline_us;
-    }
-    for (int action = 0; action < ROBOT_ACTION_COUNT; action++) {
-        if (is_expired[action]) {
+        if (r->now_us >= time_is_over_from(r, action)) {
             r->goals[action].is_running = false;
             happened(r, ACTIONS[action].error, take_event(&r->state, ACTIONS[action].error));
             if (!settle(r, -1, &has_changed)) {
@@ -134,6 +134,7 @@ static bool check_time(robot_t *r)
     if (!expire(r)) {
         return false;
     }
+    update_may_request(r);
 #if ROBOT_HAS_STRATEGY
     expire_progress(r);
 #endif

@@ -1,15 +1,17 @@
 """Synthesis of a system of many independent parts: each by itself, which gives the same as all of them together."""
 
 from collections.abc import Callable, Iterable, Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from math import prod
+
+from msgspec.structs import replace
 
 from robosc.automata.compile import subjects_read
 from robosc.automata.parts import independent_parts
 from robosc.automata.structure import System
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.questions import Answers, Questions, Restriction
-from robosc.synthesis.result import Search, SynthesisProgress, SynthesisResult, SynthesisStatus
+from robosc.synthesis.result import Search, Statistics, SynthesisProgress, SynthesisResult, SynthesisStatus
 from robosc.synthesis.synthesize import synthesize
 
 SMALLEST = 50
@@ -160,8 +162,9 @@ def _whole(system: System, made: list[tuple[_Part, SynthesisResult]], questions:
         unreached=tuple(item for item in questions.locations if item in unreached),
         unprompted=tuple(unprompted[event] for event in questions.prompted if event in unprompted),
     )
-    statistics = replace(
-        figures[0],
+    statistics = Statistics(
+        engine=figures[0].engine,
+        closure=figures[0].closure,
         state_bits=sum(item.state_bits for item in figures),
         iterations=max(item.iterations for item in figures),
         peak_nodes=max(item.peak_nodes for item in figures),

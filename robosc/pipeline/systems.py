@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from robosc.automata import System, SystemPlaces, check_system
+from robosc.automata import System, SystemPlaces, check_system, composed
 from robosc.automata.compile import State
 from robosc.automata.decision import Decision
 from robosc.automata.state import subjects, whole_names
@@ -136,6 +136,8 @@ class SystemSupervisor(SupervisorFile):
         return f"<supervisor of {self.system.name}: {self._size}, conditions added to {events}>"
 
     def __str__(self) -> str:
+        if self.system.is_controlled:
+            return f"{self.system.name}: the supervisor is in the model ({self._size}), and nothing is added to it"
         return (
             f"{self.system.name}: a supervisor exists ({self._size})\n{self.conditions}{''.join(self._module_lines())}"
         )
@@ -226,6 +228,8 @@ def synthesize_system(
 ) -> SystemSynthesis:
     """Synthesize the supervisor of automata; parameters and errors as of `robosc.synthesize`.
 
+    To a controlled system nothing is added: its states are counted.
+
     Args:
         system: The automata.
         options: Options for making the supervisor.
@@ -235,6 +239,8 @@ def synthesize_system(
         is_modular: True for a modular synthesis.
     """
     check_system(system)
+    if is_modular and system.is_controlled:
+        return _unsupported(f"{system.name} has its supervisor already, so there is nothing to synthesize in modules")
     if is_modular:
         return _synthesized_in_modules(system, options, on_progress, should_stop, places or SystemPlaces())
     engine = options.engine_options()
@@ -243,13 +249,14 @@ def synthesize_system(
         on_progress(Progress("synthesis", str(progress)))
 
     try:
-        found = synthesize(system, engine=engine, should_stop=should_stop, on_progress=report)
+        found = synthesize(composed(system), engine=engine, should_stop=should_stop, on_progress=report)
     except UnsupportedModelError as error:
-        return _unsupported(error)
+        return _unsupported(str(error))
     if found.status is CoreStatus.EMPTY:
         from robosc.explanation import SystemWords
 
-        words, reason = SystemWords(system, places or SystemPlaces()), f"no supervisor exists: {found.reason}"
+        words = SystemWords(system, places or SystemPlaces())
+        reason = found.reason if system.is_controlled else f"no supervisor exists: {found.reason}"
         return _empty(words, reason, found.statistics, engine, on_progress, should_stop)
     supervisor = SystemSupervisor(system, found.added, found.initial, found.statistics)
     return SystemSynthesis(SynthesisStatus.SUPERVISOR, "", supervisor, found.statistics)
@@ -273,7 +280,7 @@ def _synthesized_in_modules(
             on_progress=lambda message: on_progress(Progress("synthesis", message)),
         )
     except UnsupportedModelError as error:
-        return _unsupported(error)
+        return _unsupported(str(error))
     if found.unsolved is not None:
         names = ", ".join(found.unsolved.automata[:MAXIMUM_NAMES]) + ", ..." * (
             len(found.unsolved.automata) > MAXIMUM_NAMES
@@ -302,8 +309,7 @@ def _synthesized_in_modules(
     return SystemSynthesis(SynthesisStatus.SUPERVISOR, "", supervisor, statistics)
 
 
-def _unsupported(error: UnsupportedModelError) -> SystemSynthesis:
-    reason = str(error)
+def _unsupported(reason: str) -> SystemSynthesis:
     explanation = NoSupervisor(reason, ())
     return SystemSynthesis(SynthesisStatus.UNSUPPORTED_MODEL, reason, None, None, explanation=explanation)
 

@@ -147,9 +147,7 @@ class _Explainer:
         # What a supervisor's invariants exclude is no matter of the plants.
         kept = [item for item in causes if item.is_impossible and self._system.is_controlled]
         found = [
-            item
-            for item in causes
-            if item.kind is not BlockingCauseKind.BEHAVIOUR or has_behaviours or item in kept
+            item for item in causes if item.kind is not BlockingCauseKind.BEHAVIOUR or has_behaviours or item in kept
         ]
         is_never = possible == self._false
         status = "never" if is_never else "free" if possible == wanted and not kept else "restricted"

@@ -241,7 +241,9 @@ class _Writer:
             yield comment(
                 "Plants are as they were, requirements are supervisors, and the automaton at the end is what they"
             )
-            yield comment("need beside them: each controllable event only where no variable leaves its range, and where")
+            yield comment(
+                "need beside them: each controllable event only where no variable leaves its range, and where"
+            )
             yield comment("synthesis found that nothing that cannot be prevented leads against a requirement.")
         yield from self._body(self._root, ())
         yield from (f"initial {self._text(item, ())};" for item in conjuncts(system.initial) if item != TRUE)

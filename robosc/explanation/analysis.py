@@ -54,8 +54,8 @@ class BlockingCause:
         where: The states in which the cause applies.
         automaton: The automaton that has no edge.
         plant_condition: Place in `System.plant_conditions` of the condition that is not true.
-        is_impossible: True if every step would lead to states that violate the invariants of plants, or of the supervisor
-            of a controlled system.
+        is_impossible: True if every step would lead to states that violate the invariants of plants, or of the
+            supervisor of a controlled system.
         range: The range that an update would leave.
         condition: Place in `System.conditions`.
     """

@@ -136,13 +136,12 @@ def _sum(half: Number) -> Text | None:
     texts = [term.text for term in half.terms]
     if half.constant:
         texts.append(Text(str(half.constant)))
-    if len(texts) == 1 and half.terms and half.terms[0].factor == 1:
-        return half.terms[0].atom
-    return (
-        Text(" + ".join(item.text for item in texts), texts[0].level if len(texts) == 1 else Level.SUM)
-        if texts
-        else None
-    )
+    if not texts:
+        return None
+    if len(texts) > 1:
+        return Text(" + ".join(item.text for item in texts), Level.SUM)
+    # What stands alone needs no parentheses that a sum would give it.
+    return half.terms[0].atom if half.terms and half.terms[0].factor == 1 else texts[0]
 
 
 def comparison(operator: str, left: Number, right: Number) -> Text:

@@ -142,7 +142,7 @@ class Lowering:
             inputs=tuple(self.inputs),
             conditions=tuple(item for item, _ in conditions[False]),
             invariants=tuple(item for item, _ in self.invariants),
-            # Nothing is in a state that a supervisor excludes; against a requirement the system may begin.
+            # No state is one that a supervisor excludes; against a requirement the system may begin.
             initial=conjunction(*self.initial, *(item for item, _ in self.invariants if is_controlled)),
             marker=conjunction(*self.marker),
             plant_conditions=tuple(item for item, _ in conditions[True]),

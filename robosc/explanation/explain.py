@@ -144,7 +144,7 @@ class _Explainer:
         """Report what restricts an event, with or without restrictions by behaviours."""
         possible, wanted = self._possible[event], self._reachable & self._analysis.wanted(event)
         causes = self._analysis.blocking_causes(event, self._reachable)
-        # What a supervisor's invariants exclude is no matter of the plants.
+        # Invariants of a supervisor are no matter of the plants.
         kept = [item for item in causes if item.is_impossible and self._system.is_controlled]
         found = [
             item for item in causes if item.kind is not BlockingCauseKind.BEHAVIOUR or has_behaviours or item in kept

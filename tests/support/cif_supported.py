@@ -14,7 +14,7 @@ _ORDERED = ("<", "<=", ">", ">=")
 
 
 def problems(text: str) -> list[str]:
-    """What synthesis of CIF refuses in a text, which may hold a supervisor beside what is to be synthesized."""
+    """The parts of a text that synthesis of CIF refuses."""
     return [*_problems(parse(text))]
 
 

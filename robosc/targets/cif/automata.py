@@ -249,7 +249,7 @@ class _Writer:
         yield from (f"initial {self._text(item, ())};" for item in conjuncts(system.initial) if item != TRUE)
         yield from (f"marked {self._text(item, ())};" for item in conjuncts(system.marker) if item != TRUE)
         yield from (f"plant invariant {self._text(item, ())};" for item in system.plant_invariants)
-        # Of requirements, the conditions on events keep to those on states.
+        # The conditions on events see to requirements on states.
         if system.is_controlled:
             yield from (f"supervisor invariant {self._text(item, ())};" for item in system.invariants)
         for kind, conditions in (("plant", system.plant_conditions), ("supervisor", system.conditions)):

@@ -87,7 +87,7 @@ def scaled(number: Number, factor: int, known: Text) -> Number:
 
 
 def halves(number: Number) -> tuple[Number, Number]:
-    """What a sum adds and what it subtracts."""
+    """The part that a sum adds, and the part that it subtracts."""
     added = Number(tuple(term for term in number.terms if term.factor > 0), max(number.constant, 0))
     taken = Number(tuple(term for term in number.terms if term.factor < 0), min(number.constant, 0))
     return added, scaled(taken, -1, TRUE)
@@ -96,7 +96,7 @@ def halves(number: Number) -> tuple[Number, Number]:
 def selected(test: Text, then: Number, otherwise: Number, known: Text) -> Number:
     """`then` where a test holds, else `otherwise`."""
     lowest, highest = sorted((then.constant, otherwise.constant))
-    # What both add or subtract stands outside.
+    # A constant that both have stands outside.
     common = max(lowest, 0) + min(highest, 0)
     first, second = (halves(Number(item.terms, item.constant - common)) for item in (then, otherwise))
     found = Number((), common, known)
@@ -140,7 +140,7 @@ def _sum(half: Number) -> Text | None:
         return None
     if len(texts) > 1:
         return Text(" + ".join(item.text for item in texts), Level.SUM)
-    # What stands alone needs no parentheses that a sum would give it.
+    # A single atom is as strong as it is by itself.
     return half.terms[0].atom if half.terms and half.terms[0].factor == 1 else texts[0]
 
 

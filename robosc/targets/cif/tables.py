@@ -99,7 +99,7 @@ class Table:
         )
 
     def _number(self, result: _Result, low: int) -> Text:
-        """By how much a result exceeds the least one."""
+        """The text of how much a result exceeds the least one."""
         if not isinstance(result, _Choice):
             return Text("0" if result is None else str(int(result) - low))
         parts = [(runs, self._number(part, low)) for part, runs in result.branches]

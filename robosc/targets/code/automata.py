@@ -39,7 +39,7 @@ class ControlledAutomata:
 
     Attributes:
         system: The automata.
-        roles: What each automaton is, in a word.
+        roles: Role of each automaton, in a word.
         added: The added condition of each event that has one.
         initial: The condition on the initial states, or None.
         inputs: The input of each event that changes an input variable, by the name of both.

@@ -23,7 +23,7 @@ from support.cif_meaning import Meaning
 from support.effort import examples
 from support.random_cif import EVENTS, random_model
 
-# As CIF's own tool writes it: a requirement became a supervisor, and simplified guards assume its invariants.
+# In the form that CIF's own tool writes: a requirement became a supervisor, and simplified guards assume its invariants.
 TANK = """plant automaton tank:
   controllable c_fill;
   uncontrollable u_drain;
@@ -129,7 +129,7 @@ def explicit_graph(text: str) -> ControlledGraph:
 def test_whatever_a_supervisor_does_is_found_as_the_slow_twin_says(seed: int) -> None:
     text = as_supervisor(random_text(seed))
     system = system_of(text)
-    # Everything synchronizes: the supervisor as one more plant.
+    # All of it synchronizes: the supervisor as one more plant.
     whole = text.replace("supervisor r:", "plant r:")
     expected = explicit_graph(whole)
     made = robosc.synthesize(system)

@@ -175,6 +175,10 @@ class System:
                 return automaton
         raise KeyError(name)
 
+    def role_of(self, automaton: Automaton) -> str:
+        """The role of an automaton in a word: the requirements of a controlled system are its supervisor."""
+        return "supervisor" if self.is_controlled and automaton.role is Role.REQUIREMENT else str(automaton.role)
+
     def event(self, name: str) -> Event:
         """The event called `name` (KeyError if there is none)."""
         for event in self.events:

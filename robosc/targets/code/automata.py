@@ -15,7 +15,7 @@ from math import prod
 from robosc.automata.compile import NO_DATA, Path, State, compile_expression, subjects_read
 from robosc.automata.semantics import MAXIMUM_CHOICES, plant_invariants_on
 from robosc.automata.state import Subject, initial_values, subject_type, subjects
-from robosc.automata.structure import Automaton, Edge, Event, InputVariable, Role, System, composed
+from robosc.automata.structure import Automaton, Edge, Event, InputVariable, System, composed
 from robosc.cif.typing import NAMELESS
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import TRUE, Binary, EnumType, Expression, IntegerType, Type, Value, conjuncts
@@ -52,7 +52,7 @@ class ControlledAutomata:
     def __init__(self, supervised: SupervisedSystem) -> None:
         system = composed(supervised.system)
         _require_names(system)
-        self.roles = {item.name: _role(item, supervised.system) for item in supervised.system.automata}
+        self.roles = {item.name: supervised.system.role_of(item) for item in supervised.system.automata}
         self.system = system = replace(system, automata=tuple(map(_merged, system.automata)))
         self.added: Mapping[str, DecisionDiagram] = {item.event: item.condition for item in supervised.added}
         self.initial = supervised.initial
@@ -143,11 +143,6 @@ def _require_names(system: System) -> None:
             raise UnsupportedModelError(
                 f"{name!a:.100} is neither an identifier nor identifiers with dots, as code needs"
             )
-
-
-def _role(automaton: Automaton, system: System) -> str:
-    is_supervisor = system.is_controlled and automaton.role is Role.REQUIREMENT
-    return "supervisor" if is_supervisor else str(automaton.role)
 
 
 def _merged(automaton: Automaton) -> Automaton:

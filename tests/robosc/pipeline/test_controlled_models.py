@@ -321,3 +321,11 @@ def test_a_module_with_a_supervisor_and_no_specification(event: str, is_right: b
     made = robosc.synthesize(robosc.load(path))
     assert made.supervisor is not None
     assert not made.supervisor.system.is_controlled
+
+
+def test_the_role_of_a_supervisor_is_told() -> None:
+    system = system_of(TANK)
+    assert [system.role_of(item) for item in system.automata] == ["plant", "supervisor", "supervisor"]
+    (text,) = [text for name, text in robosc.generate(system, "python").files.items() if name.endswith(".py")]  # type: ignore[union-attr]
+    assert "supervisor order" in text
+    assert "requirement order" not in text

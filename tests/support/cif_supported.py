@@ -26,7 +26,8 @@ def _problems(read: Specification) -> Iterator[str]:
     for event, node in read.requirements:
         yield from _refused(node, f"requirement on {event}")
     for automaton in read.automata:
-        for name, type_, *_ in (*automaton.inputs, *automaton.variables):
+        variables = [(name, type_) for name, type_, _ in automaton.variables]
+        for name, type_ in (*automaton.inputs, *variables):
             if type_.name == "int" and (type_.low < 0 or type_.high == 2**31 - 1):
                 yield f"{automaton.name}.{name}: the range {type_.low}..{type_.high}"
         for name, _, value in automaton.variables:

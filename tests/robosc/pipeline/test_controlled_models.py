@@ -23,7 +23,7 @@ from support.cif_meaning import Meaning
 from support.effort import examples
 from support.random_cif import EVENTS, random_model
 
-# In the form that CIF's own tool writes: a requirement became a supervisor, and simplified guards assume its invariants.
+# In the form that CIF's own tool writes: a requirement became a supervisor, and guards assume its invariants.
 TANK = """plant automaton tank:
   controllable c_fill;
   uncontrollable u_drain;

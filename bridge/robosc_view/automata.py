@@ -99,7 +99,7 @@ def _numbers(system: System) -> Iterator[range]:
 
 def _drawn(system: System, automaton: Automaton, numbers: range, *, is_listed: bool) -> DrawnAutomaton:
     is_input = automaton.name in _input_names(system)
-    role = "input variable" if is_input else str(automaton.role)
+    role = "input variable" if is_input else system.role_of(automaton)
     if is_listed:
         return DrawnAutomaton(role, (), ())
     controllable = {event.name for event in system.events if event.is_controllable}

@@ -96,7 +96,7 @@ class DrawnAutomaton:
     """An automaton without a model, as it is drawn.
 
     Attributes:
-        role: `plant`, `requirement` or `input variable`.
+        role: `plant`, `requirement`, `supervisor` or `input variable`.
         nodes: Its locations; none where it is not drawn because too much is.
         arrows: Its edges.
     """

@@ -19,6 +19,7 @@ from robosc.automata.structure import (
     InputVariable,
     Role,
     System,
+    composed,
     disables,
 )
 
@@ -38,6 +39,7 @@ __all__ = [
     "System",
     "SystemPlaces",
     "check_system",
+    "composed",
     "disables",
     "environment_variable",
     "to_automata",

@@ -369,7 +369,8 @@ class Semantics:
         for rule in self._uncontrollable:
             outcome = rule.outcome(state)
             if outcome.is_possible and not outcome.meets_condition:
-                return f"{rule.event.name} can happen against its requirement"
+                whose = "the supervisor" if self.system.is_controlled else "its requirement"
+                return f"{rule.event.name} can happen against {whose}"
             if outcome.may_leave_range:
                 return f"{rule.event.name} can take a variable out of its range"
         return None
@@ -452,11 +453,17 @@ def subjects_changed(system: System, event: str) -> frozenset[Subject]:
 
 
 def plant_invariants_on(system: System, event: str) -> tuple[Expression, ...]:
-    """The plant invariants that read what an event may change; the others stay as true as they are."""
-    if not system.plant_invariants:
+    """The plant invariants that read what an event may change; the others stay as true as they are.
+
+    With those that a supervisor in the system has, if it can prevent the event.
+    """
+    kept = system.plant_invariants
+    if system.is_controlled and system.invariants and system.event(event).is_controllable:
+        kept = (*kept, *system.invariants)
+    if not kept:
         return ()
     changed = subjects_changed(system, event)
-    return tuple(item for item in system.plant_invariants if subjects_read(item) & changed)
+    return tuple(item for item in kept if subjects_read(item) & changed)
 
 
 def _reader(places: list[int]) -> Callable[[State], object]:

@@ -9,7 +9,7 @@ This structure does not depend on RoboSC: a component is an automaton like any o
 A is in location l, and `Received(path)` is the event's input of that path.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from enum import StrEnum
 
 from robosc.expressions import TRUE, Expression, PathStep, Type, Unary, Value
@@ -152,6 +152,8 @@ class System:
         plant_conditions: Conditions without which the plants cannot do an event, controllable or not.
         plant_invariants: Conditions that are true in every state that there is: what would lead to another one cannot
             happen, and the system does not begin in one. No supervisor has to see to them.
+        is_controlled: True if its requirements are a supervisor that was made already: nothing is synthesized, and a
+            controllable event does not lead where an invariant is not true. See `composed`.
     """
 
     name: str
@@ -164,6 +166,7 @@ class System:
     marker: Expression = TRUE
     plant_conditions: tuple[EventCondition, ...] = ()
     plant_invariants: tuple[Expression, ...] = ()
+    is_controlled: bool = False
 
     def automaton(self, name: str) -> Automaton:
         """The automaton called `name` (KeyError if there is none)."""
@@ -172,9 +175,31 @@ class System:
                 return automaton
         raise KeyError(name)
 
+    def role_of(self, automaton: Automaton) -> str:
+        """The role of an automaton in a word: the requirements of a controlled system are its supervisor."""
+        return "supervisor" if self.is_controlled and automaton.role is Role.REQUIREMENT else str(automaton.role)
+
     def event(self, name: str) -> Event:
         """The event called `name` (KeyError if there is none)."""
         for event in self.events:
             if event.name == name:
                 return event
         raise KeyError(name)
+
+
+def composed(system: System) -> System:
+    """Return a controlled system as it runs: the parts of its supervisor take part as plants do; others as they are.
+
+    What the supervisor would prevent does not happen then, even if it is uncontrollable; `robosc.verification` finds
+    that, in the system as it was given.
+    """
+    if not system.is_controlled:
+        return system
+    return replace(
+        system,
+        automata=tuple(replace(item, role=Role.PLANT) for item in system.automata),
+        conditions=(),
+        invariants=(),
+        plant_conditions=(*system.plant_conditions, *system.conditions),
+        plant_invariants=(*system.plant_invariants, *system.invariants),
+    )

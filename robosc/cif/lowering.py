@@ -71,6 +71,7 @@ class Lowering(msgspec.Struct):
         plant_invariants: State invariants of plants.
         initial: Predicates on the initial states.
         marker: Predicates on the marked states.
+        roles: Roles of automata and invariants, with their places.
         depends: Variables that the initial value of a variable reads, with the places where it does.
     """
 
@@ -85,6 +86,7 @@ class Lowering(msgspec.Struct):
     plant_invariants: list[Expression] = msgspec.field(default_factory=list)
     initial: list[Expression] = msgspec.field(default_factory=list)
     marker: list[Expression] = msgspec.field(default_factory=list)
+    roles: list[tuple[str, Location]] = msgspec.field(default_factory=list)
     depends: dict[tuple[str, str], dict[tuple[str, str], Location]] = msgspec.field(default_factory=dict)
 
     # Findings
@@ -122,14 +124,15 @@ class Lowering(msgspec.Struct):
 
     def _system(self, name: str) -> tuple[System, SystemPlaces]:
         alphabet = frozenset[str]().union(*(item.alphabet for item in self.automata))
-        conditions: dict[str, list[tuple[EventCondition, Location]]] = {"plant": [], "requirement": []}
+        is_controlled = self._is_controlled()
+        conditions: dict[bool, list[tuple[EventCondition, Location]]] = {True: [], False: []}
         for item in self.exclusions:
             event = item.event.name
             if event not in alphabet:
                 message = f"no automaton has '{event}' in its alphabet, so this excludes nothing"
                 self.typing.findings.warning("cif-no-effect", message, item.at, "Remove it, or use the event.")
             elif item.condition != TRUE:
-                conditions[item.role].append((EventCondition(event, item.condition), item.at))
+                conditions[item.role == "plant"].append((EventCondition(event, item.condition), item.at))
         if not any(item.role is Role.PLANT for item in self.automata) and not self.typing.findings.has_errors:
             self.error("cif-unsupported", "there is no plant automaton", self.scopes.root.at, "Add one.")
         system = System(
@@ -137,20 +140,31 @@ class Lowering(msgspec.Struct):
             events=tuple(self.events),
             automata=tuple(self.automata),
             inputs=tuple(self.inputs),
-            conditions=tuple(item for item, _ in conditions["requirement"]),
+            conditions=tuple(item for item, _ in conditions[False]),
             invariants=tuple(item for item, _ in self.invariants),
-            initial=conjunction(*self.initial),
+            # No state is one that a supervisor excludes; against a requirement the system may begin.
+            initial=conjunction(*self.initial, *(item for item, _ in self.invariants if is_controlled)),
             marker=conjunction(*self.marker),
-            plant_conditions=tuple(item for item, _ in conditions["plant"]),
+            plant_conditions=tuple(item for item, _ in conditions[True]),
             plant_invariants=tuple(self.plant_invariants),
+            is_controlled=is_controlled,
         )
         places = SystemPlaces(
             automata=self.places,
-            conditions=tuple(at for _, at in conditions["requirement"]),
+            conditions=tuple(at for _, at in conditions[False]),
             invariants=tuple(at for _, at in self.invariants),
-            plant_conditions=tuple(at for _, at in conditions["plant"]),
+            plant_conditions=tuple(at for _, at in conditions[True]),
         )
         return system, places
+
+    def _is_controlled(self) -> bool:
+        """Return True if there is a supervisor; then there must be no requirement."""
+        is_controlled = any(role == "supervisor" for role, _ in self.roles)
+        for role, at in self.roles if is_controlled else ():
+            if role == "requirement":
+                self.error("cif-unsupported", "this is a requirement, in a model that has a supervisor already", at,
+                           "Leave out either: with a supervisor, nothing is synthesized.")  # fmt: skip
+        return is_controlled
 
     # Declarations
 
@@ -222,10 +236,12 @@ class Lowering(msgspec.Struct):
         """Take an invariant; `place` is the location that it stands in."""
         predicate = self.typing.predicate(item.predicate, scope)
         events = [self._event_of(name, scope) for name in item.events]
-        if item.role not in ("plant", "requirement"):
-            word = "a supervisor's invariant" if item.role else "neither a plant's nor a requirement's"
-            self.unsupported(scope, f"this invariant is {word}", item.at, "Write 'plant' or 'requirement' before it.")
+        if item.role is None:
+            self.unsupported(scope, "this invariant has no role", item.at,
+                             "Write 'plant', 'requirement' or 'supervisor' before it.")  # fmt: skip
             return
+        if scope.is_real:
+            self.roles.append((item.role, item.at))
         if item.form is syntax.InvariantForm.DISABLES:
             predicate = negation(predicate)
         if place is not None:
@@ -261,10 +277,11 @@ class Lowering(msgspec.Struct):
                 if place.name is None:
                     self.error("cif-structure", "a location without a name must be the only one", place.at,
                                "Name it.")  # fmt: skip
-        if scope.role not in ("plant", "requirement"):
-            kind = "a supervisor" if scope.role else "neither a plant nor a requirement"
-            self.unsupported(scope, f"the automaton '{scope.path}' is {kind}", scope.at,
-                             "Make it a plant or a requirement.")  # fmt: skip
+        if scope.role is None:
+            self.unsupported(scope, f"the automaton '{scope.path}' has no role", scope.at,
+                             "Make it a plant, a requirement or a supervisor.")  # fmt: skip
+        elif scope.is_real:
+            self.roles.append((scope.role, scope.at))
         variables = [self._variable(item, scope) for item in scope.body if isinstance(item, syntax.Discrete)]
         edges = [edge for place in places for item in place.edges for edge in self._edges(item, place, scope)]
         initial = [_name(place) for place in places if self._holds(place, "initial", scope, self.initial)]
@@ -287,7 +304,7 @@ class Lowering(msgspec.Struct):
                 alphabet=alphabet,
                 edges=tuple(edge for edge in edges if edge.event in alphabet),
                 variables=tuple(item for item in variables if item is not None),
-                role=Role.REQUIREMENT if scope.role == "requirement" else Role.PLANT,
+                role=Role.REQUIREMENT if scope.role in ("requirement", "supervisor") else Role.PLANT,
                 monitors=monitors,
             )
         )

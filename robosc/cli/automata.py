@@ -197,7 +197,11 @@ def verify(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Ex
     from robosc.signatures import SignatureError
 
     model, options = loaded_for_verification(arguments), synthesis_options(arguments)
-    if arguments.supervisor is None:
+    # A server has no option for it.
+    is_controller = getattr(arguments, "controller", False)
+    if arguments.supervisor is None and is_controller:
+        found = _verified_controller(arguments, model, options)
+    elif arguments.supervisor is None:
         found = machine.verify(model, options, maximum_states=arguments.limit, is_strict=arguments.strict)
     else:
         refuse(machine is not THIS_MACHINE, NO_FILE)
@@ -220,6 +224,21 @@ def verify(arguments: argparse.Namespace, machine: Machine = THIS_MACHINE) -> Ex
     return ExitCode.OK if found.passed else ExitCode.FAILED
 
 
+def _verified_controller(
+    arguments: argparse.Namespace, model: "LoadedAutomata", options: "SynthesisOptions"
+) -> "Verification":
+    """Verify the supervisor that is synthesized, with the controller properties."""
+    from robosc.pipeline.automata_models import automata_verification
+    from robosc.verification import Limits
+
+    limits = Limits.of(arguments.limit)
+    return watched(
+        lambda report: automata_verification(
+            model, options, limits, report, lambda: False, is_strict=arguments.strict, controller=True
+        )
+    )
+
+
 def _verified(arguments: argparse.Namespace, model: "LoadedAutomata", options: "SynthesisOptions") -> "Verification":
     """Verify the supervisor's file of a command, which has to be of the automata of its model.
 
@@ -239,7 +258,14 @@ def _verified(arguments: argparse.Namespace, model: "LoadedAutomata", options: "
     supervisor, limits = decode_system(content), Limits.of(arguments.limit)
     return watched(
         lambda report: file_verification(
-            model, supervisor, options, limits, report, lambda: False, is_strict=arguments.strict
+            model,
+            supervisor,
+            options,
+            limits,
+            report,
+            lambda: False,
+            is_strict=arguments.strict,
+            controller=getattr(arguments, "controller", False),
         )
     )
 

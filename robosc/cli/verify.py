@@ -36,7 +36,8 @@ nonblocking, and reach its goals. That it forbids no more than it must is checke
 With --signed-by: the file must be signed by that key, too; without MODEL, nothing else is checked.
 With properties: verify them in the robot under its supervisor, which is synthesized unless a file is given and passes,
 with a run that shows why each of them holds or fails.
-With automata (FILE.cif, .gen, .wmod): synthesize their supervisor, and verify it by other means than it was made.
+With automata (FILE.cif, .gen, .wmod): synthesize their supervisor, unless they have one, and verify it by other means
+than it was made; with --controller also bounded and finite response, confluence and nonblocking under control.
 """
 
 
@@ -70,6 +71,12 @@ def add_parser(commands: "argparse._SubParsersAction[argparse.ArgumentParser]") 
         help="the supervisor file must be signed by a key of this file (may be repeated); without MODEL, that alone is "
         "checked",
     )
+    parser.add_argument(
+        "--controller",
+        action="store_true",
+        help="of automata: check that code that runs them responds in bounded time (with the bounds), in the same way "
+        "whatever the order of controllable events, and gets to marked states",
+    )
     parser.add_argument("-q", "--quiet", action="store_true", help="print what is wrong and nothing else")
     add_engine_options(parser)
     parser.set_defaults(run=run)
@@ -83,6 +90,8 @@ def run(arguments: argparse.Namespace) -> int:
     """
     if automata.is_given(arguments):
         return automata.verify(arguments)
+    if arguments.controller:
+        raise UsageError("--controller is for automata (.cif, .gen, .wmod): of a robot, synth checks its controller")
     return run_with(arguments, _verify_supervisor, properties.run)
 
 

@@ -12,10 +12,12 @@ from robosc.controller_properties.check import DEFAULT_LIMIT, check_controller
 from robosc.controller_properties.controller import Controller
 from robosc.controller_properties.findings import controller_findings
 from robosc.controller_properties.goals import MissedGoal, StrategyCheck, StrategyRun, check_strategy
+from robosc.controller_properties.of_automata import AutomataProperties, check_automata
 from robosc.controller_properties.outcome import Blocking, Conflict, ForbiddenCancel, Livelock, Order, Properties
 
 __all__ = [
     "DEFAULT_LIMIT",
+    "AutomataProperties",
     "Blocking",
     "Conflict",
     "Controller",
@@ -26,6 +28,7 @@ __all__ = [
     "Properties",
     "StrategyCheck",
     "StrategyRun",
+    "check_automata",
     "check_controller",
     "check_strategy",
     "controller_findings",

@@ -16,6 +16,7 @@ import msgspec
 from msgspec.structs import replace
 
 from robosc.automata.compile import State
+from robosc.automata.semantics import plant_invariants_on
 from robosc.automata.state import subjects
 from robosc.automata.structure import Automaton
 from robosc.errors import InternalError
@@ -54,7 +55,8 @@ class BlockingCause(msgspec.Struct, frozen=True):
         where: The states in which the cause applies.
         automaton: The automaton that has no edge.
         plant_condition: Place in `System.plant_conditions` of the condition that is not true.
-        is_impossible: True if every step would lead to states that violate the plant invariants.
+        is_impossible: True if every step would lead to states that violate the invariants of plants, or of the
+            supervisor of a controlled system.
         range: The range that an update would leave.
         condition: Place in `System.conditions`.
     """
@@ -191,7 +193,7 @@ class Analysis:
             ]
             if not plants:
                 found.append(BlockingCause(BlockingCauseKind.BEHAVIOUR, event, self._manager.true))
-            if system.plant_invariants:
+            if plant_invariants_on(system, event):
                 able = self._encoding.all_of(~item.where for item in found)
                 where = able & ~self.wanted(event)
                 found.append(BlockingCause(BlockingCauseKind.BEHAVIOUR, event, where, is_impossible=True))

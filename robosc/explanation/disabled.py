@@ -115,7 +115,8 @@ class Disabled:
         broken = [[item for item in invariants if not self._holds(item, target)] for target in targets]
         if all(broken):
             for item in (item for item in invariants if any(item in items for items in broken)):
-                yield f"it leads only to what the plants cannot be: there {self._text(item)} does not hold"
+                whom = "the supervisor or the plants exclude" if self._system.is_controlled else "the plants cannot be"
+                yield f"it leads only to what {whom}: there {self._text(item)} does not hold"
 
     def _stays(self, expression: Expression, state: State, event: str, low: int, high: int) -> bool:
         paths = set(paths_read(expression))

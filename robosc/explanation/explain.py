@@ -143,13 +143,14 @@ class _Explainer:
     def event(self, event: str, *, has_behaviours: bool = False) -> EventReport:
         """Report what restricts an event, with or without restrictions by behaviours."""
         possible, wanted = self._possible[event], self._reachable & self._analysis.wanted(event)
+        causes = self._analysis.blocking_causes(event, self._reachable)
+        # Invariants of a supervisor are no matter of the plants.
+        kept = [item for item in causes if item.is_impossible and self._system.is_controlled]
         found = [
-            item
-            for item in self._analysis.blocking_causes(event, self._reachable)
-            if item.kind is not BlockingCauseKind.BEHAVIOUR or has_behaviours
+            item for item in causes if item.kind is not BlockingCauseKind.BEHAVIOUR or has_behaviours or item in kept
         ]
         is_never = possible == self._false
-        status = "never" if is_never else "free" if possible == wanted else "restricted"
+        status = "never" if is_never else "free" if possible == wanted and not kept else "restricted"
         if is_never:
             found = self._decisive(event, found, wanted)
         stopped, unfound = None, ""

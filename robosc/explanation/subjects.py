@@ -167,6 +167,9 @@ class SystemWords:
         """Warnings that follow from the answers."""
         for never in answers.never:
             yield Remark("never-enabled", f"{never.event} can never happen", None)
+        if self.system.is_controlled:
+            # That a supervisor need not do something is nothing to be told.
+            return
         # These restrict by what they mark and by their ranges, too.
         more = {
             place

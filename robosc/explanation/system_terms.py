@@ -35,6 +35,7 @@ class SystemTerms(Terms):
         self._requirements = frozenset(requirements)
         self._watching = {place: name for name, conditions in requirements.items() for place in conditions}
         self._places = places
+        self._required = "supervisor" if system.is_controlled else "requirement"
 
     def state(self, state: State) -> StateValues:
         """A state: the location of each automaton with several locations, and the value of each variable."""
@@ -62,14 +63,14 @@ class SystemTerms(Terms):
             return f"that a marked state is one with {self._text(self._system.marker)}", None
         if item.invariants:
             (place,) = item.invariants
-            text = f"requirement invariant {self._text(self._system.invariants[place])}"
+            text = f"{self._required} invariant {self._text(self._system.invariants[place])}"
             return text, _at(self._places.invariants, place)
         first = item.conditions[0]
         if first in self._watching:
-            return f"requirement {self._watching[first]}", self._places.automata.get(self._watching[first])
+            return f"{self._required} {self._watching[first]}", self._places.automata.get(self._watching[first])
         events = [self._system.conditions[place].event for place in item.conditions]
         text = self._condition(events, self._system.conditions[first].condition)
-        return f"requirement {text}", _at(self._places.conditions, first)
+        return f"{self._required} {text}", _at(self._places.conditions, first)
 
     def _condition(self, events: Sequence[str], condition: Expression) -> str:
         shown = events[0] if len(events) == 1 else f"{{{', '.join(events)}}}"
@@ -84,7 +85,7 @@ class SystemTerms(Terms):
 
     def automaton_part(self, name: str) -> Part:
         """The automaton."""
-        kind = "requirement" if name in self._requirements else "plant"
+        kind = self._required if name in self._requirements else "plant"
         return Part(kind, self.automaton(name), self._places.automata.get(name))
 
     def _where(self, automaton: str, location: str) -> str:

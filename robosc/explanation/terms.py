@@ -156,7 +156,10 @@ class Terms(ABC):
         if item.plant_condition is not None:
             return self._impossible(item.plant_condition, state)
         if item.is_impossible:
-            return f"it would lead the {self.plants} only to what their invariants exclude", None
+            whose = "their invariants"
+            if self._system.is_controlled:
+                whose = "invariants of the supervisor" + " or their own" * bool(self._system.plant_invariants)
+            return f"it would lead the {self.plants} only to what {whose} exclude", None
         return "no automaton has it in its alphabet", None
 
     def _impossible(self, place: int, state: State) -> tuple[str, Part | None]:

@@ -79,8 +79,9 @@ def automata_verification(
     should_stop: "ShouldStop",
     *,
     is_strict: bool,
+    controller: bool = False,
 ) -> Verification:
-    """Synthesize the supervisor of automata, and verify it independently."""
+    """Synthesize the supervisor of automata, and verify it independently, with `controller` its properties, too."""
     from robosc.explanation import EmptyExplanation, document
 
     made = automata_synthesis(model, options, on_progress, should_stop)
@@ -91,7 +92,9 @@ def automata_verification(
         explanation = document(made.explanation) if isinstance(made.explanation, EmptyExplanation) else None
         report = {"status": str(made.status), "reason": made.reason, "explanation": explanation, **findings}
         return Verification(VerificationStatus.NO_SUPERVISOR, made.diagnostics, made.reason, report)
-    found = verify_system(made.supervisor, options, limits, on_progress, should_stop, is_strict=is_strict)
+    found = verify_system(
+        made.supervisor, options, limits, on_progress, should_stop, is_strict=is_strict, controller=controller
+    )
     return replace(found, diagnostics=made.diagnostics, report={**found.report, **findings})
 
 
@@ -104,6 +107,7 @@ def file_verification(
     should_stop: "ShouldStop",
     *,
     is_strict: bool,
+    controller: bool = False,
 ) -> Verification:
     """Verify a supervisor that was read from a file; its automata must be those of the model.
 
@@ -118,5 +122,7 @@ def file_verification(
         return Verification(VerificationStatus.NO_SUPERVISOR, diagnostics, "", report)
     if supervisor.system != checked.system:
         raise InvalidSupervisorError(f"the supervisor is one of other automata than those of {model.name}")
-    found = verify_system(supervisor, options, limits, on_progress, should_stop, is_strict=is_strict)
+    found = verify_system(
+        supervisor, options, limits, on_progress, should_stop, is_strict=is_strict, controller=controller
+    )
     return replace(found, diagnostics=diagnostics, report={**found.report, **findings})

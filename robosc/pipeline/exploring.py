@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from robosc.automata import System
+from robosc.automata import System, composed
 from robosc.certification import Progress, SynthesisOutcome
 from robosc.certification.goals import GoalExplanation
 from robosc.certification.progress import OnProgress, ShouldStop, ignored, never
@@ -163,7 +163,7 @@ def graph_of(
     if isinstance(supervisor, SystemSupervisor):
         system = supervisor.system
         return explore_system(
-            system,
+            composed(system),
             state_predicates(system, supervisor.added),
             None,
             initial=supervisor.may_begin,

@@ -9,7 +9,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from random import Random
 from typing import Any
 
-from robosc.automata import InputVariable, Semantics, System
+from robosc.automata import InputVariable, Semantics, System, composed
 from robosc.automata.compile import Path, State
 from robosc.automata.inputs import valuations
 from robosc.automata.semantics import TooManyChoicesError
@@ -79,7 +79,7 @@ def initial_states_in_words(supervisor: SystemSupervisor) -> tuple[StateInWords,
     Raises:
         UnsupportedModelError: There are too many to enumerate.
     """
-    semantics = Semantics(supervisor.system)
+    semantics = Semantics(composed(supervisor.system))
     return tuple(state_in_words(supervisor.system, None, state) for state in _initial_states(semantics, supervisor))
 
 
@@ -101,7 +101,7 @@ class SystemRun(ManualRun):
     """
 
     def __init__(self, supervisor: SystemSupervisor, initial: Mapping[str, Value] | None = None) -> None:
-        system = supervisor.system
+        system = composed(supervisor.system)
         self._supervisor = supervisor
         self._semantics = Semantics(system)
         self._added = state_predicates(system, supervisor.added)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import msgspec
 
-from robosc.automata import System, SystemPlaces, check_system
+from robosc.automata import System, SystemPlaces, check_system, composed
 from robosc.automata.compile import State
 from robosc.automata.decision import Decision
 from robosc.automata.state import subjects, whole_names
@@ -38,6 +38,8 @@ if TYPE_CHECKING:
 _MISCOUNT = "states"
 """Name of the check that fails if a supervisor states a wrong number of states."""
 
+_CONTROLLER_CHECKS = ("bounded_response", "finite_response", "confluence", "nonblocking_under_control")
+_LACK = {name: f"no {name.replace('_', ' ')}" for name in _CONTROLLER_CHECKS[:3]}
 _CHECKS = ("safe", "controllable", "nonblocking", "maximally_permissive")
 MAXIMUM_NAMES = 20
 """Maximum number of automata that are named for a module without a supervisor."""
@@ -136,6 +138,8 @@ class SystemSupervisor(SupervisorFile):
         return f"<supervisor of {self.system.name}: {self._size}, conditions added to {events}>"
 
     def __str__(self) -> str:
+        if self.system.is_controlled:
+            return f"{self.system.name}: the supervisor is in the model ({self._size}), and nothing is added to it"
         return (
             f"{self.system.name}: a supervisor exists ({self._size})\n{self.conditions}{''.join(self._module_lines())}"
         )
@@ -226,6 +230,8 @@ def synthesize_system(
 ) -> SystemSynthesis:
     """Synthesize the supervisor of automata; parameters and errors as of `robosc.synthesize`.
 
+    To a controlled system nothing is added: its states are counted.
+
     Args:
         system: The automata.
         options: Options for making the supervisor.
@@ -235,6 +241,8 @@ def synthesize_system(
         is_modular: True for a modular synthesis.
     """
     check_system(system)
+    if is_modular and system.is_controlled:
+        return _unsupported(f"{system.name} has its supervisor already, so there is nothing to synthesize in modules")
     if is_modular:
         return _synthesized_in_modules(system, options, on_progress, should_stop, places or SystemPlaces())
     engine = options.engine_options()
@@ -243,13 +251,14 @@ def synthesize_system(
         on_progress(Progress("synthesis", str(progress)))
 
     try:
-        found = synthesize(system, engine=engine, should_stop=should_stop, on_progress=report)
+        found = synthesize(composed(system), engine=engine, should_stop=should_stop, on_progress=report)
     except UnsupportedModelError as error:
-        return _unsupported(error)
+        return _unsupported(str(error))
     if found.status is CoreStatus.EMPTY:
         from robosc.explanation import SystemWords
 
-        words, reason = SystemWords(system, places or SystemPlaces()), f"no supervisor exists: {found.reason}"
+        words = SystemWords(system, places or SystemPlaces())
+        reason = found.reason if system.is_controlled else f"no supervisor exists: {found.reason}"
         return _empty(words, reason, found.statistics, engine, on_progress, should_stop)
     supervisor = SystemSupervisor(system, found.added, found.initial, found.statistics)
     return SystemSynthesis(SynthesisStatus.SUPERVISOR, "", supervisor, found.statistics)
@@ -273,7 +282,7 @@ def _synthesized_in_modules(
             on_progress=lambda message: on_progress(Progress("synthesis", message)),
         )
     except UnsupportedModelError as error:
-        return _unsupported(error)
+        return _unsupported(str(error))
     if found.unsolved is not None:
         names = ", ".join(found.unsolved.automata[:MAXIMUM_NAMES]) + ", ..." * (
             len(found.unsolved.automata) > MAXIMUM_NAMES
@@ -302,8 +311,7 @@ def _synthesized_in_modules(
     return SystemSynthesis(SynthesisStatus.SUPERVISOR, "", supervisor, statistics)
 
 
-def _unsupported(error: UnsupportedModelError) -> SystemSynthesis:
-    reason = str(error)
+def _unsupported(reason: str) -> SystemSynthesis:
     explanation = NoSupervisor(reason, ())
     return SystemSynthesis(SynthesisStatus.UNSUPPORTED_MODEL, reason, None, None, explanation=explanation)
 
@@ -338,8 +346,9 @@ def verify_system(
     should_stop: Callable[[], bool],
     *,
     is_strict: bool,
+    controller: bool = False,
 ) -> Verification:
-    """Verify a supervisor of automata independently of its synthesis."""
+    """Verify a supervisor of automata independently of its synthesis; with `controller`, its properties, too."""
     from robosc.verification import CheckOutcome
 
     verified = _verified(supervisor, options, limits, on_progress, should_stop)
@@ -350,11 +359,13 @@ def verify_system(
     stated, counted = supervisor.states, found.states
     is_miscounted = stated > 0 and counted not in (None, stated) and not found.failures
     miscount = f"it states {stated}, and there are {counted}" if is_miscounted else ""
+    properties = _controller_report(supervisor, limits, on_progress, should_stop) if controller else {}
+    results = {*properties.get("checks", {}).values()}
     status = (
         VerificationStatus.FAILED
-        if found.failures or miscount
+        if found.failures or miscount or "failed" in results
         else VerificationStatus.PASSED
-        if is_complete
+        if is_complete and "not checked" not in results
         else VerificationStatus.NOT_CHECKED
     )
     report: Mapping[str, Any] = {
@@ -377,8 +388,55 @@ def verify_system(
         "states": found.states,
         "transitions": found.transitions,
         "method": verified.method,
+        **({"controller": properties} if controller else {}),
     }
     return Verification(status, (), "", report, system_verification_text(report))
+
+
+def _controller_report(
+    supervisor: SystemSupervisor,
+    limits: "Limits",
+    on_progress: Callable[[Progress], None],
+    should_stop: Callable[[], bool],
+) -> dict[str, Any]:
+    """Return the report about the controller properties, as JSON values."""
+    from robosc.controller_properties import check_automata
+
+    on_progress(Progress("verification", "controller properties"))
+    found = check_automata(
+        composed(supervisor.system),
+        state_predicates(supervisor.system, supervisor.added),
+        limit=limits.states,
+        initial=supervisor.may_begin,
+        should_stop=should_stop,
+    )
+    if found is None:
+        return {"checks": dict.fromkeys(_CONTROLLER_CHECKS, "not checked"), "limit": limits.states, "faults": []}
+    faults: list[dict[str, Any]] = []
+    for kind in ("uncontrollable", "controllable"):
+        response = getattr(found, kind)
+        if response.bound is None:
+            words = f"{kind} events can follow each other for ever: {', '.join(response.events)}"
+            names = ["bounded_response", *(["finite_response"] if kind == "controllable" else [])]
+            faults += [
+                {"check": name, "message": words, "trace": list(response.trace), "cycle": list(response.events)}
+                for name in names
+            ]
+    if found.disagreement is not None:
+        orders = [list(order) for order in found.disagreement.orders]
+        shown = " and ".join(f"'{', '.join(order) or 'nothing'}'" for order in orders)
+        words = f"controllable events can happen in orders that never meet again, {shown}"
+        trace = list(found.disagreement.trace)
+        faults.append({"check": "confluence", "message": words, "trace": trace, "orders": orders})
+    if found.blocking is not None:
+        words = "no marked state without a possible controllable event is reached if controllable events come first"
+        faults.append({"check": "nonblocking_under_control", "message": words, "trace": list(found.blocking)})
+    return {
+        "checks": {name: "passed" if holds else "failed" for name, holds in found.checks.items()},
+        "uncontrollables_bound": found.uncontrollable.bound,
+        "controllables_bound": found.controllable.bound,
+        "faults": faults,
+    }
 
 
 def system_summary_text(supervisor: SystemSupervisor) -> str:
@@ -394,12 +452,24 @@ def system_verification_text(report: Mapping[str, Any]) -> str:
     lines = [f"{report['system']}: {report['status']}"]
     lines += [f"  {name.replace('_', ' '):<21} {outcome}" for name, outcome in report["checks"].items()]
     lines.append(f"  {'method':<21} {report['method']}")
-    for item in report["faults"]:
+    properties = report.get("controller", {"checks": {}, "faults": []})
+    for name, outcome in properties["checks"].items():
+        more = ""
+        if name == "bounded_response" and outcome == "passed":
+            more = (
+                f": at most {properties['uncontrollables_bound']} uncontrollable and "
+                f"{properties['controllables_bound']} controllable events in a row"
+            )
+        if outcome == "not checked":
+            more = f": more than {properties['limit']} states, or very many transitions"
+        lines.append(f"  {name.replace('_', ' '):<25} {outcome}{more}")
+    for item in (*report["faults"], *properties["faults"]):
         if item["check"] == _MISCOUNT:
             lines.append(f"wrong states: {item['message']}")
         else:
             after = ", ".join(item["trace"]) or "nothing"
-            lines.append(f"not {item['check'].replace('_', ' ')}: {item['message']}, after {after}")
+            lack = _LACK.get(item["check"], f"not {item['check'].replace('_', ' ')}")
+            lines.append(f"{lack}: {item['message']}, after {after}")
     return "".join(f"{visible(line)}\n" for line in lines)
 
 

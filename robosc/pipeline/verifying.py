@@ -48,6 +48,7 @@ def verify(
     options: SynthesisOptions | None = None,
     maximum_states: int | None = None,
     is_strict: bool = False,
+    controller: bool = False,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Verification: ...
@@ -63,6 +64,7 @@ def verify(
     options: SynthesisOptions | None = None,
     maximum_states: int | None = None,
     is_strict: bool = False,
+    controller: bool = False,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Verification: ...
@@ -77,6 +79,7 @@ def verify(
     options: SynthesisOptions | None = None,
     maximum_states: int | None = None,
     is_strict: bool = False,
+    controller: bool = False,
     on_progress: OnProgress = ignored,
     should_stop: ShouldStop = never,
 ) -> Verification:
@@ -94,6 +97,8 @@ def verify(
         options: Options for making the supervisor, and the deployment that a given one must have; None: its own.
         maximum_states: States up to which a given supervisor is searched state by state; None: 1,000,000.
         is_strict: True if a given supervisor passes only if permissiveness was checked, too.
+        controller: True if automata, or their supervisor, are also checked for bounded and finite response, confluence
+            and nonblocking under control.
         on_progress: Function called with the progress of the work.
         should_stop: Function called again and again; once it returns true, the work ends.
 
@@ -116,13 +121,19 @@ def verify(
     if isinstance(model, SystemSupervisor):
         if claims or supervisor is not None:
             raise TypeError("a supervisor of automata is verified by itself: properties and supervisor= need a model")
-        return verify_system(model, chosen, limits, on_progress, should_stop, is_strict=is_strict)
+        return verify_system(
+            model, chosen, limits, on_progress, should_stop, is_strict=is_strict, controller=controller
+        )
     try:
         bundle = None if isinstance(model, CoreSupervisor) else loaded(model)
         if isinstance(bundle, LoadedAutomata):
             if claims or supervisor is not None:
                 raise TypeError("automata are verified by themselves: properties and supervisor= need a robot's model")
-            return automata_verification(bundle, chosen, limits, on_progress, should_stop, is_strict=is_strict)
+            return automata_verification(
+                bundle, chosen, limits, on_progress, should_stop, is_strict=is_strict, controller=controller
+            )
+        if controller:
+            raise TypeError("controller= is for automata: synthesize checks the controller of a robot")
         if supervisor is not None:
             if bundle is None:
                 raise TypeError("supervisor= is checked against a model: give the model as the first argument")

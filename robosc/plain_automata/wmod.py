@@ -6,7 +6,7 @@ tool for large-scale discrete event systems", IFAC-PapersOnLine 50(1), 2017, pp.
 """
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import PurePath
 from typing import NoReturn
 from xml.parsers import expat
@@ -99,6 +99,7 @@ class _Reader:
         self._findings = findings
         self.events: dict[str, bool] = {}
         self.drafts: list[Draft] = []
+        self.kinds = set[str]()
 
     def _unsupported(self, element: _Element, what: str, fix: str) -> None:
         self._findings.error("automata-unsupported", what, element.at, fix)
@@ -155,6 +156,7 @@ class _Reader:
             self._findings.error("automata-syntax", message, component.at, "Correct the component.")
             return
         draft = Draft(name, _ROLES[kind])
+        self.kinds.add(kind)
         self.drafts.append(draft)
         has_accepting = False
         for part in graphs[0].children:
@@ -226,7 +228,10 @@ def read_wmod(file: SourceFile, findings: Findings) -> tuple[System, SystemPlace
     if not reader.drafts and not findings.has_errors:
         findings.error("automata-syntax", "there is no automaton in it", module.at, "Add a SimpleComponent.")
     name = module.attributes.get("Name") or PurePath(file.name).stem
-    return system_of(name, reader.drafts, reader.events, findings)
+    system, places = system_of(name, reader.drafts, reader.events, findings)
+    # States to be avoided are requirements, too.
+    is_controlled = "SUPERVISOR" in reader.kinds and "SPEC" not in reader.kinds and not system.invariants
+    return replace(system, is_controlled=is_controlled), places
 
 
 def write_wmod(system: System) -> str:
@@ -247,7 +252,7 @@ def write_wmod(system: System) -> str:
         lines.append(f'  <EventDecl Kind="{kind}" Name={_quoted(event.name)}/>')
     lines += [" </EventDeclList>", " <ComponentList>"]
     for automaton in system.automata:
-        kind = "PLANT" if automaton.role is Role.PLANT else "SPEC"
+        kind = "PLANT" if automaton.role is Role.PLANT else "SUPERVISOR" if system.is_controlled else "SPEC"
         lines.append(f'  <SimpleComponent Kind="{kind}" Name={_quoted(automaton.name)}>')
         lines.append("   <Graph>")
         silent = sorted(automaton.alphabet - {edge.event for edge in automaton.edges})

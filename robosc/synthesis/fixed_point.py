@@ -120,6 +120,8 @@ class FixedPoint:
             problem: The problem.
             known: States that are known beforehand to be good.
         """
+        if self._encoding.system.is_controlled:
+            return self._given(problem)
         start = self.initial & problem.safe
         found, reached = self._first_of(
             lambda solver: solver.good_states(problem, known),
@@ -129,6 +131,11 @@ class FixedPoint:
             return found
         found = self.good_states(Problem(problem.steps, reached), known & reached)
         return replace(found, is_of_reached=True)
+
+    def _given(self, problem: Problem) -> GoodStates:
+        """The states that a supervisor may be in which is in the system already: all that it lets be."""
+        is_lost = self._is_lost(problem.safe)
+        return GoodStates(problem.safe, 0, "there is no initial state" if is_lost else "")
 
     def nonblocking_ahead(self, problem: Problem, states: Any) -> Any:
         """Return those of some safe states that reach a marked one through transitions that stay in them.

@@ -89,13 +89,13 @@ def verify(
             added,
             initial=initial,
             limit=limits.states,
-            permissive_limit=limits.recomputed,
+            permissive_limit=0 if system.is_controlled else limits.recomputed,
             semantics=semantics,
             should_stop=should_stop,
             on_progress=on_progress,
         )
         if found.states is not None:
-            return VerificationReport(found, f"explicit forward search; {_permissiveness(found, limits)}")
+            return VerificationReport(found, f"explicit forward search; {_permissiveness(system, found, limits)}")
         reason = f"more than {limits.states} states, or {TRANSITIONS_PER_STATE * limits.states} transitions"
     else:
         reason = f"more than {limits.states} states"
@@ -120,7 +120,9 @@ def verify(
     return VerificationReport(found, method)
 
 
-def _permissiveness(found: Verification, limits: Limits) -> str:
+def _permissiveness(system: System, found: Verification, limits: Limits) -> str:
+    if system.is_controlled:
+        return "permissiveness not checked, because the model has no requirements beside the supervisor"
     if found.maximally_permissive is CheckOutcome.NOT_CHECKED:
         return (
             f"permissiveness not recomputed: more than {limits.recomputed} states, or "

@@ -235,15 +235,23 @@ class _Writer:
         """Yield its lines."""
         system = self._system
         yield comment(f"The controlled system of {system.name}, made by RoboSC {__version__}.")
-        yield comment(
-            "Plants are as they were, requirements are supervisors, and the automaton at the end is what they"
-        )
-        yield comment("need beside them: each controllable event only where no variable leaves its range, and where")
-        yield comment("synthesis found that nothing that cannot be prevented leads against a requirement.")
+        if system.is_controlled:
+            yield comment("All is as it was: the supervisor was there already.")
+        else:
+            yield comment(
+                "Plants are as they were, requirements are supervisors, and the automaton at the end is what they"
+            )
+            yield comment(
+                "need beside them: each controllable event only where no variable leaves its range, and where"
+            )
+            yield comment("synthesis found that nothing that cannot be prevented leads against a requirement.")
         yield from self._body(self._root, ())
         yield from (f"initial {self._text(item, ())};" for item in conjuncts(system.initial) if item != TRUE)
         yield from (f"marked {self._text(item, ())};" for item in conjuncts(system.marker) if item != TRUE)
         yield from (f"plant invariant {self._text(item, ())};" for item in system.plant_invariants)
+        # The conditions on events see to requirements on states.
+        if system.is_controlled:
+            yield from (f"supervisor invariant {self._text(item, ())};" for item in system.invariants)
         for kind, conditions in (("plant", system.plant_conditions), ("supervisor", system.conditions)):
             for item in conditions:
                 yield f"{kind} {self._reference(_path(item.event), ())} needs {self._text(item.condition, ())};"
@@ -312,6 +320,8 @@ class _Writer:
         events = [item.name for item in self._system.events if item.is_controllable and item.name in alphabet]
         guards = [all_of([*self._ranges(event), self._condition(added.get(event))]) for event in events]
         begins = self._condition(initial)
+        if self._system.is_controlled and {*guards, begins} <= {text.TRUE}:
+            return
         yield f"supervisor automaton {self._supervisor}:"
         yield f"  {self._events('alphabet', events, (self._supervisor,))}"
         yield from (f"  alg bool {name} = {found};" for found, name in self._diagram_lines.items())

@@ -20,7 +20,7 @@ from robosc.expressions import (
 )
 from robosc.recursion import allow_depth
 from robosc.targets.cif.expression_words import expression_words
-from robosc.targets.cif.numbers import Number, Term, combined, comparison, fits, number_text, scaled
+from robosc.targets.cif.numbers import Number, combined, comparison, fits, has_multiples, number_text, scaled, selected
 from robosc.targets.cif.subjects import Place, Reader
 from robosc.targets.cif.tables import Table, TableTooLargeError, tabulate
 from robosc.targets.cif.text import (
@@ -173,11 +173,10 @@ class _Translation(PredicateWriter[Text, Number | Symbol]):
             return _fitting(combined(left, right, 1 if operator == "+" else -1, known))
         if not left.terms or not right.terms:
             factor, number = (left.constant, right) if not left.terms else (right.constant, left)
-            return _fitting(scaled(number, factor, known))
-        first, second = (number_text(item) for item in (left, right))
-        ends = [a * b for a in left.bounds for b in right.bounds]
-        atom = Text(f"{first.within(Level.PRODUCT)} * {second.within(Level.UNARY)}", Level.PRODUCT)
-        return _fitting(Number((Term(atom, min(ends), max(ends)),), 0, known))
+            found = scaled(number, factor, known)
+            return None if has_multiples(found) else _fitting(found)
+        # Synthesis of CIF takes no products of what is not constant.
+        return None
 
     def _values_compared(self, operator: str, left: Number | Symbol, right: Number | Symbol) -> Predicate[Text] | None:
         match left, right:
@@ -217,14 +216,13 @@ class _Translation(PredicateWriter[Text, Number | Symbol]):
                 return Symbol(value, self._choice_known(test, then.known, otherwise.known))
             case Number(), Number():
                 ends = (*then.bounds, *otherwise.bounds)
-                value = chosen([(test.true, number_text(then))], number_text(otherwise))
                 is_known = self._choice_known(test, then.known, otherwise.known)
                 if test.true in (TRUE, FALSE):
                     chosen_number = then if test.true == TRUE else otherwise
                     return Number(chosen_number.terms, chosen_number.constant, is_known)
                 if min(ends) == max(ends):
                     return Number((), ends[0], is_known)
-                return Number((Term(value, min(ends), max(ends)),), 0, is_known)
+                return selected(test.true, then, otherwise, is_known)
             case _:
                 return None
 
@@ -257,8 +255,7 @@ class _Translation(PredicateWriter[Text, Number | Symbol]):
         first, second = number_text(a), number_text(b)
         if len(first.text) + len(second.text) > MAXIMUM_REPEATED:
             return None
-        ends = (*a.bounds, *b.bounds)
-        return Number((Term(chosen([(test, first)], second), min(ends), max(ends)),), 0, known)
+        return selected(test, a, b, known)
 
     def _tabulated(self, node: Expression) -> Predicate[Text]:
         table = self._table(node)

@@ -2,12 +2,19 @@
 
 A variable of `integer(-3..3)` is stored as 0..6, so every expression that reads it subtracts 3. Sums are kept as lists
 of terms, so that constants are added up, and a comparison needs no negative number.
+
+CIF's synthesis takes subtraction only as the outermost operator of an assigned value, and no products. So nothing that
+stands in something else is ever negative: a choice between sums is one between what they add, less one between what
+they subtract, and a multiple is a sum.
 """
 
 from dataclasses import dataclass
 
 from robosc.expressions import MAXIMUM_INTEGER, MINIMUM_INTEGER
-from robosc.targets.cif.text import FALSE, TRUE, Level, Text, compared
+from robosc.targets.cif.text import FALSE, TRUE, Level, Text, chosen, compared
+
+MAXIMUM_FACTOR = 100
+"""Greatest multiple that is written as a sum."""
 
 _MIRRORED = {"=": "=", "!=": "!=", "<": ">", "<=": ">=", ">": "<", ">=": "<="}
 
@@ -39,7 +46,7 @@ class Term:
         """The multiple, its sign aside."""
         if abs(self.factor) == 1:
             return Text(self.atom.within(Level.PRODUCT), Level.PRODUCT)
-        return Text(f"{abs(self.factor)} * {self.atom.within(Level.UNARY)}", Level.PRODUCT)
+        return Text(" + ".join([self.atom.within(Level.PRODUCT)] * abs(self.factor)), Level.SUM)
 
 
 @dataclass(frozen=True, slots=True)
@@ -74,9 +81,39 @@ def combined(left: Number, right: Number, sign: int, known: Text) -> Number:
 
 
 def scaled(number: Number, factor: int, known: Text) -> Number:
-    """`factor * number`."""
+    """`factor * number`; see `has_multiples`."""
     terms = tuple(Term(term.atom, term.low, term.high, factor * term.factor) for term in number.terms if factor)
     return Number(terms, factor * number.constant, known)
+
+
+def halves(number: Number) -> tuple[Number, Number]:
+    """The part that a sum adds, and the part that it subtracts."""
+    added = Number(tuple(term for term in number.terms if term.factor > 0), max(number.constant, 0))
+    taken = Number(tuple(term for term in number.terms if term.factor < 0), min(number.constant, 0))
+    return added, scaled(taken, -1, TRUE)
+
+
+def selected(test: Text, then: Number, otherwise: Number, known: Text) -> Number:
+    """`then` where a test holds, else `otherwise`."""
+    lowest, highest = sorted((then.constant, otherwise.constant))
+    # A constant that both have stands outside.
+    common = max(lowest, 0) + min(highest, 0)
+    first, second = (halves(Number(item.terms, item.constant - common)) for item in (then, otherwise))
+    found = Number((), common, known)
+    for sign, one, other in zip((1, -1), first, second, strict=True):
+        text = chosen([(test, number_text(one))], number_text(other))
+        if text in (number_text(one), number_text(other)):
+            part = one if text == number_text(one) else other
+        else:
+            ends = (*one.bounds, *other.bounds)
+            part = Number((Term(text, min(ends), max(ends)),))
+        found = combined(found, part, sign, known)
+    return found
+
+
+def has_multiples(number: Number) -> bool:
+    """Return True if a factor of it is too large to be written as a sum."""
+    return any(abs(term.factor) > MAXIMUM_FACTOR for term in number.terms)
 
 
 def fits(number: Number) -> bool:
@@ -88,20 +125,23 @@ def fits(number: Number) -> bool:
 
 def number_text(number: Number) -> Text:
     """The sum as CIF text."""
-    added = [term.text.text for term in number.terms if term.factor > 0]
-    removed = [term.text.text for term in number.terms if term.factor < 0]
-    rest = number.constant
-    if not added:
-        added, rest = [str(rest)], 0
-    pieces = [" + ".join(added), *(f" - {text}" for text in removed)]
-    if rest:
-        pieces.append(f" {'+' if rest > 0 else '-'} {abs(rest)}")
-    if len(pieces) == 1 and len(added) == 1:
-        first = next((term for term in number.terms if term.factor > 0), None)
-        if first is None:
-            return Text(added[0], Level.UNARY if number.constant < 0 else Level.ATOM)
-        return first.atom if first.factor == 1 else first.text
-    return Text("".join(pieces), Level.SUM)
+    added, taken = (_sum(half) for half in halves(number))
+    if taken is None:
+        return added or Text("0")
+    return Text(f"{added or 0} - {taken.within(Level.PRODUCT)}", Level.SUM)
+
+
+def _sum(half: Number) -> Text | None:
+    """A sum in which nothing is negative; None if there is nothing in it."""
+    texts = [term.text for term in half.terms]
+    if half.constant:
+        texts.append(Text(str(half.constant)))
+    if not texts:
+        return None
+    if len(texts) > 1:
+        return Text(" + ".join(item.text for item in texts), Level.SUM)
+    # A single atom is as strong as it is by itself.
+    return half.terms[0].atom if half.terms and half.terms[0].factor == 1 else texts[0]
 
 
 def comparison(operator: str, left: Number, right: Number) -> Text:
@@ -110,9 +150,7 @@ def comparison(operator: str, left: Number, right: Number) -> Text:
     decided = _decided(operator, *difference.bounds)
     if decided is not None:
         return TRUE if decided else FALSE
-    constant = difference.constant
-    above = Number(tuple(term for term in difference.terms if term.factor > 0), max(constant, 0))
-    below = scaled(Number(tuple(term for term in difference.terms if term.factor < 0), min(constant, 0)), -1, TRUE)
+    above, below = halves(difference)
     if not above.terms:
         above, below, operator = below, above, _MIRRORED[operator]
     return compared(number_text(above).within(Level.SUM), operator, number_text(below).within(Level.SUM))

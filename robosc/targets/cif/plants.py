@@ -9,9 +9,20 @@ from robosc.expressions import MAXIMUM_INTEGER, BooleanType, EnumType, IntegerTy
 from robosc.model.structure import Model
 from robosc.targets.cif.expressions import Symbol, Translator
 from robosc.targets.cif.names import data_plant, declared_events, shift
-from robosc.targets.cif.numbers import Number, comparison, fits, number_text
+from robosc.targets.cif.numbers import Number, Term, comparison, fits, number_text, selected
 from robosc.targets.cif.subjects import Place
-from robosc.targets.cif.text import TRUE, Text, all_of, any_of, chosen, escaped, implied, negated
+from robosc.targets.cif.text import (
+    TRUE,
+    Level,
+    Text,
+    all_of,
+    any_of,
+    chosen,
+    compared,
+    escaped,
+    implied,
+    negated,
+)
 from robosc.targets.code.predicates import Predicate
 
 MAXIMUM_DATA_EDGES = 100_000
@@ -231,19 +242,26 @@ def _number_update(number: Number, type_: Type, old: Text, place: Place) -> Text
     CIF refuses an assignment whose range has nothing in common with the variable's: that it always fails is a matter of
     synthesis. Naming the variable widens the range of the expression, not its value.
     """
-    stored = Number(number.terms, number.constant + shift(type_), number.known)
-    is_apart = _is_outside(number, type_)
+    stored = Number(number.terms, number.constant + shift(type_))
+    assert isinstance(type_, IntegerType)  # noqa: S101 - the check has typed it
+    highest = int(type_.high or 0) + shift(type_)
+    if _is_outside(number, type_):
+        return chosen([(number.known, _too_great(old, highest))], old)
     if not fits(stored):
-        if not is_apart:
-            raise UnsupportedModelError(
-                f"target cif: {place.what} exceeds 32 bits; make the ranges of what it reads smaller"
-            )
-        stored = Number((), -1, number.known)
+        raise UnsupportedModelError(
+            f"target cif: {place.what} exceeds 32 bits; make the ranges of what it reads smaller"
+        )
     if number.known != TRUE:
-        return chosen([(number.known, number_text(stored))], old)
-    if is_apart:
-        return Text(f"if true: {number_text(stored)} else {old} end")
+        stored = selected(number.known, stored, Number((Term(old, 0, highest),)), TRUE)
     return number_text(stored)
+
+
+def _too_great(old: Text, highest: int) -> Text:
+    """A value beyond a variable's range, from 0, of which CIF does not know that it always is."""
+    if highest == 0:
+        return chosen([(compared(old.text, "=", "0"), Text("1"))], old)
+    more = Text(f"{old} + 1", Level.SUM)
+    return chosen([(compared(old.text, "<", str(highest)), Text(str(highest + 1)))], more)
 
 
 def _is_outside(number: Number, type_: Type) -> bool:

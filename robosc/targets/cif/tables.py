@@ -14,7 +14,7 @@ from robosc.automata.state import Subject
 from robosc.automata.structure import InputVariable
 from robosc.conditions.literals import merged
 from robosc.expressions import Expression, Received, StateTest, Value, VariableRead, leaves
-from robosc.targets.cif.numbers import Number, Term, number_text
+from robosc.targets.cif.numbers import Number, Term
 from robosc.targets.cif.subjects import Place, Reader, Source
 from robosc.targets.cif.text import FALSE, TRUE, Text, all_of, any_of, chosen
 
@@ -83,7 +83,8 @@ class Table:
         known = self.where(lambda value: value is not None)
         if len(values) <= 1:
             return Number((), values[0] if values else 0, known)
-        return Number((Term(self._number(self.result), min(values), max(values)),), 0, known)
+        low = min(values)
+        return Number((Term(self._number(self.result, low), 0, max(values) - low),), low, known)
 
     def _where(self, result: _Result, wanted: Callable[[Value | None], bool]) -> Text:
         if not isinstance(result, _Choice):
@@ -97,10 +98,11 @@ class Table:
             if text != FALSE
         )
 
-    def _number(self, result: _Result) -> Text:
+    def _number(self, result: _Result, low: int) -> Text:
+        """The text of how much a result exceeds the least one."""
         if not isinstance(result, _Choice):
-            return number_text(Number((), int(result or 0)))
-        parts = [(runs, self._number(part)) for part, runs in result.branches]
+            return Text("0" if result is None else str(int(result) - low))
+        parts = [(runs, self._number(part, low)) for part, runs in result.branches]
         cases = [(self.reader.test(result.source, runs, self.place), text) for runs, text in parts[:-1]]
         return chosen(cases, parts[-1][1])
 

@@ -15,7 +15,7 @@ from math import prod
 from robosc.automata.compile import NO_DATA, Path, State, compile_expression, subjects_read
 from robosc.automata.semantics import MAXIMUM_CHOICES, plant_invariants_on
 from robosc.automata.state import Subject, initial_values, subject_type, subjects
-from robosc.automata.structure import Automaton, Edge, Event, InputVariable, System
+from robosc.automata.structure import Automaton, Edge, Event, InputVariable, System, composed
 from robosc.cif.typing import NAMELESS
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import TRUE, Binary, EnumType, Expression, IntegerType, Type, Value, conjuncts
@@ -39,6 +39,7 @@ class ControlledAutomata:
 
     Attributes:
         system: The automata.
+        roles: Role of each automaton, in a word.
         added: The added condition of each event that has one.
         initial: The condition on the initial states, or None.
         inputs: The input of each event that changes an input variable, by the name of both.
@@ -49,8 +50,9 @@ class ControlledAutomata:
     """
 
     def __init__(self, supervised: SupervisedSystem) -> None:
-        system = supervised.system
+        system = composed(supervised.system)
         _require_names(system)
+        self.roles = {item.name: supervised.system.role_of(item) for item in supervised.system.automata}
         self.system = system = replace(system, automata=tuple(map(_merged, system.automata)))
         self.added: Mapping[str, DecisionDiagram] = {item.event: item.condition for item in supervised.added}
         self.initial = supervised.initial
@@ -259,7 +261,7 @@ class AutomataWriter(ABC):
             possible = FALSE_CODE
             for test in tests:
                 possible = self._before.either(possible, test)
-            found += self._required(f"{automaton.role} {automaton.name}", possible)
+            found += self._required(f"{self._automata.roles[automaton.name]} {automaton.name}", possible)
             if possible == FALSE_CODE:
                 return found
             if len(tests) == 1:

@@ -86,7 +86,8 @@ class _Check:
         at = self._variables.states([found.state])
         for item in self._relations:
             if at & self._invariant != false and at & item.bad != false:
-                reason = f"{item.event.name} can happen against its requirement or take a variable out of its range"
+                whose = "the supervisor" if self._system.is_controlled else "its requirement"
+                reason = f"{item.event.name} can happen against {whose} or take a variable out of its range"
                 return failure(self._system, "safe", found.trace, found.state, reason, is_shortest=found.is_shortest)
         return found
 

@@ -352,6 +352,19 @@ def automata_run(made: watched_model.SynthesizedModel) -> Any:
     return SystemRun(made.supervisor)
 
 
+def test_a_supervisor_in_the_model_is_drawn_as_one() -> None:
+    made = model(
+        "plant p: controllable c; location a: initial; marked; edge c; end "
+        "supervisor s: location x: initial; marked; edge p.c goto y; location y: marked; end"
+    )
+    assert isinstance(made.supervisor, SystemSupervisor)
+    robot = automata.robot_of_automata(made.supervisor, {})
+    assert {name: drawn.role for name, drawn in robot.automata.items()} == {"p": "plant", "s": "supervisor"}
+    run_ = automata_run(made)
+    run_.step("p.c")
+    assert run_.reasons("p.c") == ("s is in y, not in x",)
+
+
 def test_changes_of_the_supervisor_are_reported() -> None:
     before = model(TANK_AND_BELT)
     after = model(TANK_AND_BELT.replace("c_turn", "c_back").replace("!= 4", "< 3"))

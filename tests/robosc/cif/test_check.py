@@ -189,7 +189,7 @@ def test_files_are_read_from_their_folders(tmp_path: Path) -> None:
         ("controllable int c;", "cif-unsupported", 18),
         ("cont c;", "cif-unsupported", 6),
         ("invariant true;", "cif-unsupported", 11),
-        ("supervisor invariant true;", "cif-unsupported", 22),
+        (counter("", "") + " supervisor p.e needs true; requirement p.e needs true;", "cif-unsupported", 125),
         ("automaton a: location; end", "cif-unsupported", 11),
         (counter("disc real r;", ""), "cif-unsupported", 54),
         (counter("disc int n;", ""), "cif-unsupported", 53),

@@ -14,12 +14,14 @@ from robosc.certification import make_supervisor
 from robosc.cli.main import main
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import Binary, Constant, Expression, StateTest, VariableRead, conjunction
+from robosc.language import load_bundle
 from robosc.model.structure import Deployment, Requirement, RequirementForm
 from robosc.source import Bundle
 from robosc.supervisor import Supervisor
 from robosc.targets import GenerateOptions, generate
 from robosc.targets.cif import supervisor as supervisor_module
 from support.cif_parser import CifError
+from support.cif_supported import problems
 from support.cif_system import CifSystem
 from support.cif_twin import assert_same_control, assert_same_problem
 from support.effort import examples
@@ -47,9 +49,52 @@ def layered(supervisor: Supervisor) -> Supervisor:
 def test_examples(name: str, deployment: Deployment) -> None:
     supervisor = example_supervisor(name, deployment)
     states = int(supervisor.certificate.states)
+    assert problems(generate(supervisor, "cif")["controller.cif"]) == []
     assert assert_same_problem(supervisor, reachable=states + 1) > 1
     # Exactly the states that are reachable under the supervisor.
     assert assert_same_control(supervisor, reachable=10 * states) >= states
+
+
+@pytest.mark.parametrize(
+    "file",
+    [item for item in sorted(EXAMPLES.rglob("*.rscd")) if item.parent.name != "shared"],
+    ids=lambda item: item.stem,
+)
+def test_synthesis_of_cif_takes_every_example(file: Path) -> None:
+    found = make_supervisor(load_bundle(file), verify_limit=0, allow_livelock=True).supervisor
+    assert found is not None
+    assert problems(generate(found, "cif")["controller.cif"]) == []
+
+
+@pytest.mark.parametrize(
+    ("update", "is_taken"),
+    [
+        ("n - 1", True),
+        ("n + 1 - n", True),
+        ("n - (n + 1)", True),
+        ("n - if n = 2: 1 else 0 end", True),
+        ("n - 1 + 1", False),
+        ("n - 1 - 1", False),
+        ("if n = 2: n - 1 else n end", False),
+        ("n * n", False),
+        ("2 * 3 - 1", True),
+        ("1 - 2", False),
+        ("n mod 2", True),
+        ("n mod n", False),
+    ],
+)
+def test_the_checker_of_what_synthesis_takes(update: str, is_taken: bool) -> None:
+    text = f"""plant automaton p:
+  controllable c;
+  disc int[0..5] n = 0;
+  location a:
+    initial; marked;
+    edge c do n := {update};
+end
+"""
+    assert (problems(text) == []) is is_taken
+    assert problems(text.replace("do n", "when n - 1 = 0 do n")) != []
+    assert problems(text.replace("0..5", f"0..{2**31 - 1}")) != []
 
 
 GOLDEN = Path(__file__).parents[2] / "supervisor" / "golden"
@@ -79,6 +124,7 @@ def test_random_supervisors(seed: int, is_layer: bool) -> None:
     except UnsupportedModelError as error:
         assert "target cif: the update of" in str(error)
         assume(False)
+    assert problems(generate(supervisor, "cif")["controller.cif"]) == []
     assert_same_problem(supervisor, reachable=20, others=10)
     assert_same_control(supervisor, reachable=20, others=10)
 
@@ -113,6 +159,7 @@ def test_random_models(bundle: Bundle, deployment: Deployment) -> None:
     supervisor = make_supervisor(bundle, deployment=deployment).supervisor
     assume(supervisor is not None)
     assert supervisor is not None
+    assert problems(generate(supervisor, "cif")["controller.cif"]) == []
     assert_same_problem(supervisor, reachable=20, others=10)
     assert_same_control(supervisor, reachable=20, others=10)
 
@@ -165,9 +212,11 @@ def test_a_model_with_everything(deployment: Deployment) -> None:
         "  disc int[0..6] v_level = 2;",
         "  input int[0..2] i_response_flags_known;",
         "  location $initial:",
-        "requirement component_Lift.v_tries * (component_Lift.v_level - 3) > 2 disables message_move.c_trigger;",
     ):
         assert f"\n{line}\n" in text
+    assert problems(text) == []
+    # A product of variables is none for synthesis of CIF: it is written case by case.
+    assert "component_Lift.v_tries *" not in text
     assert ("\n  uncontrollable c_cancel;\n" in text) == (deployment is Deployment.LAYER)
     assert ("disables action_ride.c_cancel" in text or "action_ride.c_cancel needs" in text) == (
         deployment is Deployment.CONTROLLER
@@ -189,7 +238,7 @@ def test_an_update_that_always_leaves_its_range() -> None:
     assert_same_problem(supervisor, reachable=20, others=20)
     assert_same_control(supervisor, reachable=20, others=20)
     files = generate(supervisor, "cif")
-    assert "do v_n := if true: 8 else v_n end;" in files["controller.cif"]
+    assert "do v_n := if v_n < 2: 3 else v_n + 1 end;" in files["controller.cif"]
     assert "service_call.c_trigger when not component_C.a and (component_C.b =>" in files["supervisor.cif"].replace(
         "\n      ", " "
     )

@@ -20,10 +20,15 @@ from robosc.cif.terms import (
     static,
     truth,
     tuple_parts,
+    values_of,
+    widened,
 )
-from robosc.cif.types import AUTOMATON, BOOL, REAL, STRING, UNKNOWN, CifType, fits, is_compatible
+from robosc.cif.types import AUTOMATON, BOOL, REAL, STRING, UNKNOWN, CifType, fits, overlaps
 from robosc.expressions import StateTest
 from robosc.source import Location
+
+MAXIMUM_CASES = 100_000
+"""Values of a type beyond which a switch over it needs `else`."""
 
 NAMELESS = "*"
 """Name of a location that has none; no identifier can be it."""
@@ -187,17 +192,12 @@ class ExpressionTyping(ABC):
     def _values_of(self, subject: Term) -> set[Any] | None:
         """Every value that a switch must cover; None if there are too many to cover."""
         match subject.type.kind:
-            case "bool":
-                return {False, True}
-            case "enum":
-                return set(subject.type.names)
-            case "int" if subject.type.low is not None and subject.type.range[1] - subject.type.low < 100_000:
-                return set(range(subject.type.low, subject.type.range[1] + 1))
             case "automaton":
                 places = [item for item in subject.value.body if isinstance(item, syntax.LocationDeclaration)]
                 return {item.name.text if item.name is not None else NAMELESS for item in places}
             case _:
-                return None
+                found = values_of(subject.type, MAXIMUM_CASES)
+                return None if found is None else set(found)
 
     def _key(self, node: syntax.Switch, key: syntax.Expression, subject: Term, scope: Scope, covered: set[Any]) -> Term:
         """The term that a subject has the value of one case."""
@@ -212,8 +212,8 @@ class ExpressionTyping(ABC):
         value = self.term(key, scope)
         if value.type.kind == "unknown":
             return ERROR
-        if value.is_static and value.type.kind in ("bool", "int", "enum"):
-            covered.add(value.value)
+        if value.is_static and overlaps(value.type, subject.type):
+            covered.add(widened(value, subject.type).value)
         return self._operators.equality(syntax.Binary("=", node.subject, key, key.at), subject, value)
 
     def _index(self, node: syntax.Index, scope: Scope) -> Term:
@@ -225,7 +225,7 @@ class ExpressionTyping(ABC):
         index = self.term(node.index, scope)
         if index.type.kind == "unknown":
             return ERROR
-        is_key = base.type.kind == "dict" and is_compatible(index.type, base.type.parts[0])
+        is_key = base.type.kind == "dict" and overlaps(index.type, base.type.parts[0])
         if not is_key and (base.type.kind not in ("list", "string") or index.type.kind != "int"):
             return self.mismatch(f"{base.type} has no element {index.type}", node.at)
         result = STRING if base.type.kind == "string" else base.type.parts[-1]
@@ -233,7 +233,7 @@ class ExpressionTyping(ABC):
             return broken(result, base, index, problem=Problem("an element is chosen by a state", node.at))
         try:
             values = dict(base.value) if is_key else base.value
-            return _narrowed(result, values[index.value])
+            return static(result, values[index.value])
         except LookupError:
             return self.mismatch(f"there is no element {index.value!r}", node.at)
 
@@ -255,6 +255,9 @@ class ExpressionTyping(ABC):
             return ERROR
         if base.type.kind not in ("list", "string"):
             return self.mismatch(f"{base.type} cannot be sliced", node.at)
+        for item, bound in zip((node.low, node.high), bounds, strict=True):
+            if item is not None and bound is not None and bound.type.kind != "int":
+                return self.mismatch(f"this must be an integer; it is {of_type(bound.type)}", item.at)
         type_ = STRING if base.type.kind == "string" else CifType("list", parts=base.type.parts)
         known = [item for item in bounds if item is not None]
         if not base.is_static or not all(item.is_static for item in known):
@@ -301,7 +304,3 @@ def _literal(value: bool | int | float | str) -> Term:
     if isinstance(value, int):
         return number(value)
     return static(REAL if isinstance(value, float) else STRING, value)
-
-
-def _narrowed(type_: CifType, value: Any) -> Term:
-    return number(value) if type_.kind == "int" else static(type_, value)

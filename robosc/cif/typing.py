@@ -1,12 +1,10 @@
 """Types of CIF's names: the type of each declaration, with its static value or the expression that it becomes."""
 
-from dataclasses import replace
-
 from robosc.cif import syntax
 from robosc.cif.expression_typing import NAMELESS, ExpressionTyping
 from robosc.cif.scopes import Entity, Scope, Scopes
-from robosc.cif.terms import ERROR, Problem, Term, broken, made, static
-from robosc.cif.types import AUTOMATON, BOOL, REAL, UNKNOWN, CifType, fits
+from robosc.cif.terms import ERROR, Problem, Term, broken, made, static, widened
+from robosc.cif.types import AUTOMATON, BOOL, REAL, UNKNOWN, CifType, declared, fits
 from robosc.expressions import StateTest, VariableRead
 from robosc.source import Location
 
@@ -45,6 +43,15 @@ class Typing(ExpressionTyping):
                     return UNKNOWN
                 return CifType(written.kind, low, high, parts)
         fields = tuple(item.text for item in written.fields)
+        if written.kind == "tuple":
+            for index, item in enumerate(written.fields):
+                if item.text in fields[:index]:
+                    self.error("cif-duplicate-name", f"the tuple has two fields '{item.text}'", item.at,
+                               "Rename one of the two.")  # fmt: skip
+            if len(fields) < 2:
+                self.error("cif-type", "a tuple has two fields or more", written.at,
+                           "Write the type of its field alone, or add a field.")  # fmt: skip
+                return UNKNOWN
         return self._operators.sized(CifType(written.kind, parts=parts, names=fields), written.at)
 
     def _named(self, name: syntax.Name, scope: Scope) -> CifType:
@@ -124,8 +131,10 @@ class Typing(ExpressionTyping):
         raise AssertionError(declaration)
 
     def _constant(self, type_: CifType, value: syntax.Expression, scope: Scope) -> Term:
+        outer, self._operators.is_evaluating = self._operators.is_evaluating, True
         term = self.term(value, scope)
-        if term.type.kind == "unknown":
+        self._operators.is_evaluating = outer
+        if "unknown" in (term.type.kind, type_.kind):
             return ERROR
         if not fits(term.type, type_):
             return self.mismatch(f"{term.type} does not fit {type_}", value.at)
@@ -134,8 +143,7 @@ class Typing(ExpressionTyping):
         if not term.is_static:
             return self.mismatch("the value of a constant must be known beforehand", value.at,
                                  "Use literals and other constants.")  # fmt: skip
-        # Its own value is as narrow a type as there is.
-        return term if term.type.kind in ("int", "enum") else static(type_, term.value)
+        return widened(term, declared(type_, term.type))
 
     def _variable(self, entity: Entity, type_: CifType) -> Term:
         scope, name = entity.scope, entity.identifier.text
@@ -180,8 +188,7 @@ class Typing(ExpressionTyping):
             return ERROR
         if not fits(term.type, type_):
             return self.mismatch(f"{term.type} does not fit {type_}", at)
-        # A tuple has the names of its fields from the declaration.
-        return replace(term, type=type_) if type_.kind == "tuple" else term
+        return widened(term, declared(type_, term.type))
 
     def _cycle(self, what: str, entity: Entity) -> None:
         self.error("cif-cycle", f"{what} '{entity.name}' is defined by itself", entity.at, "Break the circle.")

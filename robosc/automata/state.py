@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 from robosc.automata.structure import System
 from robosc.expressions import Type, Value, domain
+from robosc.expressions.text import variable_text
 
 
 @dataclass(frozen=True, slots=True)
@@ -19,7 +20,7 @@ class Subject:
     variable: str | None = None
 
     def __str__(self) -> str:
-        return self.automaton if self.variable is None else f"{self.automaton}.{self.variable}"
+        return self.automaton if self.variable is None else variable_text(self.automaton, self.variable)
 
 
 def subjects(system: System) -> tuple[Subject, ...]:

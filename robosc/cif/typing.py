@@ -5,7 +5,7 @@ from robosc.cif.expression_typing import NAMELESS, ExpressionTyping
 from robosc.cif.scopes import Entity, Scope, Scopes
 from robosc.cif.terms import ERROR, Problem, Term, broken, made, static, widened
 from robosc.cif.types import AUTOMATON, BOOL, REAL, UNKNOWN, CifType, declared, fits
-from robosc.expressions import StateTest, VariableRead
+from robosc.expressions import ITSELF, StateTest, VariableRead
 from robosc.source import Location
 
 
@@ -152,7 +152,7 @@ class Typing(ExpressionTyping):
         if not type_.is_finite:
             return broken(type_, problem=Problem(f"'{entity.name}' has the type {type_}", entity.at))
         if isinstance(entity.declaration, syntax.Input):
-            return made(type_, VariableRead(entity.name, "value"))
+            return made(type_, VariableRead(entity.name, ITSELF))
         return made(type_, VariableRead(scope.path, name))
 
     def _algebraic(self, entity: Entity, declaration: syntax.Algebraic) -> Term:

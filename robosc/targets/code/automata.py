@@ -18,7 +18,7 @@ from robosc.automata.state import Subject, initial_values, subject_type, subject
 from robosc.automata.structure import Automaton, Edge, Event, InputVariable, System
 from robosc.cif.typing import NAMELESS
 from robosc.errors import UnsupportedModelError
-from robosc.expressions import TRUE, Binary, EnumType, Expression, IntegerType, Type, Value, conjuncts
+from robosc.expressions import ITSELF, TRUE, Binary, EnumType, Expression, IntegerType, Type, Value, conjuncts
 from robosc.expressions.text import expression_text
 from robosc.supervisor import DecisionDiagram
 from robosc.supervisor.predicates import state_predicate
@@ -133,7 +133,7 @@ def _require_names(system: System) -> None:
     for automaton in system.automata:
         names += [automaton.name, *(item for item in automaton.locations if item != NAMELESS)]
         for variable in automaton.variables:
-            names.append(variable.name)
+            names += [variable.name] if variable.name != ITSELF else []
             if isinstance(variable.type, EnumType):
                 names += [variable.type.name, *variable.type.values]
     for name in names:

@@ -23,7 +23,7 @@ from robosc.cif.terms import (
     values_of,
     widened,
 )
-from robosc.cif.types import AUTOMATON, BOOL, REAL, STRING, UNKNOWN, CifType, fits, overlaps
+from robosc.cif.types import AUTOMATON, BOOL, REAL, STRING, CifType, fits, overlaps
 from robosc.expressions import StateTest
 from robosc.source import Location
 
@@ -43,12 +43,16 @@ class ExpressionTyping(ABC):
 
     Args:
         scopes: The scopes.
+
+    Attributes:
+        is_receiving: True in the updates of an edge that receives a value.
     """
 
     def __init__(self, scopes: Scopes) -> None:
         self.scopes = scopes
         self.findings = scopes.findings
         self._operators = Operators(scopes.findings)
+        self.is_receiving = False
 
     @abstractmethod
     def type(self, written: syntax.Type, scope: Scope) -> CifType:
@@ -76,6 +80,10 @@ class ExpressionTyping(ABC):
         if term.type.kind not in ("bool", "unknown"):
             return self.mismatch(f"this must be a boolean; it is {of_type(term.type)}", node.at)
         return term
+
+    def equality(self, left: Term, right: Term, at: Location) -> Term:
+        """The term that two terms have the same value."""
+        return self._operators.equality("=", at, left, right)
 
     def conjunction(self, nodes: tuple[syntax.Expression, ...], scope: Scope) -> Term:
         """The term of predicates that all must hold."""
@@ -214,14 +222,14 @@ class ExpressionTyping(ABC):
             return ERROR
         if value.is_static and overlaps(value.type, subject.type):
             covered.add(widened(value, subject.type).value)
-        return self._operators.equality(syntax.Binary("=", node.subject, key, key.at), subject, value)
+        return self.equality(subject, value, key.at)
 
     def _index(self, node: syntax.Index, scope: Scope) -> Term:
         base = self.term(node.base, scope)
         if base.type.kind == "unknown":
             return ERROR
         if base.type.kind == "tuple":
-            return self._field(node, base, scope)
+            return self.field(node, base, scope)
         index = self.term(node.index, scope)
         if index.type.kind == "unknown":
             return ERROR
@@ -237,7 +245,8 @@ class ExpressionTyping(ABC):
         except LookupError:
             return self.mismatch(f"there is no element {index.value!r}", node.at)
 
-    def _field(self, node: syntax.Index, base: Term, scope: Scope) -> Term:
+    def field(self, node: syntax.Index, base: Term, scope: Scope) -> Term:
+        """The term of a field of a tuple, by its name or number."""
         parts = tuple_parts(base)
         if isinstance(node.index, syntax.Name) and str(node.index) in base.type.names:
             return parts[base.type.names.index(str(node.index))]
@@ -292,7 +301,9 @@ class ExpressionTyping(ABC):
                     return self.mismatch("'self' is the enclosing automaton, and there is none", node.at)
                 return Term(AUTOMATON, value=scope)
             case "?":
-                return broken(UNKNOWN, problem=Problem("a value is received from a channel", node.at))
+                # That an edge receives anything is reported where its channel is declared.
+                return ERROR if self.is_receiving else self.mismatch("this edge receives no value", node.at,
+                                                                     "Receive one, as in 'edge e?'.")  # fmt: skip
         if node.name is not None:
             self.term(node.name, scope)
         return broken(REAL, problem=Problem("a derivative is read", node.at))

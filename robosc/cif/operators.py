@@ -7,8 +7,6 @@ from decimal import Decimal
 from operator import add, mul, sub
 from typing import Any
 
-from msgspec.structs import replace
-
 from robosc.cif import syntax
 from robosc.cif.terms import (
     ERROR,
@@ -125,9 +123,9 @@ class Operators:
                 return logic(operator, left, right)
             if operator in ("and", "or") and left.type.kind == right.type.kind == "set":
                 return self._sets(node, left, right)
-            return self._unfit(node, left, right)
+            return self._unfit(node.operator, node.at, left, right)
         if operator in ("=", "!="):
-            return self.equality(node, left, right)
+            return self.equality(operator, node.at, left, right)
         if operator in ("in", "sub"):
             return self._membership(node, left, right)
         if left.type.is_number and right.type.is_number:
@@ -136,37 +134,37 @@ class Operators:
             return self._arithmetic(node, left, right)
         if operator in ("+", "-") and not (left.type.is_number or right.type.is_number):
             return self._collections(node, left, right)
-        return self._unfit(node, left, right)
+        return self._unfit(node.operator, node.at, left, right)
 
-    def _unfit(self, node: syntax.Binary, left: Term, right: Term) -> Term:
-        return self.mismatch(f"'{node.operator}' does not take {left.type} and {right.type}", node.at)
+    def _unfit(self, operator: str, at: Location, left: Term, right: Term) -> Term:
+        return self.mismatch(f"'{operator}' does not take {left.type} and {right.type}", at)
 
-    def equality(self, node: syntax.Binary, left: Term, right: Term) -> Term:
+    def equality(self, operator: str, at: Location, left: Term, right: Term) -> Term:
         """The term of `=` or `!=` between two operands."""
         common = joined(left.type, right.type)
         if common is None or common.kind in ("automaton", "func", "dist"):
-            return self._unfit(node, left, right)
+            return self._unfit(operator, at, left, right)
         left, right = widened(left, common), widened(right, common)
         if left.is_static and right.is_static and (self.is_evaluating or common.kind in ("bool", "int", "enum")):
-            return truth((left.value == right.value) is (node.operator == "="))
+            return truth((left.value == right.value) is (operator == "="))
         if left.type.kind == "bool":
-            return logic(node.operator, left, right)
+            return logic(operator, left, right)
         if left.parts or right.parts:
-            return self._tuples(node, left, right)
+            return self._tuples(operator, at, left, right)
         if left.type.kind not in ("int", "enum"):
-            return broken(BOOL, left, right, problem=Problem(f"values of type {left.type} are compared", node.at))
+            return broken(BOOL, left, right, problem=Problem(f"values of type {left.type} are compared", at))
         if not (left.is_usable and right.is_usable):
             return broken(BOOL, left, right)
         if left.type.kind == "enum":
-            return made(BOOL, enum_comparison(node.operator, left.core, right.core), left, right)
-        return made(BOOL, Binary("=" if node.operator == "=" else "!=", left.core, right.core), left, right)
+            return made(BOOL, enum_comparison(operator, left.core, right.core), left, right)
+        return made(BOOL, Binary("=" if operator == "=" else "!=", left.core, right.core), left, right)
 
-    def _tuples(self, node: syntax.Binary, left: Term, right: Term) -> Term:
+    def _tuples(self, operator: str, at: Location, left: Term, right: Term) -> Term:
         """Compare tuples that are not both known, field by field."""
         found = truth(True)
         for one, other in zip(tuple_parts(left), tuple_parts(right), strict=True):
-            found = logic("and", found, self.equality(replace(node, operator="="), one, other))
-        return found if node.operator == "=" else negation(found)
+            found = logic("and", found, self.equality("=", at, one, other))
+        return found if operator == "=" else negation(found)
 
     def _order(self, node: syntax.Binary, left: Term, right: Term) -> Term:
         is_real = "real" in (left.type.kind, right.type.kind)
@@ -184,7 +182,7 @@ class Operators:
         if operator == "/" or (operator in ("+", "-", "*") and "real" in (left.type.kind, right.type.kind)):
             return self._real(node, left, right)
         if "real" in (left.type.kind, right.type.kind):
-            return self._unfit(node, left, right)
+            return self._unfit(node.operator, node.at, left, right)
         if operator in ("div", "mod") and right.is_static and right.value == 0:
             return self.mismatch("this divides by zero", node.at)
         low, high = result_range(operator, left.type.range, right.type.range)
@@ -228,7 +226,7 @@ class Operators:
     def _sets(self, node: syntax.Binary, left: Term, right: Term) -> Term:
         type_ = joined(left.type, right.type)
         if type_ is None:
-            return self._unfit(node, left, right)
+            return self._unfit(node.operator, node.at, left, right)
         if not (left.is_static and right.is_static):
             return broken(type_, left, right, problem=Problem("this computes with sets", node.at))
         one, other = widened(left, type_).value, widened(right, type_).value
@@ -242,7 +240,7 @@ class Operators:
         kind = "" if type_ is None else type_.kind
         is_known = kind in ("string", "list", "dict") if node.operator == "+" else kind == "set"
         if type_ is None or not is_known:
-            return self._unfit(node, left, right)
+            return self._unfit(node.operator, node.at, left, right)
         if not (left.is_static and right.is_static):
             return broken(type_, left, right, problem=Problem(f"this computes with values of type {type_}", node.at))
         left, right = widened(left, type_), widened(right, type_)
@@ -263,7 +261,7 @@ class Operators:
         """Remove the keys of a dictionary, or of a list or set of keys, from a dictionary."""
         is_fit = right.type.kind in ("dict", "list", "set") and joined(left.type.parts[0], right.type.parts[0])
         if not is_fit:
-            return self._unfit(node, left, right)
+            return self._unfit(node.operator, node.at, left, right)
         if not (left.is_static and right.is_static):
             return broken(left.type, left, right, problem=Problem("this computes with dictionaries", node.at))
         keys = set(dict(right.value) if right.type.kind == "dict" else right.value)
@@ -272,9 +270,9 @@ class Operators:
     def _membership(self, node: syntax.Binary, left: Term, right: Term) -> Term:
         if node.operator == "sub":
             if left.type.kind != "set" or joined(left.type, right.type) is None:
-                return self._unfit(node, left, right)
+                return self._unfit(node.operator, node.at, left, right)
         elif right.type.kind not in ("list", "set", "dict") or joined(left.type, right.type.parts[0]) is None:
-            return self._unfit(node, left, right)
+            return self._unfit(node.operator, node.at, left, right)
         if not (left.is_static and right.is_static):
             return broken(BOOL, left, right, problem=Problem(f"'{node.operator}' has a value of a state", node.at))
         if node.operator == "sub":

@@ -157,6 +157,11 @@ def tuple_parts(term: Term) -> tuple[Term, ...]:
     return tuple(broken(type_, term) for type_ in term.type.parts)
 
 
+def flat(term: Term) -> list[Term]:
+    """The term, or those of the fields of a tuple, however deep."""
+    return [item for part in tuple_parts(term) for item in flat(part)] if term.type.kind == "tuple" else [term]
+
+
 def tuple_term(type_: CifType, parts: tuple[Term, ...]) -> Term:
     """A tuple of terms."""
     if all(part.is_static for part in parts):

@@ -50,6 +50,8 @@ class CifType:
     @property
     def is_finite(self) -> bool:
         """True if a variable of a model for synthesis may have it."""
+        if self.kind == "tuple":
+            return all(part.is_finite for part in self.parts)
         return self.kind in ("bool", "enum") or (self.kind == "int" and self.low is not None)
 
     def __str__(self) -> str:

@@ -3,7 +3,7 @@
 from robosc.cif import syntax
 from robosc.cif.expression_typing import NAMELESS, ExpressionTyping
 from robosc.cif.scopes import Entity, Scope, Scopes
-from robosc.cif.terms import ERROR, Problem, Term, broken, made, static, widened
+from robosc.cif.terms import ERROR, Problem, Term, broken, made, static, tuple_term, widened
 from robosc.cif.types import AUTOMATON, BOOL, REAL, UNKNOWN, CifType, declared, fits
 from robosc.expressions import ITSELF, StateTest, VariableRead
 from robosc.source import Location
@@ -20,6 +20,7 @@ class Typing(ExpressionTyping):
         super().__init__(scopes)
         self._terms: dict[Entity, Term | None] = {}
         self._types: dict[Entity, CifType | None] = {}
+        self._fields: dict[Scope, set[str]] = {}
         self._enums: dict[tuple[str, ...], str] = {}
 
     # Types
@@ -152,8 +153,24 @@ class Typing(ExpressionTyping):
         if not type_.is_finite:
             return broken(type_, problem=Problem(f"'{entity.name}' has the type {type_}", entity.at))
         if isinstance(entity.declaration, syntax.Input):
+            if type_.kind == "tuple":
+                return broken(type_, problem=Problem(f"'{entity.name}' has the type {type_}", entity.at))
             return made(type_, VariableRead(entity.name, ITSELF))
-        return made(type_, VariableRead(scope.path, name))
+        return self._stored(scope, name, type_)
+
+    def _stored(self, scope: Scope, name: str, type_: CifType) -> Term:
+        """The term of a variable; a tuple is stored as a variable for each field, such as `t_a` for `t[a]`."""
+        if type_.kind != "tuple":
+            return made(type_, VariableRead(scope.path, name))
+        taken = self._fields.setdefault(scope, set(scope.entries))
+        parts = []
+        for field, part in zip(type_.names, type_.parts, strict=True):
+            free = f"{name}_{field}"
+            while free in taken:
+                free += "_"
+            taken.add(free)
+            parts.append(self._stored(scope, free, part))
+        return tuple_term(type_, tuple(parts))
 
     def _algebraic(self, entity: Entity, declaration: syntax.Algebraic) -> Term:
         scope = entity.scope

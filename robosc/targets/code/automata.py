@@ -279,7 +279,8 @@ class AutomataWriter(ABC):
         found: list[Statement] = []
         for update in edge.updates:
             type_ = subject_type(self._system, Subject(automaton.name, update.variable))
-            words = f"{automaton.name}: {update.variable} := {expression_text(update.expression)}"
+            place = f": {update.variable}" if update.variable != ITSELF else ""
+            words = f"{automaton.name}{place} := {expression_text(update.expression)}"
             value = self._before.value(update.expression)
             _require_native(words, value)
             if isinstance(type_, IntegerType):

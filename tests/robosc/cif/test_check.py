@@ -117,7 +117,7 @@ def counter(declarations: str, edge: str, location: str = "") -> str:
          " edge e when l and q.z < n do x := n; end end plant def P(): controllable e; disc int[0..3] z; location m: initial;"
          " marked; edge e do z := 2; end p: P(); d: D(p.e, p.m, 2, p);", 2),
         ("group g: controllable e; group h: plant p: location: initial; marked; edge .g.e; end end end"
-         " group g: plant q: location: initial; marked; edge ^g.e; end end", 1),
+         " group h: plant q: location: initial; marked; edge ^g.e; end end", 1),
         ("plant p: controllable $plant; location $end: initial; marked; edge p.plant; end", 1),
         (counter("", "do x := 1") + " requirement r: p.e needs p.x = 0;", 2),
     ],
@@ -213,12 +213,12 @@ invariant true;
 plant p:
   controllable a; disc real r; disc int n; controllable int ch;
   location:
-    edge a, tau, ch! when f(1) = 2;
+    edge a, tau, ch!3 when f(1) = 2;
 end
 """
     _, found = checked(text)
     assert {item.code for item in found} == {"cif-unsupported"}
-    assert [item.location.line for item in found if item.location] == [1, 1, 2, 4, 4, 4, 6, 6, 6]
+    assert [item.location.line for item in found if item.location] == [1, 1, 2, 4, 4, 4, 6, 6]
     assert all(item.fix for item in found)
 
 

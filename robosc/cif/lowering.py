@@ -26,11 +26,13 @@ from robosc.cif.types import CifType, fits
 from robosc.cif.typing import NAMELESS, Typing
 from robosc.cif.updates import Updates
 from robosc.expressions import (
+    FALSE,
     TRUE,
     BooleanType,
     EnumType,
     Expression,
     IntegerType,
+    StateTest,
     Type,
     VariableRead,
     conjunction,
@@ -70,6 +72,8 @@ class Lowering:
         plant_invariants: State invariants of plants.
         initial: Predicates on the initial states.
         marker: Predicates on the marked states.
+        event_places: Place of the declaration of each event.
+        plant_reads: What plants read, with the places where they do.
         depends: Variables that the initial value of a variable reads, with the places where it does.
     """
 
@@ -84,6 +88,8 @@ class Lowering:
     plant_invariants: list[Expression] = field(default_factory=list)
     initial: list[Expression] = field(default_factory=list)
     marker: list[Expression] = field(default_factory=list)
+    event_places: dict[str, Location] = field(default_factory=dict)
+    plant_reads: list[tuple[Expression, Location]] = field(default_factory=list)
     depends: dict[tuple[str, str], dict[tuple[str, str], Location]] = field(default_factory=dict)
 
     # Findings
@@ -103,6 +109,13 @@ class Lowering:
             return TRUE
         return term.core
 
+    def used_by(self, role: str | None, term: Term, scope: Scope, at: Location) -> Expression:
+        """The expression of a term that a plant or a requirement uses."""
+        found = self.used(term, scope, at)
+        if role == "plant":
+            self.plant_reads.append((found, at))
+        return found
+
     # The whole
 
     def lowered(self, name: str) -> tuple[System, SystemPlaces]:
@@ -117,7 +130,37 @@ class Lowering:
             if scope.is_automaton:
                 self._automaton(scope)
         self._check_initial_values()
+        if not self.typing.findings.has_errors:
+            self._warn()
         return self._system(name)
+
+    def _warn(self) -> None:
+        """Report what is mostly meant otherwise: plants that read requirements, and events that never happen."""
+        warn = self.typing.findings.warning
+        requirements = {item.name for item in self.automata if item.role is Role.REQUIREMENT}
+        for expression, at in self.plant_reads:
+            read = {leaf.component for leaf in leaves(expression) if isinstance(leaf, VariableRead | StateTest)}
+            if names := sorted(read & requirements):
+                message = f"a plant reads the state of the requirement '{names[0]}'"
+                warn("cif-plant-reads-requirement", message, at, "Make it a plant, or let a requirement say this.")
+        # An invariant about an event that is in no alphabet has a finding of its own.
+        excluded = {item.event.name for item in self.exclusions}
+        unused: dict[Location, list[str]] = {}
+        for event, at in self.event_places.items():
+            having = [item for item in self.automata if event in item.alphabet]
+            if not having and event not in excluded:
+                unused.setdefault(at, []).append(event)
+            for item in having:
+                guards = [edge.guard for edge in item.edges if edge.event == event]
+                if event not in item.monitors and all(guard == FALSE for guard in guards):
+                    why = "has only edges of it whose guards are false" if guards else "has no edge of it"
+                    message = f"'{event}' never happens: '{item.name}' {why}"
+                    fix = "Add an edge, or take the event out of the alphabet."
+                    warn("cif-event-never-happens", message, self.places[item.name], fix)
+        for at, events in unused.items():
+            more = f" and {len(events) - 1} more" if len(events) > 1 else ""
+            message = f"no automaton has '{events[0]}'{more} in its alphabet"
+            warn("cif-unused-event", message, at, "Remove it, or use it on an edge.")
 
     def _system(self, name: str) -> tuple[System, SystemPlaces]:
         alphabet = frozenset[str]().union(*(item.alphabet for item in self.automata))
@@ -168,7 +211,8 @@ class Lowering:
                                  "Use a discrete variable.")  # fmt: skip
             case syntax.Predicates(word=word, predicates=predicates, at=at):
                 term = self.typing.conjunction(predicates, scope)
-                (self.initial if word == "initial" else self.marker).append(self.used(term, scope, at))
+                found = self.initial if word == "initial" else self.marker
+                found.append(self.used_by(scope.role, term, scope, at))
             case syntax.Invariant():
                 self._invariant(item, scope, None)
             case syntax.Equation():
@@ -184,6 +228,7 @@ class Lowering:
                              "Write 'controllable' or 'uncontrollable' before it.")  # fmt: skip
         elif scope.is_real:
             self.events.append(Event(name, item.is_controllable))
+            self.event_places[name] = item.name.at
 
     def _input(self, item: syntax.Input, name: str, scope: Scope) -> None:
         written = self.typing.type(item.type, scope)
@@ -237,7 +282,7 @@ class Lowering:
             predicate = negation(predicate)
         if place is not None:
             predicate = logic("=>", place, predicate)
-        condition = self.used(predicate, scope, item.predicate.at)
+        condition = self.used_by(item.role, predicate, scope, item.predicate.at)
         if not scope.is_real:
             return
         if item.form is syntax.InvariantForm.STATE:
@@ -340,6 +385,7 @@ class Lowering:
             return bool(term.value)
         condition = logic("=>", self.typing.location(scope, place), term)
         if scope.is_real and self.typing.usable(term, found[0].at):
+            self.used_by(scope.role, term, scope, found[0].at)
             predicates.append(condition.core)
         return True
 
@@ -416,11 +462,14 @@ class Lowering:
     # Edges
 
     def _edges(self, item: syntax.Edge, place: syntax.LocationDeclaration, scope: Scope) -> list[Edge]:
-        guard = self.used(self.typing.conjunction(item.guards, scope), scope, item.at)
+        at = item.guards[0].at if item.guards else item.at
+        guard = self.used_by(scope.role, self.typing.conjunction(item.guards, scope), scope, at)
         self.typing.is_receiving = bool(item.events) and all(event.use == "?" for event in item.events)
         assigned = Updates(self.typing).assigned(item.updates, scope)
         self.typing.is_receiving = False
-        updates = tuple(Assignment(name, self.used(new.term, scope, new.at)) for name, new in assigned.items())
+        updates = tuple(
+            Assignment(name, self.used_by(scope.role, new.term, scope, new.at)) for name, new in assigned.items()
+        )
         target = self._target(item, place, scope)
         if not item.events:
             self.unsupported(scope, "this edge has no event, which means 'tau'", item.at, "Give it an event.")

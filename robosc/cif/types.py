@@ -61,7 +61,8 @@ class CifType:
             case "enum":
                 return self.name
             case "list":
-                bounds = "" if self.low is None else f"[{self.low}..{self.high}]"
+                length = f"{self.low}" if self.low == self.high else f"{self.low}..{self.high}"
+                bounds = "" if self.low is None else f"[{length}]"
                 return f"list{bounds} {self.parts[0]}"
             case "set" | "dist":
                 return f"{self.kind} {self.parts[0]}"

@@ -349,9 +349,9 @@ class Lowering:
         """The alphabet of an automaton, and the events that it monitors."""
         found: dict[str, frozenset[str] | None] = {"alphabet": None, "monitor": None}
         used = frozenset(edge.event for edge in edges)
-        for item in scope.body:
-            if not isinstance(item, syntax.Alphabet):
-                continue
+        lists = [item for item in scope.body if isinstance(item, syntax.Alphabet)]
+        # What is monitored is in the alphabet, wherever that stands.
+        for item in sorted(lists, key=lambda item: item.word):
             if found[item.word] is not None:
                 self.error("cif-structure", f"there are two of '{item.word}' in '{scope.path}'", item.at,
                            "Join them.")  # fmt: skip
@@ -432,7 +432,7 @@ class Lowering:
         whole = truth(False)
         for term, at in terms:
             whole = logic("or", whole, self.typing.equality(own, term, at))
-        self.initial.append(self.used(whole, scope, item.name.at))
+        self.initial.append(self.used_by(scope.role, whole, scope, item.name.at))
         names = [old.expression.variable for old in flat(own) if isinstance(old.expression, VariableRead)]
         for term, at in terms:
             for part in flat(term):

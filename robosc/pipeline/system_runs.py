@@ -232,9 +232,7 @@ class SystemRun(ManualRun):
         for name in wanted:
             if name not in self._places:
                 raise UnknownNameError(unknown_event(name, self._places, "part of the state"))
-        found = [
-            state for state in states if all(state[self._places[name]] == part for name, part in wanted.items())
-        ]
+        found = [state for state in states if all(state[self._places[name]] == part for name, part in wanted.items())]
         if len(found) == 1:
             return found[0]
         offered = self._alternatives(found or states)

@@ -309,8 +309,8 @@ class Operators:
         type_ = CifType(node.kind, length, length, tuple(parts), is_open=True)
         if not all(item.is_static for item in items):
             return broken(type_, *items, problem=Problem(f"this makes a {node.kind} of values of a state", node.at))
-        whole = [parts[index % len(parts)] for index in range(len(items))]
-        values = [widened(item, part).value for item, part in zip(items, whole, strict=True)]
+        expected = [parts[index % len(parts)] for index in range(len(items))]
+        values = [widened(item, part).value for item, part in zip(items, expected, strict=True)]
         if node.kind == "dict":
             if len(set(values[::2])) < len(items) // 2:
                 return self.mismatch("two keys of this dictionary are the same", node.at, "Leave one of them out.")

@@ -129,7 +129,7 @@ def counter(declarations: str, edge: str, location: str = "") -> str:
         (counter("const dict(int: int) d = {1: 2, 3: 4} - [1]; const bool b = d = {3: 4};", "when b do x := 1"), 2),
         (counter('const string s = fmt("%03d|%.2f|%s|%b|%x|%2$-4d|", 7, 2, [1.0], true, 255);'
                  ' const bool b = s = "007|2.00|[1.0]|true|ff|2   |";', "when b do x := 1"), 2),
-        (counter('const bool b = <string>1e7 = "1.0e7" and <string>0.00025 = "2.5e-4" and <string>-12.5 = "-12.5";',
+        (counter('const bool b = <string>1e7 = "1.0e7" and <string>0.00025 = "2.5e-4" and <string>(-12.5) = "-12.5";',
                  "when b do x := 1"), 2),
         (counter("const int n = pop([2, 3])[0] + del([1, 2], 0)[0] - floor(scale(1, 0, 2, 0, 4));", "do x := n"), 2),
         (counter("const tuple(bool a; int[0..1] b) l = (true, 1); const int n = switch l: case (true, 1): 1 case (true, 0): 2"

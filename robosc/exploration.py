@@ -15,7 +15,7 @@ from robosc.automata.semantics import Semantics
 from robosc.automata.state import Subject, subjects
 from robosc.automata.structure import Automaton, Edge, System
 from robosc.errors import UnsupportedModelError
-from robosc.expressions import Value
+from robosc.expressions import ITSELF, Value
 from robosc.expressions.text import automaton_text
 from robosc.graphviz import can_draw, drawn
 from robosc.model.structure import Communication, Model
@@ -208,9 +208,9 @@ def marks(system: System, model: Model) -> Callable[[Mapping[str, str], Mapping[
 
 
 def _named_automata(system: System, model: Model | None) -> list[str]:
-    """The automata that are shown under their own names: the components, or all automata if there is no model."""
+    """The automata whose locations are shown: the components; without a model all but those of input variables."""
     if model is None:
-        return [automaton.name for automaton in system.automata]
+        return [item.name for item in system.automata if ITSELF not in {variable.name for variable in item.variables}]
     return [item.name for item in model.components if item.behaviour]
 
 

@@ -76,12 +76,14 @@ class Bundle(msgspec.Struct, frozen=True):
         interfaces: Definitions of middleware types that the files use, named like `std_msgs/msg/Bool.msg`, as far as
             they were found, with all that they are made of, and the types of a package that lacks one, named like
             `std_msgs/types.txt`; they are checked against but are no part of the model.
+        aliases: Other names of files, such as that of a link, with the name that the file has here.
     """
 
     main: SourceFile
     libraries: tuple[SourceFile, ...] = ()
     searched: tuple[str, ...] = ()
     interfaces: tuple[SourceFile, ...] = ()
+    aliases: tuple[tuple[str, str], ...] = ()
 
     @property
     def files(self) -> tuple[SourceFile, ...]:
@@ -90,6 +92,7 @@ class Bundle(msgspec.Struct, frozen=True):
 
     def file(self, name: str) -> SourceFile | None:
         """The file called `name`, or None."""
+        name = dict(self.aliases).get(name, name)
         return next((file for file in self.files if file.name == name), None)
 
     @property

@@ -152,7 +152,9 @@ class EdgesTaken:
         state = tuple(parts[name] for name in self._subjects)
         found = []
         for name, edges in self._edges.get(step.event, {}).items():
-            taken = before.components[name], step.state.components[name]
+            # An input variable has one location, which states leave out.
+            only = edges[0][1][0]
+            taken = before.components.get(name, only), step.state.components.get(name, only)
             fitting = [number for number, way, guard in edges if way == taken and guard(state, NO_DATA) is True]
             if len(fitting) == 1:
                 found += fitting
@@ -164,7 +166,7 @@ def distinct_initial_states(system: System, states: Sequence[StateInWords]) -> t
     inputs = _input_names(system)
     found: dict[tuple[Any, ...], StateInWords] = {}
     for state in states:
-        own = tuple(value for name, value in state.parts.items() if name.rpartition(".")[0] not in inputs)
+        own = tuple(value for name, value in state.parts.items() if name not in inputs)
         found.setdefault(own, state)
     return tuple(found.values())
 

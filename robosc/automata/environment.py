@@ -3,7 +3,7 @@
 import msgspec
 
 from robosc.automata.structure import Assignment, Automaton, DiscreteVariable, Edge, Event, InputVariable
-from robosc.expressions import Expression, Received, Type, VariableRead, domain
+from robosc.expressions import ITSELF, Expression, Received, Type, VariableRead, domain
 
 _LOCATION = "here"
 
@@ -32,7 +32,7 @@ def environment_variable(name: str, type_: Type) -> EnvironmentVariable:
         type_: A finite type.
     """
     event = Event(f"{name}.changes", is_controllable=False)
-    edge = Edge(_LOCATION, event.name, _LOCATION, updates=(Assignment("value", Received()),))
+    edge = Edge(_LOCATION, event.name, _LOCATION, updates=(Assignment(ITSELF, Received()),))
     automaton = Automaton(
         name=name,
         locations=(_LOCATION,),
@@ -40,6 +40,6 @@ def environment_variable(name: str, type_: Type) -> EnvironmentVariable:
         marked=frozenset({_LOCATION}),
         alphabet=frozenset({event.name}),
         edges=(edge,),
-        variables=(DiscreteVariable("value", type_, tuple(domain(type_))),),
+        variables=(DiscreteVariable(ITSELF, type_, tuple(domain(type_))),),
     )
-    return EnvironmentVariable(automaton, event, InputVariable(event.name, (), type_), VariableRead(name, "value"))
+    return EnvironmentVariable(automaton, event, InputVariable(event.name, (), type_), VariableRead(name, ITSELF))

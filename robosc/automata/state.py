@@ -4,6 +4,7 @@ import msgspec
 
 from robosc.automata.structure import System
 from robosc.expressions import Type, Value, domain
+from robosc.expressions.text import variable_text
 
 
 class Subject(msgspec.Struct, frozen=True):
@@ -18,7 +19,7 @@ class Subject(msgspec.Struct, frozen=True):
     variable: str | None = None
 
     def __str__(self) -> str:
-        return self.automaton if self.variable is None else f"{self.automaton}.{self.variable}"
+        return self.automaton if self.variable is None else variable_text(self.automaton, self.variable)
 
 
 def subjects(system: System) -> tuple[Subject, ...]:

@@ -20,7 +20,7 @@ from robosc.certification.strategies import verify_strategy
 from robosc.controller_properties import Controller, check_controller
 from robosc.errors import Diagnostic, sorted_diagnostics
 from robosc.expressions import Value
-from robosc.expressions.text import automaton_text
+from robosc.expressions.text import automaton_text, variable_text
 from robosc.model.check import check
 from robosc.model.layers import layer_findings
 from robosc.model.structure import CommunicationKind, Deployment, Model
@@ -301,11 +301,11 @@ def _beliefs(certificate: Certificate, found: Verification, goals: CheckOutcome 
 def state_in_words(system: System, model: Model | None, state: State) -> StateInWords:
     """A state of automata in the words of their model; without one, the location of each automaton is reported."""
     values = {(item.automaton, item.variable): value for item, value in zip(subjects(system), state, strict=True)}
-    variables = {f"{owner}.{name}": value for (owner, name), value in values.items() if name is not None}
+    variables = {variable_text(owner, name): value for (owner, name), value in values.items() if name is not None}
     if model is None:
-        return StateInWords(
-            {owner: str(value) for (owner, name), value in values.items() if name is None}, variables, {}
-        )
+        locations = {owner: str(value) for (owner, name), value in values.items() if name is None}
+        # Of an input variable, whose automaton has one location, the value is all that there is.
+        return StateInWords({owner: item for owner, item in locations.items() if owner not in variables}, variables, {})
     components = {item.name for item in model.components}
     plants = [
         communication_plant_name(item)

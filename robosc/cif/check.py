@@ -37,15 +37,34 @@ def load_cif(path: Path, text: str | None = None) -> Bundle:
     """
     main = SourceFile(path.name, read_source(path, path.name) if text is None else text)
 
+    known = {_identity(path): main}
+    aliases: dict[str, str] = {}
+
     def read(name: str) -> SourceFile | None:
         try:
-            return SourceFile(name, read_source(path.parent / name, name))
+            # One file may have many names: by links, and by upper and lower case where the system ignores it.
+            identity = _identity(path.parent / name)
+            if identity in known:
+                aliases[name] = known[identity].name
+            else:
+                known[identity] = SourceFile(name, read_source(path.parent / name, name))
+            return known[identity]
         except OSError:
             # `check_cif` reports the missing file where it is imported.
             return None
 
     files, _ = _imported(main, read, Findings())
-    return Bundle(main, tuple(sorted((file for file, _ in files[1:]), key=lambda file: file.name)))
+    libraries = sorted((file for file, _ in files[1:]), key=lambda file: file.name)
+    return Bundle(main, tuple(libraries), aliases=tuple(sorted(aliases.items())))
+
+
+def _identity(path: Path) -> object:
+    """Return what two names of one file have in common; of a text without a file, its name."""
+    try:
+        found = path.stat()
+    except OSError:
+        return path.resolve()
+    return found.st_dev, found.st_ino
 
 
 def check_cif(bundle: Bundle) -> CheckedSystem:
@@ -99,7 +118,8 @@ def _imported(main: SourceFile, read: Callable[[str], SourceFile | None], findin
             if other is None:
                 findings.diagnostics.append(_missing(item, name))
                 has_all = False
-            else:
+            elif other.name == name or _same(other.name) not in seen:
+                seen.add(_same(other.name))
                 waiting.append(other)
     return found, has_all
 

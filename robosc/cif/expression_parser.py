@@ -1,5 +1,7 @@
 """Expressions and types of CIF, read by recursive descent with the precedence of the language."""
 
+from math import isinf
+
 from robosc.cif import syntax
 from robosc.cif.cursor import Cursor
 from robosc.cif.reserved_words import FUNCTIONS
@@ -138,7 +140,10 @@ class ExpressionParser(Cursor):
             return syntax.Literal(self.integer(), at)
         if kind == _REAL:
             self.place += 1
-            return syntax.Literal(float(word), at)
+            value = float(word)
+            if isinf(value):
+                self.report("the number is larger than real numbers can be", at, "Use a number below 1.8e308.")
+            return syntax.Literal(value, at)
         if kind == _STRING:
             return syntax.Literal(self.string(), at)
         match word:

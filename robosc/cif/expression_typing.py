@@ -20,10 +20,15 @@ from robosc.cif.terms import (
     static,
     truth,
     tuple_parts,
+    values_of,
+    widened,
 )
-from robosc.cif.types import AUTOMATON, BOOL, REAL, STRING, UNKNOWN, CifType, fits, is_compatible
+from robosc.cif.types import AUTOMATON, BOOL, REAL, STRING, CifType, fits, overlaps
 from robosc.expressions import StateTest
 from robosc.source import Location
+
+MAXIMUM_CASES = 100_000
+"""Values of a type beyond which a switch over it needs `else`."""
 
 NAMELESS = "*"
 """Name of a location that has none; no identifier can be it."""
@@ -38,12 +43,16 @@ class ExpressionTyping(ABC):
 
     Args:
         scopes: The scopes.
+
+    Attributes:
+        is_receiving: True in the updates of an edge that receives a value.
     """
 
     def __init__(self, scopes: Scopes) -> None:
         self.scopes = scopes
         self.findings = scopes.findings
         self._operators = Operators(scopes.findings)
+        self.is_receiving = False
 
     @abstractmethod
     def type(self, written: syntax.Type, scope: Scope) -> CifType:
@@ -71,6 +80,10 @@ class ExpressionTyping(ABC):
         if term.type.kind not in ("bool", "unknown"):
             return self.mismatch(f"this must be a boolean; it is {of_type(term.type)}", node.at)
         return term
+
+    def equality(self, left: Term, right: Term, at: Location) -> Term:
+        """The term that two terms have the same value."""
+        return self._operators.equality("=", at, left, right)
 
     def conjunction(self, nodes: tuple[syntax.Expression, ...], scope: Scope) -> Term:
         """The term of predicates that all must hold."""
@@ -187,17 +200,12 @@ class ExpressionTyping(ABC):
     def _values_of(self, subject: Term) -> set[Any] | None:
         """Every value that a switch must cover; None if there are too many to cover."""
         match subject.type.kind:
-            case "bool":
-                return {False, True}
-            case "enum":
-                return set(subject.type.names)
-            case "int" if subject.type.low is not None and subject.type.range[1] - subject.type.low < 100_000:
-                return set(range(subject.type.low, subject.type.range[1] + 1))
             case "automaton":
                 places = [item for item in subject.value.body if isinstance(item, syntax.LocationDeclaration)]
                 return {item.name.text if item.name is not None else NAMELESS for item in places}
             case _:
-                return None
+                found = values_of(subject.type, MAXIMUM_CASES)
+                return None if found is None else set(found)
 
     def _key(self, node: syntax.Switch, key: syntax.Expression, subject: Term, scope: Scope, covered: set[Any]) -> Term:
         """The term that a subject has the value of one case."""
@@ -212,20 +220,20 @@ class ExpressionTyping(ABC):
         value = self.term(key, scope)
         if value.type.kind == "unknown":
             return ERROR
-        if value.is_static and value.type.kind in ("bool", "int", "enum"):
-            covered.add(value.value)
-        return self._operators.equality(syntax.Binary("=", node.subject, key, key.at), subject, value)
+        if value.is_static and overlaps(value.type, subject.type):
+            covered.add(widened(value, subject.type).value)
+        return self.equality(subject, value, key.at)
 
     def _index(self, node: syntax.Index, scope: Scope) -> Term:
         base = self.term(node.base, scope)
         if base.type.kind == "unknown":
             return ERROR
         if base.type.kind == "tuple":
-            return self._field(node, base, scope)
+            return self.field(node, base, scope)
         index = self.term(node.index, scope)
         if index.type.kind == "unknown":
             return ERROR
-        is_key = base.type.kind == "dict" and is_compatible(index.type, base.type.parts[0])
+        is_key = base.type.kind == "dict" and overlaps(index.type, base.type.parts[0])
         if not is_key and (base.type.kind not in ("list", "string") or index.type.kind != "int"):
             return self.mismatch(f"{base.type} has no element {index.type}", node.at)
         result = STRING if base.type.kind == "string" else base.type.parts[-1]
@@ -233,11 +241,12 @@ class ExpressionTyping(ABC):
             return broken(result, base, index, problem=Problem("an element is chosen by a state", node.at))
         try:
             values = dict(base.value) if is_key else base.value
-            return _narrowed(result, values[index.value])
+            return static(result, values[index.value])
         except LookupError:
             return self.mismatch(f"there is no element {index.value!r}", node.at)
 
-    def _field(self, node: syntax.Index, base: Term, scope: Scope) -> Term:
+    def field(self, node: syntax.Index, base: Term, scope: Scope) -> Term:
+        """The term of a field of a tuple, by its name or number."""
         parts = tuple_parts(base)
         if isinstance(node.index, syntax.Name) and str(node.index) in base.type.names:
             return parts[base.type.names.index(str(node.index))]
@@ -255,6 +264,9 @@ class ExpressionTyping(ABC):
             return ERROR
         if base.type.kind not in ("list", "string"):
             return self.mismatch(f"{base.type} cannot be sliced", node.at)
+        for item, bound in zip((node.low, node.high), bounds, strict=True):
+            if item is not None and bound is not None and bound.type.kind != "int":
+                return self.mismatch(f"this must be an integer; it is {of_type(bound.type)}", item.at)
         type_ = STRING if base.type.kind == "string" else CifType("list", parts=base.type.parts)
         known = [item for item in bounds if item is not None]
         if not base.is_static or not all(item.is_static for item in known):
@@ -289,7 +301,9 @@ class ExpressionTyping(ABC):
                     return self.mismatch("'self' is the enclosing automaton, and there is none", node.at)
                 return Term(AUTOMATON, value=scope)
             case "?":
-                return broken(UNKNOWN, problem=Problem("a value is received from a channel", node.at))
+                # That an edge receives anything is reported where its channel is declared.
+                return ERROR if self.is_receiving else self.mismatch("this edge receives no value", node.at,
+                                                                     "Receive one, as in 'edge e?'.")  # fmt: skip
         if node.name is not None:
             self.term(node.name, scope)
         return broken(REAL, problem=Problem("a derivative is read", node.at))
@@ -301,7 +315,3 @@ def _literal(value: bool | int | float | str) -> Term:
     if isinstance(value, int):
         return number(value)
     return static(REAL if isinstance(value, float) else STRING, value)
-
-
-def _narrowed(type_: CifType, value: Any) -> Term:
-    return number(value) if type_.kind == "int" else static(type_, value)

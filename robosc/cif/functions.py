@@ -4,9 +4,10 @@ import math
 from collections.abc import Callable, Mapping
 
 from robosc.cif import syntax
-from robosc.cif.operators import Operators
+from robosc.cif.operators import Operators, value_text
 from robosc.cif.terms import MATHEMATICS, Problem, Term, broken, made, number, rounded, static, truth
-from robosc.cif.types import BOOL, REAL, STRING, UNKNOWN, CifType, integer
+from robosc.cif.text_patterns import formatted
+from robosc.cif.types import BOOL, REAL, STRING, CifType, integer
 from robosc.expressions import MAXIMUM_INTEGER, MINIMUM_INTEGER, Call
 from robosc.expressions.bounds import call_bounds
 
@@ -42,24 +43,79 @@ def call(operators: Operators, node: syntax.Call, arguments: list[Term]) -> Term
             case _ if name in MATHEMATICS and len(kinds) == 1 and numbers:
                 if not is_static:
                     return _broken(REAL, node, arguments)
-                return static(REAL, MATHEMATICS[name](float(values[0])))
+                return operators.real(MATHEMATICS[name](float(values[0])), node.at)
             case "size" if kinds in (["list"], ["set"], ["dict"], ["string"]):
                 return number(len(values[0])) if is_static else _broken(_INTEGER, node, arguments)
             case "empty" if kinds in (["list"], ["set"], ["dict"]):
                 return truth(not values[0]) if is_static else _broken(BOOL, node, arguments)
+            case "fmt" if kinds[:1] == ["string"]:
+                return _formatted(operators, node, arguments)
+            case "scale" if len(kinds) == 5 and numbers:
+                if not is_static:
+                    return _broken(REAL, node, arguments)
+                return _scaled(operators, node, [float(value) for value in values])
+            case "pop" if kinds == ["list"]:
+                return _popped(operators, node, arguments[0])
+            case "del" if kinds == ["list", "int"]:
+                return _deleted(operators, node, arguments)
+            case _ if name in _DISTRIBUTIONS and (name == "constant" or numbers):
+                kind = _DISTRIBUTIONS[name] or (REAL if "real" in kinds else arguments[0].type if kinds else REAL)
+                problem = Problem("this makes a distribution", node.at)
+                return broken(CifType("dist", parts=(kind,)), *arguments, problem=problem)
     except (ValueError, OverflowError):
         return operators.mismatch(f"'{name}' has no value here", node.at)
-    if name in ("fmt", "scale", "pop", "del") or name not in _CHECKED:
-        result = {"fmt": STRING, "scale": REAL}.get(name, UNKNOWN)
-        if result.kind == "unknown":
-            operators.error("cif-unsupported", f"synthesis does not know the function '{name}'", node.at,
-                         "Write its value instead.")  # fmt: skip
-        return _broken(result, node, arguments)
     types = " and ".join(str(item.type) for item in arguments) or "nothing"
     return operators.mismatch(f"'{name}' does not take {types}", node.at)
 
 
-_CHECKED = frozenset({*_WHOLE, *MATHEMATICS, "abs", "min", "max", "sign", "pow", "size", "empty"})
+_DISTRIBUTIONS: Mapping[str, CifType | None] = (
+    dict.fromkeys("beta erlang exponential gamma lognormal normal random triangle weibull".split(), REAL)
+    | dict.fromkeys(("binomial", "geometric", "poisson"), _INTEGER)
+    | {"bernoulli": BOOL, "uniform": None, "constant": None}
+)
+"""Type of the samples of each distribution; None: that of its parameters."""
+
+
+def _formatted(operators: Operators, node: syntax.Call, arguments: list[Term]) -> Term:
+    pattern = node.arguments[0]
+    if not isinstance(pattern, syntax.Literal):
+        return operators.mismatch("the pattern of 'fmt' must be written out", pattern.at, "Write a text in quotes.")
+    if not all(item.is_static for item in arguments):
+        return _broken(STRING, node, arguments)
+    try:
+        return static(STRING, formatted(str(pattern.value), arguments[1:], value_text))
+    except ValueError as error:
+        return operators.mismatch(str(error), pattern.at, "Write a specifier that fits for each value.")
+
+
+def _scaled(operators: Operators, node: syntax.Call, values: list[float]) -> Term:
+    value, low, high, least, greatest = values
+    if low == high:
+        return operators.mismatch("'scale' has no value here", node.at)
+    return operators.real(least + (value - low) / (high - low) * (greatest - least), node.at)
+
+
+def _popped(operators: Operators, node: syntax.Call, term: Term) -> Term:
+    """The first element of a list, and the others."""
+    element = term.type.parts[0]
+    type_ = CifType("tuple", parts=(element, CifType("list", parts=(element,))))
+    if not term.is_static:
+        return _broken(type_, node, [term])
+    if not term.value:
+        return operators.mismatch("'pop' has no value here", node.at)
+    return static(type_, (term.value[0], term.value[1:]))
+
+
+def _deleted(operators: Operators, node: syntax.Call, arguments: list[Term]) -> Term:
+    """A list without the element of an index."""
+    type_ = CifType("list", parts=arguments[0].type.parts)
+    if not all(item.is_static for item in arguments):
+        return _broken(type_, node, arguments)
+    items, index = arguments[0].value, arguments[1].value
+    if not -len(items) <= index < len(items):
+        return operators.mismatch(f"there is no element {index}", node.at)
+    index %= len(items)
+    return static(type_, (*items[:index], *items[index + 1 :]))
 
 
 def _broken(type_: CifType, node: syntax.Call, arguments: list[Term]) -> Term:
@@ -95,7 +151,7 @@ def _power(operators: Operators, node: syntax.Call, arguments: list[Term]) -> Te
     if not (base.is_static and exponent.is_static):
         return _broken(_INTEGER if is_whole else REAL, node, arguments)
     if not is_whole:
-        return static(REAL, math.pow(base.value, exponent.value))
+        return operators.real(math.pow(base.value, exponent.value), node.at)
     if abs(base.value) > 1 and exponent.value > 31:
         return operators.mismatch("the result leaves 32 bits", node.at)
     parity = exponent.value if abs(base.value) > 1 else min(exponent.value, 2 + exponent.value % 2)

@@ -23,18 +23,19 @@ from robosc.automata.environment import environment_variable
 from robosc.automata.structure import InputVariable
 from robosc.cif import syntax
 from robosc.cif.scopes import Entity, Scope, Scopes
-from robosc.cif.terms import ERROR, Term, conditional, logic, negation, tuple_parts
-from robosc.cif.types import CifType, fits, overlaps
+from robosc.cif.terms import Term, flat, logic, negation, truth, widened
+from robosc.cif.types import CifType, fits
 from robosc.cif.typing import NAMELESS, Typing
+from robosc.cif.updates import Updates
 from robosc.expressions import (
+    FALSE,
     TRUE,
-    Binary,
     BooleanType,
     EnumType,
     Expression,
     IntegerType,
+    StateTest,
     Type,
-    Value,
     VariableRead,
     conjunction,
     default_value,
@@ -72,6 +73,8 @@ class Lowering(msgspec.Struct):
         initial: Predicates on the initial states.
         marker: Predicates on the marked states.
         roles: Roles of automata and invariants, with their places.
+        event_places: Place of the declaration of each event.
+        plant_reads: What plants read, with the places where they do.
         depends: Variables that the initial value of a variable reads, with the places where it does.
     """
 
@@ -86,6 +89,8 @@ class Lowering(msgspec.Struct):
     plant_invariants: list[Expression] = msgspec.field(default_factory=list)
     initial: list[Expression] = msgspec.field(default_factory=list)
     marker: list[Expression] = msgspec.field(default_factory=list)
+    event_places: dict[str, Location] = msgspec.field(default_factory=dict)
+    plant_reads: list[tuple[Expression, Location]] = msgspec.field(default_factory=list)
     roles: list[tuple[str, Location]] = msgspec.field(default_factory=list)
     depends: dict[tuple[str, str], dict[tuple[str, str], Location]] = msgspec.field(default_factory=dict)
 
@@ -106,6 +111,13 @@ class Lowering(msgspec.Struct):
             return TRUE
         return term.core
 
+    def used_by(self, role: str | None, term: Term, scope: Scope, at: Location) -> Expression:
+        """The expression of a term that a plant or a requirement uses."""
+        found = self.used(term, scope, at)
+        if role == "plant":
+            self.plant_reads.append((found, at))
+        return found
+
     # The whole
 
     def lowered(self, name: str) -> tuple[System, SystemPlaces]:
@@ -120,7 +132,37 @@ class Lowering(msgspec.Struct):
             if scope.is_automaton:
                 self._automaton(scope)
         self._check_initial_values()
+        if not self.typing.findings.has_errors:
+            self._warn()
         return self._system(name)
+
+    def _warn(self) -> None:
+        """Report what is mostly meant otherwise: plants that read requirements, and events that never happen."""
+        warn = self.typing.findings.warning
+        requirements = {item.name for item in self.automata if item.role is Role.REQUIREMENT}
+        for expression, at in self.plant_reads:
+            read = {leaf.component for leaf in leaves(expression) if isinstance(leaf, VariableRead | StateTest)}
+            if names := sorted(read & requirements):
+                message = f"a plant reads the state of the requirement '{names[0]}'"
+                warn("cif-plant-reads-requirement", message, at, "Make it a plant, or let a requirement say this.")
+        # An invariant about an event that is in no alphabet has a finding of its own.
+        excluded = {item.event.name for item in self.exclusions}
+        unused: dict[Location, list[str]] = {}
+        for event, at in self.event_places.items():
+            having = [item for item in self.automata if event in item.alphabet]
+            if not having and event not in excluded:
+                unused.setdefault(at, []).append(event)
+            for item in having:
+                guards = [edge.guard for edge in item.edges if edge.event == event]
+                if event not in item.monitors and all(guard == FALSE for guard in guards):
+                    why = "has only edges of it whose guards are false" if guards else "has no edge of it"
+                    message = f"'{event}' never happens: '{item.name}' {why}"
+                    fix = "Add an edge, or take the event out of the alphabet."
+                    warn("cif-event-never-happens", message, self.places[item.name], fix)
+        for at, events in unused.items():
+            more = f" and {len(events) - 1} more" if len(events) > 1 else ""
+            message = f"no automaton has '{events[0]}'{more} in its alphabet"
+            warn("cif-unused-event", message, at, "Remove it, or use it on an edge.")
 
     def _system(self, name: str) -> tuple[System, SystemPlaces]:
         alphabet = frozenset[str]().union(*(item.alphabet for item in self.automata))
@@ -128,6 +170,10 @@ class Lowering(msgspec.Struct):
         conditions: dict[bool, list[tuple[EventCondition, Location]]] = {True: [], False: []}
         for item in self.exclusions:
             event = item.event.name
+            declaration = item.event.declaration
+            if isinstance(declaration, syntax.Event) and declaration.data is not None:
+                # It is refused where it is declared.
+                continue
             if event not in alphabet:
                 message = f"no automaton has '{event}' in its alphabet, so this excludes nothing"
                 self.typing.findings.warning("cif-no-effect", message, item.at, "Remove it, or use the event.")
@@ -179,7 +225,8 @@ class Lowering(msgspec.Struct):
                                  "Use a discrete variable.")  # fmt: skip
             case syntax.Predicates(word=word, predicates=predicates, at=at):
                 term = self.typing.conjunction(predicates, scope)
-                (self.initial if word == "initial" else self.marker).append(self.used(term, scope, at))
+                found = self.initial if word == "initial" else self.marker
+                found.append(self.used_by(scope.role, term, scope, at))
             case syntax.Invariant():
                 self._invariant(item, scope, None)
             case syntax.Equation():
@@ -195,10 +242,14 @@ class Lowering(msgspec.Struct):
                              "Write 'controllable' or 'uncontrollable' before it.")  # fmt: skip
         elif scope.is_real:
             self.events.append(Event(name, item.is_controllable))
+            self.event_places[name] = item.name.at
 
     def _input(self, item: syntax.Input, name: str, scope: Scope) -> None:
-        type_ = self._variable_type(item.name, item.type, scope)
-        if type_ is not None and scope.is_real:
+        written = self.typing.type(item.type, scope)
+        if not self._is_variable(item.name, written, scope, has_fields=False):
+            return
+        type_ = core_type(written)
+        if scope.is_real:
             made = environment_variable(name, type_)
             edges = tuple(replace(edge, event=name) for edge in made.automaton.edges)
             self.automata.append(replace(made.automaton, alphabet=frozenset({name}), edges=edges))
@@ -206,20 +257,21 @@ class Lowering(msgspec.Struct):
             self.events.append(Event(name, is_controllable=False))
             self.inputs.append(replace(made.received, event=name))
 
-    def _variable_type(self, name: syntax.Identifier, written: syntax.Type, scope: Scope) -> Type | None:
-        """The type of a variable; None if synthesis does not take it, which has been reported."""
-        type_ = self.typing.type(written, scope)
+    def _is_variable(self, name: syntax.Identifier, type_: CifType, scope: Scope, *, has_fields: bool = True) -> bool:
+        """Return True if synthesis takes a variable of a type; report what it does not take."""
         if type_.kind == "unknown":
-            return None
-        if not type_.is_finite:
+            return False
+        if not type_.is_finite or (type_.kind == "tuple" and not has_fields):
             self.unsupported(scope, f"'{scope.absolute(name.text)}' has the type {type_}", name.at,
                              "Use a boolean, an enum or an integer with a range.")  # fmt: skip
-            return None
+            return False
+        if type_.kind == "tuple":
+            return all(self._is_variable(name, part, scope) for part in type_.parts)
         if type_.kind == "int" and type_.range[1] - type_.range[0] >= MAXIMUM_VALUES:
             message = f"'{scope.absolute(name.text)}' has more than {MAXIMUM_VALUES} values"
             self.error("cif-too-large", message, name.at, "Use a smaller range.")
-            return None
-        return core_type(type_)
+            return False
+        return True
 
     def _equation(self, item: syntax.Equation, scope: Scope) -> None:
         entry = scope.entries.get(item.name.text)
@@ -246,7 +298,7 @@ class Lowering(msgspec.Struct):
             predicate = negation(predicate)
         if place is not None:
             predicate = logic("=>", place, predicate)
-        condition = self.used(predicate, scope, item.predicate.at)
+        condition = self.used_by(item.role, predicate, scope, item.predicate.at)
         if not scope.is_real:
             return
         if item.form is syntax.InvariantForm.STATE:
@@ -282,7 +334,8 @@ class Lowering(msgspec.Struct):
                              "Make it a plant, a requirement or a supervisor.")  # fmt: skip
         elif scope.is_real:
             self.roles.append((scope.role, scope.at))
-        variables = [self._variable(item, scope) for item in scope.body if isinstance(item, syntax.Discrete)]
+        discrete = [item for item in scope.body if isinstance(item, syntax.Discrete)]
+        variables = [variable for item in discrete for variable in self._variables(item, scope)]
         edges = [edge for place in places for item in place.edges for edge in self._edges(item, place, scope)]
         initial = [_name(place) for place in places if self._holds(place, "initial", scope, self.initial)]
         marked = [_name(place) for place in places if self._holds(place, "marked", scope, self.marker)]
@@ -303,7 +356,7 @@ class Lowering(msgspec.Struct):
                 marked=frozenset(marked),
                 alphabet=alphabet,
                 edges=tuple(edge for edge in edges if edge.event in alphabet),
-                variables=tuple(item for item in variables if item is not None),
+                variables=tuple(variables),
                 role=Role.REQUIREMENT if scope.role in ("requirement", "supervisor") else Role.PLANT,
                 monitors=monitors,
             )
@@ -313,9 +366,9 @@ class Lowering(msgspec.Struct):
         """The alphabet of an automaton, and the events that it monitors."""
         found: dict[str, frozenset[str] | None] = {"alphabet": None, "monitor": None}
         used = frozenset(edge.event for edge in edges)
-        for item in scope.body:
-            if not isinstance(item, syntax.Alphabet):
-                continue
+        lists = [item for item in scope.body if isinstance(item, syntax.Alphabet)]
+        # What is monitored is in the alphabet, wherever that stands.
+        for item in sorted(lists, key=lambda item: item.word):
             if found[item.word] is not None:
                 self.error("cif-structure", f"there are two of '{item.word}' in '{scope.path}'", item.at,
                            "Join them.")  # fmt: skip
@@ -349,44 +402,61 @@ class Lowering(msgspec.Struct):
             return bool(term.value)
         condition = logic("=>", self.typing.location(scope, place), term)
         if scope.is_real and self.typing.usable(term, found[0].at):
+            self.used_by(scope.role, term, scope, found[0].at)
             predicates.append(condition.core)
         return True
 
-    def _variable(self, item: syntax.Discrete, scope: Scope) -> DiscreteVariable | None:
-        type_ = self._variable_type(item.name, item.type, scope)
-        terms = [(self.typing.term(value, scope), value.at) for value in item.values]
+    def _variables(self, item: syntax.Discrete, scope: Scope) -> list[DiscreteVariable]:
+        """The variables of a declaration: one, or one for each field of a tuple."""
         wanted = self.typing.type(item.type, scope)
+        is_variable = self._is_variable(item.name, wanted, scope)
+        terms = [(self.typing.term(value, scope), value.at) for value in item.values]
         if "unknown" in (wanted.kind, *(term.type.kind for term, _ in terms)):
-            return None
+            return []
         for term, at in terms:
             if not fits(term.type, wanted):
                 self.typing.mismatch(f"{term.type} does not fit {wanted}", at)
-                return None
-        if type_ is None or not scope.is_real:
-            return None
-        if item.is_any:
-            return DiscreteVariable(item.name.text, type_, tuple(domain(type_)))
-        if not terms:
-            first = wanted.names[0] if wanted.kind == "enum" else None
-            return DiscreteVariable(item.name.text, type_, (default_value(type_, first),))
-        if all(term.is_static for term, _ in terms):
-            values: tuple[Value, ...] = tuple(dict.fromkeys(term.value for term, _ in terms))
-            return DiscreteVariable(item.name.text, type_, values)
-        # Each is asked, so that all that synthesis does not take is reported.
-        usable = [self.typing.usable(term, at) for term, at in terms]
-        if not all(usable):
-            return None
-        own = VariableRead(scope.path, item.name.text)
-        equals = [Binary("=", own, term.core) for term, _ in terms]
-        whole: Expression = equals[0]
-        for other in equals[1:]:
-            whole = Binary("or", whole, other)
-        self.initial.append(whole)
+                return []
+        entry = scope.entries.get(item.name.text)
+        if not is_variable or not scope.is_real or not isinstance(entry, Entity):
+            return []
+        own = self.typing.entity(entry)
+        if own.type.kind == "unknown":
+            return []
+        terms = [(widened(term, wanted), at) for term, at in terms]
+        found = [(old.expression, old.type) for old in flat(own)]
+        parts = [(read.variable, type_) for read, type_ in found if isinstance(read, VariableRead)]
+        is_static = all(term.is_static for term, _ in terms)
+        if not item.is_any and is_static and (len(terms) < 2 or len(parts) == 1):
+            spread = [[part.value for part in flat(term)] for term, _ in terms]
+            if not terms:
+                spread = [[default_value(core_type(type_), type_.names[0] if type_.names else None)
+                           for _, type_ in parts]]  # fmt: skip
+            columns = [tuple(dict.fromkeys(column)) for column in zip(*spread, strict=True)]
+            return [DiscreteVariable(name, core_type(type_), values)
+                    for (name, type_), values in zip(parts, columns, strict=True)]  # fmt: skip
+        if not item.is_any:
+            # Each is asked, so that all that synthesis does not take is reported.
+            usable = [self.typing.usable(part, at) for term, at in terms for part in flat(term)]
+            if not all(usable):
+                return []
+            self._begins(item, scope, own, terms)
+        types = [(name, core_type(type_)) for name, type_ in parts]
+        return [DiscreteVariable(name, type_, tuple(domain(type_))) for name, type_ in types]
+
+    def _begins(self, item: syntax.Discrete, scope: Scope, own: Term, terms: list[tuple[Term, Location]]) -> None:
+        """Let a variable begin with one of several values, which may be those of other variables."""
+        whole = truth(False)
         for term, at in terms:
-            for leaf in leaves(term.core):
-                if isinstance(leaf, VariableRead):
-                    self.depends.setdefault((scope.path, item.name.text), {})[leaf.component, leaf.variable] = at
-        return DiscreteVariable(item.name.text, type_, tuple(domain(type_)))
+            whole = logic("or", whole, self.typing.equality(own, term, at))
+        self.initial.append(self.used_by(scope.role, whole, scope, item.name.at))
+        names = [old.expression.variable for old in flat(own) if isinstance(old.expression, VariableRead)]
+        for term, at in terms:
+            for part in flat(term):
+                for leaf in leaves(part.core):
+                    if isinstance(leaf, VariableRead):
+                        for name in names:
+                            self.depends.setdefault((scope.path, name), {})[leaf.component, leaf.variable] = at
 
     def _check_initial_values(self) -> None:
         """Report initial values that go round in a circle."""
@@ -409,9 +479,14 @@ class Lowering(msgspec.Struct):
     # Edges
 
     def _edges(self, item: syntax.Edge, place: syntax.LocationDeclaration, scope: Scope) -> list[Edge]:
-        guard = self.used(self.typing.conjunction(item.guards, scope), scope, item.at)
-        assigned = self._updates(item.updates, scope)
-        updates = tuple(Assignment(name, self.used(term, scope, at)) for name, (term, at) in assigned.items())
+        at = item.guards[0].at if item.guards else item.at
+        guard = self.used_by(scope.role, self.typing.conjunction(item.guards, scope), scope, at)
+        self.typing.is_receiving = bool(item.events) and all(event.use == "?" for event in item.events)
+        assigned = Updates(self.typing).assigned(item.updates, scope)
+        self.typing.is_receiving = False
+        updates = tuple(
+            Assignment(name, self.used_by(scope.role, new.term, scope, new.at)) for name, new in assigned.items()
+        )
         target = self._target(item, place, scope)
         if not item.events:
             self.unsupported(scope, "this edge has no event, which means 'tau'", item.at, "Give it an event.")
@@ -421,14 +496,27 @@ class Lowering(msgspec.Struct):
                 self.unsupported(scope, "this edge has the event 'tau'", event.at, "Give it an event of its own.")
                 continue
             entity = self._event_of(event.name, scope)
-            if event.value is not None:
-                self.typing.term(event.value, scope)
-            if event.use:
-                word = "sends" if event.use == "!" else "receives"
-                self.unsupported(scope, f"this edge {word} data of a channel", event.at, "Use events without data.")
-            elif entity is not None:
+            self._check_use(event, entity, scope)
+            if entity is not None and not event.use:
                 found.append(Edge(_name(place), entity.name, target, guard, updates))
         return found
+
+    def _check_use(self, event: syntax.EdgeEvent, entity: Entity | None, scope: Scope) -> None:
+        """Check what an edge sends or receives; that synthesis takes no channels is reported where one is declared."""
+        sent = self.typing.term(event.value, scope) if event.value is not None else None
+        if entity is None or not event.use:
+            return
+        assert isinstance(entity.declaration, syntax.Event)  # noqa: S101 - the entity of an event
+        data = entity.declaration.data
+        if data is None:
+            self.typing.mismatch(f"'{event.name}' is no channel", event.at, "Write the event without '!' or '?'.")
+            return
+        type_ = None if data.kind == "void" else self.typing.type(data, entity.scope)
+        if event.use == "!" and (sent is None) != (type_ is None):
+            count = "no value" if sent is None else "a value"
+            self.typing.mismatch(f"'{event.name}' is a channel of {type_ or 'void'}, and is sent {count}", event.at)
+        elif sent is not None and type_ is not None and event.value is not None and not fits(sent.type, type_):
+            self.typing.mismatch(f"{sent.type} does not fit {type_}", event.value.at)
 
     def _target(self, item: syntax.Edge, place: syntax.LocationDeclaration, scope: Scope) -> str:
         if item.target is None:
@@ -438,90 +526,6 @@ class Lowering(msgspec.Struct):
             message = f"'{item.target.text}' is not a location of this automaton"
             self.error("cif-unknown-name", message, item.target.at, "Write the name of one of its locations.")
         return item.target.text
-
-    def _updates(self, items: tuple[syntax.Update, ...], scope: Scope) -> dict[str, tuple[Term, Location]]:
-        """The new value of every variable that is assigned."""
-        found: dict[str, tuple[Term, Location]] = {}
-        for item in items:
-            if isinstance(item, syntax.Assignment):
-                term = self.typing.term(item.value, scope)
-                made = self._assigned(item.address, term, scope)
-            else:
-                made = self._if_update(item, scope)
-            for name, (term, at) in made.items():
-                if name in found:
-                    self.error("cif-assignment", f"'{name}' is assigned twice", at, "Assign it once.")
-                found[name] = (term, at)
-        return found
-
-    def _if_update(self, item: syntax.IfUpdate, scope: Scope) -> dict[str, tuple[Term, Location]]:
-        branches = [(self.typing.conjunction(guards, scope), self._updates(updates, scope))
-                    for guards, updates in item.branches]  # fmt: skip
-        otherwise = self._updates(item.otherwise, scope)
-        found: dict[str, tuple[Term, Location]] = {}
-        for name in dict.fromkeys(name for part in (*(part for _, part in branches), otherwise) for name in part):
-            entry = scope.entries[name]
-            assert isinstance(entry, Entity)  # noqa: S101 - a variable of this automaton
-            old = (self.typing.entity(entry), item.at)
-            term, at = otherwise.get(name, old)
-            for guard, part in reversed(branches):
-                new, at = part.get(name, (old[0], at))
-                kinds = (guard.type.kind, new.type.kind, term.type.kind)
-                term = ERROR if "unknown" in kinds else conditional(guard, new, term, old[0].type)
-            found[name] = (term, at)
-        return found
-
-    def _assigned(self, address: syntax.Expression, term: Term, scope: Scope) -> dict[str, tuple[Term, Location]]:
-        """The variables of an address, with their values."""
-        match address:
-            case syntax.Group(items=items, at=at):
-                return self._several(items, term, scope, at)
-            case syntax.Index(base=base, index=index, at=at):
-                self.unsupported(scope, "this assigns a part of a variable", at, "Assign the whole variable.")
-                self.typing.term(index, scope)
-                self._assigned(base, ERROR, scope)
-                return {}
-            case syntax.Name():
-                return self._one(address, term, scope)
-        raise AssertionError(address)
-
-    def _several(
-        self, items: tuple[syntax.Expression, ...], term: Term, scope: Scope, at: Location
-    ) -> dict[str, tuple[Term, Location]]:
-        if term.type.kind == "tuple" and len(term.type.parts) == len(items):
-            parts = tuple_parts(term)
-        else:
-            if term.type.kind != "unknown":
-                self.typing.mismatch(f"{term.type} has not {len(items)} parts", at)
-            parts = tuple(ERROR for _ in items)
-        found: dict[str, tuple[Term, Location]] = {}
-        for item, part in zip(items, parts, strict=True):
-            for name, value in self._assigned(item, part, scope).items():
-                if name in found:
-                    self.error("cif-assignment", f"'{name}' is assigned twice", value[1], "Assign it once.")
-                found[name] = value
-        return found
-
-    def _one(self, name: syntax.Name, term: Term, scope: Scope) -> dict[str, tuple[Term, Location]]:
-        entity = self.scopes.resolve(name, scope)
-        if entity is None:
-            return {}
-        is_variable = isinstance(entity, Entity) and isinstance(entity.declaration, syntax.Discrete | syntax.Continuous)
-        if not is_variable or not isinstance(entity, Entity):
-            self.scopes.wrong_kind(name, entity, "a discrete variable")
-            return {}
-        if entity.scope is not scope:
-            message = f"'{name}' is a variable of '{entity.scope.path}', which alone may assign it"
-            self.error("cif-assignment", message, name.at, "Let that automaton assign it on an edge of the same event.")
-            return {}
-        own = self.typing.entity(entity)
-        if "unknown" in (own.type.kind, term.type.kind) or isinstance(entity.declaration, syntax.Continuous):
-            return {}
-        if not overlaps(term.type, own.type):
-            self.typing.mismatch(f"{term.type} does not fit {own.type}", name.at)
-            return {}
-        # A variable that synthesis does not take has been reported where it is declared.
-        return {} if own.problems else {entity.identifier.text: (term, name.at)}
 
 
 def core_type(type_: CifType) -> Type:

@@ -1,7 +1,11 @@
 """Operators of CIF's expressions: type, static value and expression of a result, from those of the operands."""
 
+import math
+import re
 from collections.abc import Callable, Mapping
+from decimal import Decimal
 from operator import add, mul, sub
+from typing import Any
 
 from robosc.cif import syntax
 from robosc.cif.terms import (
@@ -20,7 +24,9 @@ from robosc.cif.terms import (
     result_range,
     static,
     truth,
+    tuple_parts,
     tuple_term,
+    widened,
 )
 from robosc.cif.types import (
     BOOL,
@@ -28,6 +34,7 @@ from robosc.cif.types import (
     STRING,
     UNKNOWN,
     CifType,
+    declared,
     integer,
     is_compatible,
     joined,
@@ -52,10 +59,14 @@ class Operators:
 
     Args:
         findings: Findings so far.
+
+    Attributes:
+        is_evaluating: True in the value of a constant, where whatever is known beforehand may be compared.
     """
 
     def __init__(self, findings: Findings) -> None:
         self._findings = findings
+        self.is_evaluating = False
 
     def error(self, code: str, message: str, location: Location, fix: str) -> None:
         """Report an error."""
@@ -89,7 +100,9 @@ class Operators:
         if node.operator == "+":
             return term
         if term.type.kind == "real":
-            return static(REAL, -term.value) if term.is_static else broken(REAL, term)
+            if term.is_static:
+                return static(REAL, -term.value)
+            return broken(REAL, term, problem=Problem("this computes with real numbers", node.at))
         low, high = term.type.range
         if low == MINIMUM_INTEGER:
             if term.type.low is not None:
@@ -97,7 +110,7 @@ class Operators:
             low += 1
         type_ = integer(-high, -low)
         if term.is_static:
-            return number(-term.value)
+            return self._integer(type_ if term.type.low is not None else CifType("int"), -term.value, node.at)
         return made(type_, Unary("-", term.core), term) if term.is_usable else broken(type_, term)
 
     def binary(self, node: syntax.Binary, left: Term, right: Term) -> Term:
@@ -110,40 +123,52 @@ class Operators:
                 return logic(operator, left, right)
             if operator in ("and", "or") and left.type.kind == right.type.kind == "set":
                 return self._sets(node, left, right)
-            return self._unfit(node, left, right)
+            return self._unfit(node.operator, node.at, left, right)
         if operator in ("=", "!="):
-            return self.equality(node, left, right)
+            return self.equality(operator, node.at, left, right)
         if operator in ("in", "sub"):
             return self._membership(node, left, right)
         if left.type.is_number and right.type.is_number:
             if operator in ("<", "<=", ">", ">="):
                 return self._order(node, left, right)
             return self._arithmetic(node, left, right)
-        if operator in ("+", "-") and left.type.kind == right.type.kind:
+        if operator in ("+", "-") and not (left.type.is_number or right.type.is_number):
             return self._collections(node, left, right)
-        return self._unfit(node, left, right)
+        return self._unfit(node.operator, node.at, left, right)
 
-    def _unfit(self, node: syntax.Binary, left: Term, right: Term) -> Term:
-        return self.mismatch(f"'{node.operator}' does not take {left.type} and {right.type}", node.at)
+    def _unfit(self, operator: str, at: Location, left: Term, right: Term) -> Term:
+        return self.mismatch(f"'{operator}' does not take {left.type} and {right.type}", at)
 
-    def equality(self, node: syntax.Binary, left: Term, right: Term) -> Term:
+    def equality(self, operator: str, at: Location, left: Term, right: Term) -> Term:
         """The term of `=` or `!=` between two operands."""
-        if not is_compatible(left.type, right.type) or left.type.kind in ("automaton", "func", "dist"):
-            return self._unfit(node, left, right)
-        if left.is_static and right.is_static and left.type.kind in ("bool", "int", "enum"):
-            return truth((left.value == right.value) is (node.operator == "="))
+        common = joined(left.type, right.type)
+        if common is None or common.kind in ("automaton", "func", "dist"):
+            return self._unfit(operator, at, left, right)
+        left, right = widened(left, common), widened(right, common)
+        if left.is_static and right.is_static and (self.is_evaluating or common.kind in ("bool", "int", "enum")):
+            return truth((left.value == right.value) is (operator == "="))
         if left.type.kind == "bool":
-            return logic(node.operator, left, right)
+            return logic(operator, left, right)
+        if left.parts or right.parts:
+            return self._tuples(operator, at, left, right)
         if left.type.kind not in ("int", "enum"):
-            return broken(BOOL, left, right, problem=Problem(f"values of type {left.type} are compared", node.at))
+            return broken(BOOL, left, right, problem=Problem(f"values of type {left.type} are compared", at))
         if not (left.is_usable and right.is_usable):
             return broken(BOOL, left, right)
         if left.type.kind == "enum":
-            return made(BOOL, enum_comparison(node.operator, left.core, right.core), left, right)
-        return made(BOOL, Binary("=" if node.operator == "=" else "!=", left.core, right.core), left, right)
+            return made(BOOL, enum_comparison(operator, left.core, right.core), left, right)
+        return made(BOOL, Binary("=" if operator == "=" else "!=", left.core, right.core), left, right)
+
+    def _tuples(self, operator: str, at: Location, left: Term, right: Term) -> Term:
+        """Compare tuples that are not both known, field by field."""
+        found = truth(True)
+        for one, other in zip(tuple_parts(left), tuple_parts(right), strict=True):
+            found = logic("and", found, self.equality("=", at, one, other))
+        return found if operator == "=" else negation(found)
 
     def _order(self, node: syntax.Binary, left: Term, right: Term) -> Term:
-        if "real" in (left.type.kind, right.type.kind):
+        is_real = "real" in (left.type.kind, right.type.kind)
+        if is_real and not (self.is_evaluating and left.is_static and right.is_static):
             return broken(BOOL, left, right, problem=Problem("real numbers are compared", node.at))
         if left.is_static and right.is_static:
             a, b = left.value, right.value
@@ -157,7 +182,7 @@ class Operators:
         if operator == "/" or (operator in ("+", "-", "*") and "real" in (left.type.kind, right.type.kind)):
             return self._real(node, left, right)
         if "real" in (left.type.kind, right.type.kind):
-            return self._unfit(node, left, right)
+            return self._unfit(node.operator, node.at, left, right)
         if operator in ("div", "mod") and right.is_static and right.value == 0:
             return self.mismatch("this divides by zero", node.at)
         low, high = result_range(operator, left.type.range, right.type.range)
@@ -168,8 +193,7 @@ class Operators:
             low, high = max(low, MINIMUM_INTEGER), min(high, MAXIMUM_INTEGER)
         type_ = integer(low, high) if is_ranged else CifType("int")
         if left.is_static and right.is_static:
-            a, b = left.value, right.value
-            return number(_ARITHMETIC[operator](a, b))
+            return self._integer(type_, _ARITHMETIC[operator](left.value, right.value), node.at)
         if not (left.is_usable and right.is_usable):
             return broken(type_, left, right)
         if operator in ("div", "mod") and not (right.is_static and right.value > 0):
@@ -185,25 +209,41 @@ class Operators:
             value = {"+": lambda: a + b, "-": lambda: a - b, "*": lambda: a * b, "/": lambda: a / b}[node.operator]()
         except ZeroDivisionError:
             return self.mismatch("this divides by zero", node.at)
-        return static(REAL, value)
+        return self.real(value, node.at)
+
+    def _integer(self, type_: CifType, value: int, at: Location) -> Term:
+        if not MINIMUM_INTEGER <= value <= MAXIMUM_INTEGER:
+            return self.mismatch("the result leaves 32 bits", at)
+        return static(type_, value)
+
+    def real(self, value: float, at: Location) -> Term:
+        """The term of a result that is a real number, if it is one."""
+        if not math.isfinite(value):
+            return self.mismatch("the result is larger than real numbers can be", at)
+        # There is one zero.
+        return static(REAL, value + 0.0)
 
     def _sets(self, node: syntax.Binary, left: Term, right: Term) -> Term:
         type_ = joined(left.type, right.type)
         if type_ is None:
-            return self._unfit(node, left, right)
+            return self._unfit(node.operator, node.at, left, right)
         if not (left.is_static and right.is_static):
             return broken(type_, left, right, problem=Problem("this computes with sets", node.at))
-        return static(type_, left.value & right.value if node.operator == "and" else left.value | right.value)
+        one, other = widened(left, type_).value, widened(right, type_).value
+        return static(type_, one & other if node.operator == "and" else one | other)
 
     def _collections(self, node: syntax.Binary, left: Term, right: Term) -> Term:
         """Join or subtract strings, lists, sets or dictionaries."""
-        kind = left.type.kind
         type_ = joined(left.type, right.type)
-        is_known = kind in ("string", "list", "dict") if node.operator == "+" else kind in ("set", "dict")
+        if node.operator == "-" and left.type.kind == "dict":
+            return self._without_keys(node, left, right)
+        kind = "" if type_ is None else type_.kind
+        is_known = kind in ("string", "list", "dict") if node.operator == "+" else kind == "set"
         if type_ is None or not is_known:
-            return self._unfit(node, left, right)
+            return self._unfit(node.operator, node.at, left, right)
         if not (left.is_static and right.is_static):
             return broken(type_, left, right, problem=Problem(f"this computes with values of type {type_}", node.at))
+        left, right = widened(left, type_), widened(right, type_)
         if node.operator == "-":
             return static(type_, left.value - right.value)
         if len(left.value) + len(right.value) > MAXIMUM_ELEMENTS:
@@ -214,15 +254,25 @@ class Operators:
             return static(type_, frozenset((dict(left.value) | dict(right.value)).items()))
         value = left.value + right.value
         if kind == "list":
-            type_ = CifType("list", len(value), len(value), type_.parts)
+            type_ = CifType("list", len(value), len(value), type_.parts, is_open=type_.is_open)
         return static(type_, value)
+
+    def _without_keys(self, node: syntax.Binary, left: Term, right: Term) -> Term:
+        """Remove the keys of a dictionary, or of a list or set of keys, from a dictionary."""
+        is_fit = right.type.kind in ("dict", "list", "set") and joined(left.type.parts[0], right.type.parts[0])
+        if not is_fit:
+            return self._unfit(node.operator, node.at, left, right)
+        if not (left.is_static and right.is_static):
+            return broken(left.type, left, right, problem=Problem("this computes with dictionaries", node.at))
+        keys = set(dict(right.value) if right.type.kind == "dict" else right.value)
+        return static(left.type, frozenset(item for item in left.value if item[0] not in keys))
 
     def _membership(self, node: syntax.Binary, left: Term, right: Term) -> Term:
         if node.operator == "sub":
-            if left.type.kind != "set" or not is_compatible(left.type, right.type):
-                return self._unfit(node, left, right)
-        elif right.type.kind not in ("list", "set", "dict") or not is_compatible(left.type, right.type.parts[0]):
-            return self._unfit(node, left, right)
+            if left.type.kind != "set" or joined(left.type, right.type) is None:
+                return self._unfit(node.operator, node.at, left, right)
+        elif right.type.kind not in ("list", "set", "dict") or joined(left.type, right.type.parts[0]) is None:
+            return self._unfit(node.operator, node.at, left, right)
         if not (left.is_static and right.is_static):
             return broken(BOOL, left, right, problem=Problem(f"'{node.operator}' has a value of a state", node.at))
         if node.operator == "sub":
@@ -236,14 +286,15 @@ class Operators:
         type_ = joined(then.type, otherwise.type)
         if type_ is None or type_.kind == "automaton":
             return self.mismatch(f"the branches have types that do not fit: {then.type} and {otherwise.type}", at)
-        return conditional(condition, then, otherwise, type_)
+        return conditional(condition, widened(then, type_), widened(otherwise, type_), type_)
 
     def group(self, node: syntax.Group, items: list[Term]) -> Term:
         """The term of a tuple, list, set or dictionary of elements."""
         if any(item.type.kind == "unknown" for item in items):
             return ERROR
         if node.kind == "tuple":
-            whole = self.sized(CifType("tuple", parts=tuple(item.type for item in items)), node.at)
+            type_ = CifType("tuple", parts=tuple(item.type for item in items), is_open=True)
+            whole = self.sized(type_, node.at)
             return ERROR if whole.kind == "unknown" else tuple_term(whole, tuple(items))
         groups = [items[::2], items[1::2]] if node.kind == "dict" else [items]
         parts = []
@@ -255,11 +306,14 @@ class Operators:
                 return self.mismatch("the elements have types that do not fit each other", node.at)
             parts.append(part)
         length = len(items) if node.kind == "list" else None
-        type_ = CifType(node.kind, length, length, tuple(parts))
+        type_ = CifType(node.kind, length, length, tuple(parts), is_open=True)
         if not all(item.is_static for item in items):
             return broken(type_, *items, problem=Problem(f"this makes a {node.kind} of values of a state", node.at))
-        values = [item.value for item in items]
+        expected = [parts[index % len(parts)] for index in range(len(items))]
+        values = [widened(item, part).value for item, part in zip(items, expected, strict=True)]
         if node.kind == "dict":
+            if len(set(values[::2])) < len(items) // 2:
+                return self.mismatch("two keys of this dictionary are the same", node.at, "Leave one of them out.")
             return static(type_, frozenset(zip(values[::2], values[1::2], strict=True)))
         return static(type_, tuple(values) if node.kind == "list" else frozenset(values))
 
@@ -268,7 +322,7 @@ class Operators:
         if "unknown" in (term.type.kind, type_.kind):
             return ERROR
         if is_compatible(term.type, type_) and term.type.kind != "automaton":
-            return term
+            return widened(term, declared(type_, term.type))
         pairs = {("int", "real"), ("bool", "string"), ("int", "string"), ("real", "string"), ("automaton", "string"),
                  ("string", "bool"), ("string", "int"), ("string", "real")}  # fmt: skip
         if (term.type.kind, type_.kind) not in pairs:
@@ -286,17 +340,58 @@ def of_type(type_: CifType) -> str:
     return f"of type {type_}"
 
 
+def real_text(value: float) -> str:
+    """A real number as CIF writes it: with a point always, and in powers of ten from 1e7 on and below 1e-3."""
+    if value == 0 or 1e-3 <= abs(value) < 1e7:
+        return format(Decimal(repr(value)), "f") if value else "0.0"
+    sign, figures, place = Decimal(repr(value)).as_tuple()
+    text = "".join(map(str, figures)).rstrip("0")
+    power = len(figures) - 1 + int(place)
+    return f"{'-' if sign else ''}{text[0]}.{text[1:] or '0'}e{power}"
+
+
+def value_text(value: Any, type_: CifType) -> str:
+    """A static value as CIF writes it; a text without its quotes."""
+    return str(value) if type_.kind == "string" else _literal_text(value, type_)
+
+
+def _literal_text(value: Any, type_: CifType) -> str:
+    match type_.kind:
+        case "bool":
+            return str(value).lower()
+        case "real":
+            return real_text(value)
+        case "string":
+            escaped = value.replace("\\", "\\\\").replace('"', '\\"').replace("\n", "\\n").replace("\t", "\\t")
+            return f'"{escaped}"'
+        case "tuple":
+            return f"({', '.join(map(_literal_text, value, type_.parts))})"
+        case "list" | "set":
+            items = [_literal_text(item, type_.parts[0]) for item in value]
+            return f"[{', '.join(items)}]" if type_.kind == "list" else f"{{{', '.join(sorted(items))}}}"
+        case "dict":
+            pairs = sorted(": ".join(map(_literal_text, item, type_.parts)) for item in value)
+            return f"{{{', '.join(pairs)}}}"
+    return str(value)
+
+
 def _cast_value(term: Term, type_: CifType) -> Term:
     value = term.value
     match type_.kind:
         case "real":
+            if isinstance(value, str) and not re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", value, re.ASCII):
+                raise ValueError(value)
+            if not math.isfinite(float(value)):
+                raise ValueError(value)
             return static(REAL, float(value))
         case "string":
-            return static(STRING, str(value).lower() if isinstance(value, bool) else str(value))
+            return static(STRING, value_text(value, term.type))
         case "bool":
             if value not in ("true", "false"):
                 raise ValueError(value)
             return truth(value == "true")
+    if not re.fullmatch(r"[+-]?[0-9]{1,20}", value):
+        raise ValueError(value)
     found = int(value)
     if not MINIMUM_INTEGER <= found <= MAXIMUM_INTEGER:
         raise ValueError(value)

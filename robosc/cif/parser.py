@@ -570,7 +570,10 @@ class Parser(ExpressionParser):
         found = []
         while True:
             name = self.identifier()
-            flags = "".join(flag for flag in "!?~" if self.takes(flag))
+            begin = self.place
+            while self.texts[self.place] in ("!", "?", "~"):
+                self.place += 1
+            flags = "".join(self.texts[begin : self.place])
             found.append(syntax.Parameter(syntax.ParameterKind.EVENT, name, data, controllability, flags))
             if not self.takes(","):
                 return found

@@ -130,7 +130,7 @@ class Alias:
     parameter: syntax.Parameter
     argument: syntax.Expression
     argument_scope: "Scope"
-    definition_scope: "Scope"
+    scope: "Scope"
     target: "Item | None" = None
     is_resolved: bool = False
     kind = "a parameter"
@@ -157,6 +157,7 @@ class Scope:
         parameters: Names of its parameters.
         body: Declarations in order, those of merged groups one after the other.
         is_real: False in a definition that is checked without an instance.
+        files: Files that have a part of a group.
     """
 
     path: str
@@ -170,6 +171,7 @@ class Scope:
     parameters: set[str] = field(default_factory=set)
     body: list[syntax.Declaration] = field(default_factory=list)
     is_real: bool = True
+    files: set[str] = field(default_factory=set)
 
     @property
     def kind(self) -> str:
@@ -236,6 +238,7 @@ class Scopes:
                     self._component(scope, item)
                 case syntax.Component():
                     definition = Definition(item, scope)
+                    self._check_flags(item)
                     self._definitions.append(definition)
                     self._add(scope, item.name, definition)
                 case syntax.Instance():
@@ -262,6 +265,16 @@ class Scopes:
                 case _:
                     pass
 
+    def _check_flags(self, item: syntax.Component) -> None:
+        """Report flags of event parameters that mean nothing."""
+        for parameter in item.parameters or ():
+            name, flags = parameter.name, parameter.flags
+            if len(set(flags)) < len(flags):
+                self._error("cif-structure", f"'{name.text}' has a flag twice", name.at, "Write each flag once.")
+            if flags and parameter.type is None:
+                self._error("cif-structure", f"'{name.text}' has flags, and is no channel", name.at,
+                            "Remove them, or write the type of its data before the name.")  # fmt: skip
+
     def _component(self, scope: Scope, item: syntax.Component) -> None:
         if not item.is_automaton:
             group = self._group(scope, item.name)
@@ -274,11 +287,14 @@ class Scopes:
         self._declare(made, item.body)
 
     def _group(self, scope: Scope, name: syntax.Identifier) -> Scope | None:
-        """A new group, or the one of that name that is there."""
+        """A new group, or the one of that name of another file, with which it is merged."""
         known = scope.entries.get(name.text)
-        if isinstance(known, Scope) and not known.is_automaton and known.definition is None:
+        is_group = isinstance(known, Scope) and not known.is_automaton and known.definition is None
+        if isinstance(known, Scope) and is_group and name.at.file not in known.files:
+            known.files.add(name.at.file)
             return known
         made = Scope(scope.absolute(name.text), scope, name.at, ancestry=scope.ancestry, is_real=scope.is_real)
+        made.files.add(name.at.file)
         self._add(scope, name, made)
         return made
 
@@ -349,7 +365,7 @@ class Scopes:
             if parameter.kind is syntax.ParameterKind.ALGEBRAIC:
                 entry = self._algebraic(parameter, scope, argument, container)
             else:
-                entry = Alias(parameter, argument, container, definition.scope)
+                entry = Alias(parameter, argument, container, scope)
             self._add(scope, parameter.name, entry)
         self._declare(scope, definition.component.body)
         return scope
@@ -399,9 +415,8 @@ class Scopes:
             case syntax.ParameterKind.LOCATION:
                 place = syntax.LocationDeclaration(parameter.name, (), (), (), (), parameter.name.at)
                 return Entity(place, scope, parameter.name)
-        assert parameter.definition is not None  # noqa: S101 - a component's parameter names a definition
         assert scope.parent is not None  # noqa: S101 - a definition stands somewhere
-        found = self.resolve(parameter.definition, scope.parent)
+        found = self._definition(parameter, scope)
         if not isinstance(found, Definition) or found.component in scope.ancestry:
             return Scope(parameter.name.text, scope.parent, parameter.name.at, is_real=False)
         made = self._new_scope(found, scope.absolute(parameter.name.text), parameter.name.at, scope)
@@ -413,8 +428,21 @@ class Scopes:
 
     # Looking up
 
-    def resolve(self, name: syntax.Name, scope: Scope) -> "Item | None":
-        """Return what a name means where it is written; None if nothing, which has been reported."""
+    def _definition(self, parameter: syntax.Parameter, scope: Scope) -> "Item | None":
+        """Return what a component parameter of an instance must be an instance of, which an instance may hold."""
+        assert parameter.definition is not None  # noqa: S101 - a component's parameter names a definition
+        assert scope.parent is not None  # noqa: S101 - a definition stands somewhere
+        is_own = parameter.definition.parts[0] == parameter.name.text
+        return self.resolve(parameter.definition, scope.parent if is_own else scope, is_type=True)
+
+    def resolve(self, name: syntax.Name, scope: Scope, *, is_type: bool = False) -> "Item | None":
+        """Return what a name means where it is written; None if nothing, which has been reported.
+
+        Args:
+            name: The name.
+            scope: Scope that it is written in.
+            is_type: True for what a parameter is an instance of: that alone may be a definition in an instance.
+        """
         first, *others = name.parts
         if name.root is syntax.Root.SPECIFICATION:
             start: Scope | None = self.root
@@ -435,7 +463,7 @@ class Scopes:
                 self._unknown(part, name, None)
                 return None
             entry = None if part in found.parameters else found.entries.get(part)
-            if entry is None or (isinstance(entry, Definition) and found.definition is not None):
+            if entry is None or (isinstance(entry, Definition) and found.definition is not None and not is_type):
                 self._unknown(part, name, found)
                 return None
             found = self._target(entry)
@@ -463,8 +491,7 @@ class Scopes:
         if found is None:
             return None
         if parameter.kind is syntax.ParameterKind.COMPONENT:
-            assert parameter.definition is not None  # noqa: S101 - it names a definition
-            definition = self.resolve(parameter.definition, alias.definition_scope)
+            definition = self._definition(parameter, alias.scope)
             if definition is None:
                 return None
             if isinstance(found, Scope) and found.definition is definition:

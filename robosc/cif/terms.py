@@ -5,11 +5,13 @@ An expression that synthesis does not support is an error only where it is used,
 
 import math
 from collections.abc import Callable, Mapping
+from itertools import product
 from typing import Any
 
 import msgspec
+from msgspec.structs import replace
 
-from robosc.cif.types import BOOL, UNKNOWN, CifType, integer
+from robosc.cif.types import BOOL, REAL, UNKNOWN, CifType, integer
 from robosc.expressions import Binary, Conditional, Constant, EnumValue, Expression, Unary, children
 from robosc.source import Location
 
@@ -136,9 +138,9 @@ def conditional(condition: Term, then: Term, otherwise: Term, type_: CifType) ->
     if "unknown" in (condition.type.kind, then.type.kind, otherwise.type.kind):
         return ERROR
     if condition.is_static:
-        return then if condition.value else otherwise
+        return widened(then if condition.value else otherwise, type_)
     if type_.kind == "tuple" and not condition.problems:
-        pairs = zip(tuple_parts(then), tuple_parts(otherwise), type_.parts, strict=True)
+        pairs = zip(tuple_parts(widened(then, type_)), tuple_parts(widened(otherwise, type_)), type_.parts, strict=True)
         parts = tuple(conditional(condition, one, other, part) for one, other, part in pairs)
         return tuple_term(type_, parts)
     if not (condition.is_usable and then.is_usable and otherwise.is_usable):
@@ -155,6 +157,11 @@ def tuple_parts(term: Term) -> tuple[Term, ...]:
     return tuple(broken(type_, term) for type_ in term.type.parts)
 
 
+def flat(term: Term) -> list[Term]:
+    """The term, or those of the fields of a tuple, however deep."""
+    return [item for part in tuple_parts(term) for item in flat(part)] if term.type.kind == "tuple" else [term]
+
+
 def tuple_term(type_: CifType, parts: tuple[Term, ...]) -> Term:
     """A tuple of terms."""
     if all(part.is_static for part in parts):
@@ -162,6 +169,72 @@ def tuple_term(type_: CifType, parts: tuple[Term, ...]) -> Term:
     found = dict.fromkeys(item for part in parts for item in part.problems)
     size, depth = sum(part.size for part in parts), max(part.depth for part in parts)
     return Term(type_, parts=parts, problems=tuple(found), size=size, depth=depth)
+
+
+def widened(term: Term, type_: CifType) -> Term:
+    """A term as one of a type that it fits: its integers become real where reals are expected."""
+    if "unknown" in (term.type.kind, type_.kind):
+        return ERROR
+    if term.is_static:
+        return replace(term, type=type_, value=_converted(term.value, term.type, type_))
+    if term.parts:
+        parts = tuple(widened(part, expected) for part, expected in zip(term.parts, type_.parts, strict=True))
+        return replace(term, type=type_, parts=parts)
+    if type_.kind == "real" and term.type.kind == "int":
+        return replace(term, type=REAL, expression=None)
+    return replace(term, type=type_)
+
+
+def _has_reals(type_: CifType) -> bool:
+    return type_.kind == "real" or any(map(_has_reals, type_.parts))
+
+
+def _converted(value: Any, type_: CifType, target: CifType) -> Any:
+    """A static value of one type as one of another that it fits."""
+    if type_.kind == "int" and target.kind == "real":
+        return float(value)
+    if type_.kind not in ("list", "set", "dict", "tuple") or not _has_reals(target):
+        return value
+    if type_.kind in ("tuple", "dict"):
+        pairs = tuple(zip(type_.parts, target.parts, strict=True))
+        rows = [value] if type_.kind == "tuple" else value
+        made = [tuple(_converted(item, *pair) for item, pair in zip(row, pairs, strict=True)) for row in rows]
+        return made[0] if type_.kind == "tuple" else frozenset(made)
+    items = (_converted(item, type_.parts[0], target.parts[0]) for item in value)
+    return tuple(items) if type_.kind == "list" else frozenset(items)
+
+
+def values_of(type_: CifType, most: int) -> list[Any] | None:
+    """Every value of a type; None if there may be more than `most`."""
+    match type_.kind:
+        case "bool":
+            return [False, True]
+        case "enum":
+            return list(type_.names)
+        case "int":
+            low, high = type_.range
+            return list(range(low, high + 1)) if high - low < most else None
+        case "tuple":
+            return _rows([values_of(part, most) for part in type_.parts], most)
+        case "list" if type_.low is not None and type_.range[1] <= most:
+            items = values_of(type_.parts[0], most)
+            found: list[Any] = []
+            for length in range(type_.low, type_.range[1] + 1):
+                rows = _rows([items] * length, most)
+                if rows is None or len(found) + len(rows) > most:
+                    return None
+                found += rows
+            return found
+        case _:
+            return None
+
+
+def _rows(columns: list[list[Any] | None], most: int) -> list[Any] | None:
+    """Every combination of one value of each column."""
+    known = [column for column in columns if column is not None]
+    if len(known) < len(columns) or math.prod(map(len, known)) > most:
+        return None
+    return list(product(*known))
 
 
 def enum_comparison(operator: str, left: Expression, right: Expression) -> Expression:

@@ -1,13 +1,11 @@
 """Types of CIF's names: the type of each declaration, with its static value or the expression that it becomes."""
 
-from msgspec.structs import replace
-
 from robosc.cif import syntax
 from robosc.cif.expression_typing import NAMELESS, ExpressionTyping
 from robosc.cif.scopes import Entity, Scope, Scopes
-from robosc.cif.terms import ERROR, Problem, Term, broken, made, static
-from robosc.cif.types import AUTOMATON, BOOL, REAL, UNKNOWN, CifType, fits
-from robosc.expressions import StateTest, VariableRead
+from robosc.cif.terms import ERROR, Problem, Term, broken, made, static, tuple_term, widened
+from robosc.cif.types import AUTOMATON, BOOL, REAL, UNKNOWN, CifType, declared, fits
+from robosc.expressions import ITSELF, StateTest, VariableRead
 from robosc.source import Location
 
 
@@ -22,6 +20,7 @@ class Typing(ExpressionTyping):
         super().__init__(scopes)
         self._terms: dict[Entity, Term | None] = {}
         self._types: dict[Entity, CifType | None] = {}
+        self._fields: dict[Scope, set[str]] = {}
         self._enums: dict[tuple[str, ...], str] = {}
 
     # Types
@@ -45,6 +44,15 @@ class Typing(ExpressionTyping):
                     return UNKNOWN
                 return CifType(written.kind, low, high, parts)
         fields = tuple(item.text for item in written.fields)
+        if written.kind == "tuple":
+            for index, item in enumerate(written.fields):
+                if item.text in fields[:index]:
+                    self.error("cif-duplicate-name", f"the tuple has two fields '{item.text}'", item.at,
+                               "Rename one of the two.")  # fmt: skip
+            if len(fields) < 2:
+                self.error("cif-type", "a tuple has two fields or more", written.at,
+                           "Write the type of its field alone, or add a field.")  # fmt: skip
+                return UNKNOWN
         return self._operators.sized(CifType(written.kind, parts=parts, names=fields), written.at)
 
     def _named(self, name: syntax.Name, scope: Scope) -> CifType:
@@ -124,8 +132,10 @@ class Typing(ExpressionTyping):
         raise AssertionError(declaration)
 
     def _constant(self, type_: CifType, value: syntax.Expression, scope: Scope) -> Term:
+        outer, self._operators.is_evaluating = self._operators.is_evaluating, True
         term = self.term(value, scope)
-        if term.type.kind == "unknown":
+        self._operators.is_evaluating = outer
+        if "unknown" in (term.type.kind, type_.kind):
             return ERROR
         if not fits(term.type, type_):
             return self.mismatch(f"{term.type} does not fit {type_}", value.at)
@@ -134,8 +144,7 @@ class Typing(ExpressionTyping):
         if not term.is_static:
             return self.mismatch("the value of a constant must be known beforehand", value.at,
                                  "Use literals and other constants.")  # fmt: skip
-        # Its own value is as narrow a type as there is.
-        return term if term.type.kind in ("int", "enum") else static(type_, term.value)
+        return widened(term, declared(type_, term.type))
 
     def _variable(self, entity: Entity, type_: CifType) -> Term:
         scope, name = entity.scope, entity.identifier.text
@@ -144,8 +153,24 @@ class Typing(ExpressionTyping):
         if not type_.is_finite:
             return broken(type_, problem=Problem(f"'{entity.name}' has the type {type_}", entity.at))
         if isinstance(entity.declaration, syntax.Input):
-            return made(type_, VariableRead(entity.name, "value"))
-        return made(type_, VariableRead(scope.path, name))
+            if type_.kind == "tuple":
+                return broken(type_, problem=Problem(f"'{entity.name}' has the type {type_}", entity.at))
+            return made(type_, VariableRead(entity.name, ITSELF))
+        return self._stored(scope, name, type_)
+
+    def _stored(self, scope: Scope, name: str, type_: CifType) -> Term:
+        """The term of a variable; a tuple is stored as a variable for each field, such as `t_a` for `t[a]`."""
+        if type_.kind != "tuple":
+            return made(type_, VariableRead(scope.path, name))
+        taken = self._fields.setdefault(scope, set(scope.entries))
+        parts = []
+        for field, part in zip(type_.names, type_.parts, strict=True):
+            free = f"{name}_{field}"
+            while free in taken:
+                free += "_"
+            taken.add(free)
+            parts.append(self._stored(scope, free, part))
+        return tuple_term(type_, tuple(parts))
 
     def _algebraic(self, entity: Entity, declaration: syntax.Algebraic) -> Term:
         scope = entity.scope
@@ -180,8 +205,7 @@ class Typing(ExpressionTyping):
             return ERROR
         if not fits(term.type, type_):
             return self.mismatch(f"{term.type} does not fit {type_}", at)
-        # A tuple has the names of its fields from the declaration.
-        return replace(term, type=type_) if type_.kind == "tuple" else term
+        return widened(term, declared(type_, term.type))
 
     def _cycle(self, what: str, entity: Entity) -> None:
         self.error("cif-cycle", f"{what} '{entity.name}' is defined by itself", entity.at, "Break the circle.")

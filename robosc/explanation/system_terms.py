@@ -9,6 +9,7 @@ from robosc.explanation.constraints import RelaxableConstraint
 from robosc.explanation.parts import Part, StateValues
 from robosc.explanation.terms import Terms
 from robosc.expressions import Expression, Unary
+from robosc.expressions.text import words_text
 from robosc.source import Location
 
 
@@ -36,6 +37,9 @@ class SystemTerms(Terms):
         self._watching = {place: name for name, conditions in requirements.items() for place in conditions}
         self._places = places
         self._required = "supervisor" if system.is_controlled else "requirement"
+
+    def _text(self, expression: Expression) -> str:
+        return words_text(expression)
 
     def state(self, state: State) -> StateValues:
         """A state: the location of each automaton with several locations, and the value of each variable."""

@@ -7,6 +7,7 @@ code generators.
 from robosc.expressions.tree import (
     ARGUMENTS,
     FALSE,
+    ITSELF,
     TRUE,
     ArrayPart,
     Binary,
@@ -57,6 +58,7 @@ from robosc.expressions.types import (
 __all__ = [
     "ARGUMENTS",
     "FALSE",
+    "ITSELF",
     "MAXIMUM_INTEGER",
     "MINIMUM_INTEGER",
     "TRUE",

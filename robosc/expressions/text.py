@@ -4,6 +4,7 @@ import re
 from collections.abc import Collection
 
 from robosc.expressions.tree import (
+    ITSELF,
     ArrayPart,
     Binary,
     Call,
@@ -65,8 +66,20 @@ def automaton_text(name: str, components: Collection[str]) -> str:
 
 
 def variable_text(component: str, variable: str) -> str:
-    """Return the name of a variable in a text: with its component before it, unless it is a sentence."""
+    """Return the name of a variable in a text: with its component before it, unless it is a sentence or `ITSELF`."""
+    if variable == ITSELF:
+        return component
     return variable if _SENTENCE.search(variable) else f"{component}.{variable}"
+
+
+def words_text(expression: Expression, components: Collection[str] = ()) -> str:
+    """The expression with the words of CIF, where they differ: `not`, and `if` with a colon and an `end`.
+
+    Args:
+        expression: The expression.
+        components: Names of all components.
+    """
+    return _Printer(components, has_words=True).print(expression, 0)[0]
 
 
 def expression_text(expression: Expression, components: Collection[str] = ()) -> str:
@@ -88,8 +101,9 @@ def expression_text(expression: Expression, components: Collection[str] = ()) ->
 class _Printer:
     """Prints the expressions of one robot."""
 
-    def __init__(self, components: Collection[str]) -> None:
+    def __init__(self, components: Collection[str], *, has_words: bool = False) -> None:
         self._components = components
+        self._has_words = has_words
 
     def print(self, expression: Expression, depth: int) -> tuple[str, int]:
         """The text and how tightly its outermost operator binds, inside `depth` quantifiers."""
@@ -121,13 +135,15 @@ class _Printer:
             case Conditional(condition=condition, then=then, otherwise=otherwise):
                 # No generator here: each of those that are open within each other takes a part of C's stack.
                 parts = [self.print(item, depth)[0] for item in (condition, then, otherwise)]
+                if self._has_words:
+                    return "if {}: {} else {} end".format(*parts), _OPERAND
                 return "if {} then {} else {}".format(*parts), _CONDITIONAL
             case Unary(operator="holds", operand=operand):
                 return f"holds({self.print(operand, depth)[0]})", _OPERAND
             case Unary(operator="not", operand=VariableRead(variable=variable)) if _SENTENCE.search(variable):
                 return _SENTENCE.sub(r"\1 \2 not ", variable, count=1), _OPERAND
             case Unary(operator="not", operand=operand):
-                return f"!{self._within(operand, _NOT, depth)}", _NOT
+                return f"{'not ' if self._has_words else '!'}{self._within(operand, _NOT, depth)}", _NOT
             case Unary(operand=operand):
                 return f"-{self._within(operand, _NEGATIVE, depth)}", _NEGATIVE
             case Binary(operator="implies", left=left, right=right):

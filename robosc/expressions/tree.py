@@ -31,6 +31,13 @@ class EnumValue(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="en
     value: Name
 
 
+ITSELF = "*"
+"""Name of the variable of an automaton that is nothing but this variable, such as an input variable.
+
+No identifier can be it, and texts have the automaton's name alone.
+"""
+
+
 class VariableRead(msgspec.Struct, frozen=True, gc=False, tag_field="node", tag="variable"):
     """The value of a component's variable."""
 

@@ -107,6 +107,8 @@ class SystemRun(ManualRun):
         self._added = state_predicates(system, supervisor.added)
         self._disabled = Disabled(system, self._added)
         self._subjects = tuple(map(str, subjects(system)))
+        # Of an input variable, the value has the name, and not the only location of its automaton.
+        self._places = {name: place for place, name in enumerate(self._subjects)}
         self._inputs: dict[str, list[InputVariable]] = {}
         for item in system.inputs:
             self._inputs.setdefault(item.event, []).append(item)
@@ -230,11 +232,9 @@ class SystemRun(ManualRun):
             ChoiceError: There are several such states, or none.
         """
         for name in wanted:
-            if name not in self._subjects:
-                raise UnknownNameError(unknown_event(name, self._subjects, "part of the state"))
-        found = [
-            state for state in states if all(state[self._subjects.index(name)] == part for name, part in wanted.items())
-        ]
+            if name not in self._places:
+                raise UnknownNameError(unknown_event(name, self._places, "part of the state"))
+        found = [state for state in states if all(state[self._places[name]] == part for name, part in wanted.items())]
         if len(found) == 1:
             return found[0]
         offered = self._alternatives(found or states)
@@ -247,7 +247,7 @@ class SystemRun(ManualRun):
 
     def _alternatives(self, states: Sequence[State]) -> str:
         """Text that lists states by the values in which they differ; the first ones if there are very many."""
-        places = _varying(states) if len(states) > 1 else range(len(self._subjects))
+        places = _varying(states) if len(states) > 1 else self._places.values()
         offered = [
             ", ".join(f"{self._subjects[place]} = {value_text(state[place])}" for place in places)
             for state in states[:_MAXIMUM_WAYS]

@@ -6,6 +6,7 @@ from graphlib import CycleError, TopologicalSorter
 from typing import overload
 
 from robosc.automata.structure import System
+from robosc.expressions.text import variable_text
 from robosc.expressions.types import Type, Value, domain
 from robosc.supervisor.structure import DecisionDiagram
 
@@ -76,7 +77,7 @@ def validate(diagram: DecisionDiagram, domains: Domains) -> None:
         number = place + 2
         domain = domains.get((node.automaton, node.variable))
         if domain is None:
-            name = node.automaton if node.variable is None else f"{node.automaton}.{node.variable}"
+            name = node.automaton if node.variable is None else variable_text(node.automaton, node.variable)
             raise ValueError(f"node {number} tests '{name}', which does not exist or takes no part in synthesis")
         if not node.starts or node.starts[0] != 0 or len(node.starts) != len(node.children):
             raise ValueError(f"node {number} needs one child for each start, and its first start must be 0")

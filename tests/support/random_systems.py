@@ -32,6 +32,7 @@ from robosc.automata import (
     environment_variable,
 )
 from robosc.expressions import (
+    ITSELF,
     TRUE,
     Binary,
     BinaryOperator,
@@ -191,8 +192,8 @@ class _Builder:
         self.inputs = tuple(item for event in carrying for item in self._inputs(event))
         self.sensors: list[EnvironmentVariable] = []
         if is_wide and self._chance(0.2):
-            self.variables["S", "value"] = self._type()
-            self.sensors.append(environment_variable("S", self.variables["S", "value"]))
+            self.variables["S", ITSELF] = self._type()
+            self.sensors.append(environment_variable("S", self.variables["S", ITSELF]))
 
     def _chance(self, share: float) -> bool:
         return self.random.random() < share

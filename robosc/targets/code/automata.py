@@ -18,7 +18,7 @@ from robosc.automata.state import Subject, initial_values, subject_type, subject
 from robosc.automata.structure import Automaton, Edge, Event, InputVariable, System, composed
 from robosc.cif.typing import NAMELESS
 from robosc.errors import UnsupportedModelError
-from robosc.expressions import TRUE, Binary, EnumType, Expression, IntegerType, Type, Value, conjuncts
+from robosc.expressions import ITSELF, TRUE, Binary, EnumType, Expression, IntegerType, Type, Value, conjuncts
 from robosc.expressions.text import expression_text
 from robosc.supervisor import DecisionDiagram
 from robosc.supervisor.predicates import state_predicate
@@ -135,7 +135,7 @@ def _require_names(system: System) -> None:
     for automaton in system.automata:
         names += [automaton.name, *(item for item in automaton.locations if item != NAMELESS)]
         for variable in automaton.variables:
-            names.append(variable.name)
+            names += [variable.name] if variable.name != ITSELF else []
             if isinstance(variable.type, EnumType):
                 names += [variable.type.name, *variable.type.values]
     for name in names:
@@ -281,7 +281,8 @@ class AutomataWriter(ABC):
         found: list[Statement] = []
         for update in edge.updates:
             type_ = subject_type(self._system, Subject(automaton.name, update.variable))
-            words = f"{automaton.name}: {update.variable} := {expression_text(update.expression)}"
+            place = f": {update.variable}" if update.variable != ITSELF else ""
+            words = f"{automaton.name}{place} := {expression_text(update.expression)}"
             value = self._before.value(update.expression)
             _require_native(words, value)
             if isinstance(type_, IntegerType):

@@ -107,7 +107,7 @@ async def test_what_is_shown(tmp_path: Path) -> None:
             ("jam", False, False),
         ]
         assert [(item["label"], item["kind"]) for item in belt["edges"]][2] == ("line.belt.c_turn", "controllable")
-        assert [item["label"] for item in order["edges"]] == ["tank.c_fill", "tank.c_fill [sensor.value]"]
+        assert [item["label"] for item in order["edges"]] == ["tank.c_fill", "tank.c_fill [sensor]"]
         play = answer["play"]
         assert [(item["event"], item["controllable"]) for item in play["events"]] == [
             ("sensor", False),

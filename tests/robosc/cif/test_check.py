@@ -117,9 +117,39 @@ def counter(declarations: str, edge: str, location: str = "") -> str:
          " edge e when l and q.z < n do x := n; end end plant def P(): controllable e; disc int[0..3] z; location m: initial;"
          " marked; edge e do z := 2; end p: P(); d: D(p.e, p.m, 2, p);", 2),
         ("group g: controllable e; group h: plant p: location: initial; marked; edge .g.e; end end end"
-         " group g: plant q: location: initial; marked; edge ^g.e; end end", 1),
+         " group h: plant q: location: initial; marked; edge ^g.e; end end", 1),
         ("plant p: controllable $plant; location $end: initial; marked; edge p.plant; end", 1),
         (counter("", "do x := 1") + " requirement r: p.e needs p.x = 0;", 2),
+        # The declared type counts, and integers become real where reals are expected.
+        (counter("const real r = 2; const int n = size(<string>r);", "when x < n do x := x + 1"), 4),
+        (counter("const real r = 1.0; const bool b = r = 1;", "when b do x := 1"), 2),
+        (counter("const list real l = if true: [1] else [2.5] end; const bool b = l = [1];", "when b do x := 1"), 2),
+        (counter("const set real s = {3, 4}; const bool b = 3 in s;", "when b do x := 1"), 2),
+        (counter("const dict(int: real) d = {}; const bool b = empty(d) and d + {1: 2} = {1: 2.0};", "when b do x := 1"), 2),
+        (counter("const dict(int: int) d = {1: 2, 3: 4} - [1]; const bool b = d = {3: 4};", "when b do x := 1"), 2),
+        (counter('const string s = fmt("%03d|%.2f|%s|%b|%x|%2$-4d|", 7, 2, [1.0], true, 255);'
+                 ' const bool b = s = "007|2.00|[1.0]|true|ff|2   |";', "when b do x := 1"), 2),
+        (counter('const bool b = <string>1e7 = "1.0e7" and <string>0.00025 = "2.5e-4" and <string>(-12.5) = "-12.5";',
+                 "when b do x := 1"), 2),
+        (counter("const int n = pop([2, 3])[0] + del([1, 2], 0)[0] - floor(scale(1, 0, 2, 0, 4));", "do x := n"), 2),
+        (counter("const tuple(bool a; int[0..1] b) l = (true, 1); const int n = switch l: case (true, 1): 1 case (true, 0): 2"
+                 " case (false, 0): 2 case (false, 1): 3 end;", "when x < n do x := x + 1"), 2),
+        (counter("const list[0..1] bool l = []; const int n = switch l: case []: 1 case [true]: 2 case [false]: 3 end;",
+                 "when x < n do x := x + 1"), 2),
+        # Variables of tuples, and assignments of their fields.
+        (counter("disc tuple(int[0..3] a; bool b) t = (1, true);", "when t[b] do t[a] := t[a] + 1, t[b] := t[a] < 2"), 3),
+        (counter("disc tuple(int[0..3] a; tuple(bool c; int[0..1] d) b) t;", "do t[b][c] := true, t[1][1] := 1"), 2),
+        (counter("disc tuple(int[0..3] a; bool b) t in {(1, true), (2, false)};", "do t := (3, true)"), 3),
+        (counter("disc tuple(int[0..3] a; bool b) t in any;", "do t := (3, true)"), 8),
+        (counter("disc tuple(int[0..3] a; bool b) t, u;", "do t := u, u[a] := 3"), 3),
+        (counter("disc tuple(int[0..3] a; bool b) t;", "when t = (0, false) do t[a] := 3"), 2),
+        (counter("disc tuple(int[0..3] a; bool b) t; disc int[0..1] t_a;", "do if t[b]: t[a] := 3 else t[b] := true end"), 3),
+        (counter("disc tuple(int[0..3] a; bool b) t;", "do (x, t[a]) := (1, 2)"), 2),
+        # A parameter typed by a definition in an instance.
+        ("group def Y(): plant def Q(): controllable c; disc int[0..3] v; location: initial; marked;"
+         " edge c when v < 3 do v := v + 1; end q: Q(); end y: Y();"
+         " group def X(y.Q p): requirement p.c needs p.v < 2; end x: X(y.q);", 3),
+        ("group def D(event int e~!?): end " + counter("", "do x := 1"), 2),
     ],
 )  # fmt: skip
 def test_number_of_states(text: str, expected: int) -> None:
@@ -179,6 +209,25 @@ def test_files_are_read_from_their_folders(tmp_path: Path) -> None:
         ("enum E = A, A;", "cif-duplicate-name", 13),
         ("const int n = 3; k: n();", "cif-wrong-kind", 21),
         (counter("", "when e"), "cif-wrong-kind", 85),
+        ("group a: end group a: end", "cif-duplicate-name", 20),
+        ("group a: group b: end group b: end end", "cif-duplicate-name", 29),
+        ("type t = tuple(int a);", "cif-type", 10),
+        ("type t = tuple(int a; bool a);", "cif-duplicate-name", 28),
+        ("const real x = 1e309;", "cif-syntax-error", 16),
+        ("const real x = 1e308 * 10;", "cif-type", 22),
+        ("const int n = 2147483648;", "cif-syntax-error", 15),
+        ("const list int k = [1]; const list real l = k;", "cif-type", 45),
+        ("const list int k = [1, 2]; const int n = k[true];", "cif-type", 42),
+        ("const list int k = [1, 2]; const list int l = k[1.0:];", "cif-type", 49),
+        ("const int[0..5] n = 2; alg int[2..2] m = n;", "cif-type", 42),
+        ('const string s = fmt("%d", true);', "cif-type", 22),
+        ("const tuple(bool a, b) l = (true, true); const int n = switch l: case (true, true): 1 end;", "cif-type", 56),
+        ("group def D(event e!): end", "cif-structure", 19),
+        ("group def D(event int e!?!): end", "cif-structure", 23),
+        (counter("", "do x := ?"), "cif-type", 88),
+        (counter("", "").replace("edge e", "edge e!1"), "cif-type", 78),
+        (counter("disc tuple(int[0..3] a; bool b) t;", "do t := (1, true), t[a] := 3"), "cif-assignment", 133),
+        (counter("disc tuple(int[0..3] a; bool b) t;", "do t[a] := true"), "cif-type", 117),
         (counter("", "do x := 1, x := 2"), "cif-assignment", 91),
         (counter("", "do (x, x) := (1, 2)"), "cif-assignment", 87),
         (counter("", "do if x = 1: x := 2 end, if x = 2: x := 1 end"), "cif-assignment", 115),
@@ -213,12 +262,12 @@ invariant true;
 plant p:
   controllable a; disc real r; disc int n; controllable int ch;
   location:
-    edge a, tau, ch! when f(1) = 2;
+    edge a, tau, ch!3 when f(1) = 2;
 end
 """
     _, found = checked(text)
     assert {item.code for item in found} == {"cif-unsupported"}
-    assert [item.location.line for item in found if item.location] == [1, 1, 2, 4, 4, 4, 6, 6, 6]
+    assert [item.location.line for item in found if item.location] == [1, 1, 2, 4, 4, 4, 6, 6]
     assert all(item.fix for item in found)
 
 
@@ -228,6 +277,50 @@ def test_a_definition_that_nobody_instantiates_is_checked_for_types_alone() -> N
     assert found == ()
     _, found = checked(TANK + "automaton def D(alg int n): location: edge when n; end")
     assert [item.code for item in found] == ["cif-type"]
+
+
+def test_one_file_with_two_names_is_one_file(tmp_path: Path) -> None:
+    (tmp_path / "sub").mkdir()
+    (tmp_path / "a.cif").write_text('import "sub/b.cif", "./c.cif", "link.cif";')
+    (tmp_path / "sub" / "b.cif").write_text('import "../a.cif"; const int n = 2;' + counter("", "do x := n"))
+    (tmp_path / "c.cif").write_text("const int m = 3;")
+    (tmp_path / "link.cif").symlink_to("c.cif")
+    for main in ("a.cif", "sub/b.cif"):
+        found = check_cif(load_cif(tmp_path / main))
+        assert found.system is not None, [str(item) for item in found.diagnostics]
+
+
+def test_a_channel_is_one_finding() -> None:
+    text = """controllable int e;
+plant p: location: initial; marked; edge e!1; end
+plant q: disc int[0..3] x; location: initial; marked; edge e? do x := ?; end
+requirement e needs q.x = 0;"""
+    _, (finding,) = checked(text)
+    assert (finding.code, finding.location and finding.location.line) == ("cif-unsupported", 1)
+
+
+@pytest.mark.parametrize(
+    ("text", "codes"),
+    [
+        ("controllable z;", ["cif-unused-event"]),
+        ("plant def D(): controllable y, z; location: initial; marked; edge y; end a: D(); b: D();", ["cif-unused-event"]),
+        ("plant q: alphabet tank.c_fill; location: initial; marked; end", ["cif-event-never-happens"]),
+        ("plant q: monitor; alphabet tank.c_fill; location: initial; marked; end", []),
+        ("plant q: location: initial; marked; edge tank.c_fill when false; end", ["cif-event-never-happens"]),
+        ("requirement r: location a: initial; marked; edge tank.c_fill goto b; location b: marked; end"
+         " plant tank.u_drain needs r.a; plant q: disc bool b = r.b; location: initial; marked; end",
+         ["cif-plant-reads-requirement"] * 2),
+        ("requirement r: location a: initial; marked; edge tank.c_fill goto b; location b: marked; end"
+         " plant q: disc bool b; location: initial; marked; edge tank.u_drain when r.a do b := r.b; end",
+         ["cif-plant-reads-requirement"] * 2),
+        ("requirement r: location a: initial; marked; edge tank.c_fill goto b; location b: marked; end"
+         " requirement tank.c_fill needs r.a;", []),
+    ],
+)  # fmt: skip
+def test_what_is_mostly_meant_otherwise_is_a_warning(text: str, codes: list[str]) -> None:
+    system, found = checked(TANK + text)
+    assert system is not None, [str(item) for item in found]
+    assert [item.code for item in found] == codes
 
 
 def test_chains_of_algebraic_variables_do_not_explode() -> None:

@@ -13,7 +13,7 @@ from hypothesis import given, settings
 import robosc
 from robosc.automata import DiscreteVariable, EventCondition, InputVariable, Role, System, disables
 from robosc.automata.compile import State
-from robosc.expressions import Binary, Constant, EnumType, IntegerType, StateTest, Unary
+from robosc.expressions import ITSELF, Binary, Constant, EnumType, IntegerType, StateTest, Unary
 from robosc.pipeline.system_runs import initial_states_in_words
 from robosc.pipeline.walking import WalkFindingKind
 from support.effort import examples
@@ -50,7 +50,8 @@ CAMERA = system(
 def parts(automata: System, state: State) -> dict[str, Any]:
     """A state as a run shows it: locations, then variables."""
     given = {str(subject): value for subject, value in zip(NaiveSystem(automata).subjects, state, strict=True)}
-    return dict(sorted(given.items(), key=lambda item: item[0] not in {other.name for other in automata.automata}))
+    held = {item.name for item in automata.automata if all(part.name != ITSELF for part in item.variables)}
+    return dict(sorted(given.items(), key=lambda item: item[0] not in held))
 
 
 def by_name(given: Iterable[dict[str, Any]]) -> list[list[tuple[str, Any]]]:

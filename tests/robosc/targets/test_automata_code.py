@@ -18,7 +18,17 @@ from robosc.automata.state import subject_domain, subjects
 from robosc.automata.structure import DiscreteVariable, Edge, EventCondition
 from robosc.cif import check_cif
 from robosc.errors import UnsupportedModelError
-from robosc.expressions import FALSE, Binary, BooleanType, Constant, Expression, IntegerType, Unary, VariableRead
+from robosc.expressions import (
+    FALSE,
+    ITSELF,
+    Binary,
+    BooleanType,
+    Constant,
+    Expression,
+    IntegerType,
+    Unary,
+    VariableRead,
+)
 from robosc.recursion import allow_depth
 from robosc.source import Bundle, SourceFile
 from robosc.supervisor.predicates import state_predicates
@@ -76,7 +86,7 @@ class Reference:
         self.semantics = Semantics(self.system)
         self.added = state_predicates(self.system, supervisor.added)
         places = {str(item): place for place, item in enumerate(subjects(self.system))}
-        self.inputs = {item.event: places[f"{item.event}.value"] for item in self.system.inputs}
+        self.inputs = {item.event: places[item.event] for item in self.system.inputs}
         self.values = {
             name: subject_domain(self.system, subjects(self.system)[place]) for name, place in self.inputs.items()
         }
@@ -277,7 +287,7 @@ def test_where_the_supervisor_does_not_let_it_begin(tmp_path: Path) -> None:
     fixed = replace(
         found.system,
         plant_conditions=(EventCondition("hot", FALSE),),
-        invariants=(Unary("not", VariableRead("hot", "value")),),
+        invariants=(Unary("not", VariableRead("hot", ITSELF)),),
     )
     supervisor = robosc.synthesize(fixed).supervisor
     assert supervisor is not None
@@ -287,7 +297,7 @@ def test_where_the_supervisor_does_not_let_it_begin(tmp_path: Path) -> None:
     with pytest.raises(ValueError, match="may not begin so"):
         space["Supervisor"]({"hot": True})
     # The program in C begins with what is false.
-    turned = replace(fixed, invariants=(VariableRead("hot", "value"),))
+    turned = replace(fixed, invariants=(VariableRead("hot", ITSELF),))
     supervisor = robosc.synthesize(turned).supervisor
     assert supervisor is not None
     done = subprocess.run(in_c(supervisor, tmp_path), input="", capture_output=True, text=True, check=False)

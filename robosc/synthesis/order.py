@@ -13,7 +13,7 @@ place (A. George and J. W. H. Liu, "An implementation of a pseudoperipheral node
 284-295).
 """
 
-from collections import defaultdict, deque
+from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Sequence
 from functools import cache
 from itertools import permutations
@@ -35,6 +35,10 @@ _WINDOW = 4
 _CLEARLY = 0.9
 """Share of the span of the declared start up to which another start is better: within that, nothing is gained."""
 
+_HUB_EDGES = 16
+_HUB_SHARE = 4
+"""Edges that a thing is in so that it counts as a hub: so many, and one of so many of all."""
+
 _SLIDES = 4
 """Times that the window slides at most."""
 
@@ -53,7 +57,20 @@ def block_order(
     together = (*hyperedges(system), *map(subjects_read, conditions))
     edges = [sorted({index[subject] for subject in edge}) for edge in together]
     edges = [edge for edge in edges if len(edge) > 1]
-    return tuple(blocks[place] for place in best_order(len(blocks), edges))
+    return tuple(blocks[place] for place in hubs_last(best_order(len(blocks), edges), edges))
+
+
+def hubs_last(order: Sequence[int], edges: Sequence[Sequence[int]]) -> tuple[int, ...]:
+    """The order with those things last that a large part of all edges has in common.
+
+    FORCE puts them in the middle. Then every edge that lies below begins at them, and saturation, which closes sets
+    under the edges that begin at one level, has half of a system to close at once. If they are last, each edge begins at
+    what is its own.
+    """
+    count_of = Counter(item for edge in edges for item in edge)
+    least = max(_HUB_EDGES, len(edges) // _HUB_SHARE)
+    hubs = {item for item, count in count_of.items() if count >= least}
+    return (*(item for item in order if item not in hubs), *(item for item in order if item in hubs))
 
 
 def best_order(count: int, edges: Sequence[Sequence[int]]) -> tuple[int, ...]:

@@ -12,7 +12,7 @@ from robosc.automata import DiscreteVariable, EventCondition, System, to_automat
 from robosc.automata.state import Subject, subjects
 from robosc.expressions import Binary, BooleanType, Unary, VariableRead, conjunction
 from robosc.model.structure import Deployment
-from robosc.synthesis.order import best_order, block_order, force, hyperedges, slide, span, traversal
+from robosc.synthesis.order import best_order, block_order, force, hubs_last, hyperedges, slide, span, traversal
 from support.models import example_model
 from support.random_systems import any_systems
 from support.systems import automaton, system
@@ -82,6 +82,16 @@ def test_rows_and_trees_are_found_again_whatever_the_declared_order(seed: int) -
     assert span(best_order(63, row), row) == 62
     tree = [[shuffled[place], shuffled[(place - 1) // 2]] for place in range(1, 63)]
     assert span(best_order(63, tree), tree) <= 170
+
+
+def test_what_a_large_part_of_all_edges_has_in_common_is_last() -> None:
+    spokes = [[0, item] for item in range(1, 21)]
+    order = (*range(5, 21), 0, *range(1, 5))
+    assert hubs_last(order, spokes) == (*range(5, 21), *range(1, 5), 0)
+    # Fewer edges than a hub has, and fewer than a quarter of all.
+    assert hubs_last(order, spokes[:15]) == order
+    rows = [[item, item + 1] for item in range(1, 20)] * 4
+    assert hubs_last(order, [*spokes, *rows]) == order
 
 
 @given(any_systems())

@@ -93,11 +93,12 @@ def product_line(size: int, seed: int) -> System:
         name = f"D{number}"
         is_lamp = number > 1 and dice.random() < 0.6
         devices.append(_switch(name, is_controllable=is_lamp))
-        feature = read(f"F{dice.randrange(count)}.has")
+        # Devices of one feature, and what they show of each other, are near each other.
+        feature = read(f"F{min(count - 1, number // 2 + dice.randrange(2))}.has")
         prefix = "" if is_lamp else "u_"
         allowed += [(f"{prefix}{name}_on", feature), (f"{prefix}{name}_off", feature)]
         if is_lamp:
-            shown = dice.sample(range(number), min(number, 2))
+            shown = dice.sample(range(max(0, number - 6), number), 2)
             needs.append((f"{name}_on", _either(*(StateTest(f"D{other}", "on") for other in shown))))
             needs.append((f"{name}_off", StateTest(f"D{shown[0]}", "off")))
     return replace(_with(system(*flags, *devices), needs, allowed), initial=conjunction(*rules))
@@ -319,7 +320,7 @@ SEEDED_FAMILIES: dict[str, Callable[[int, int], System]] = {
     "product line": product_line,
     "movable bridges": movable_bridges,
     "locks": locks,
-    "tower": partial(_without_chance, lambda floors: cat_and_mouse(floors, 2), 10),
+    "tower": partial(_without_chance, lambda floors: cat_and_mouse(floors, 2), 50),
     "cluster tools": cluster_tools,
     "philosophers": partial(_without_chance, lambda count: dining_philosophers(max(2, count)), 2),
     "fleet in zones": fleet,

@@ -36,8 +36,8 @@ _CLEARLY = 0.9
 """Share of the span of the declared start up to which another start is better: within that, nothing is gained."""
 
 _HUB_EDGES = 16
-_HUB_SHARE = 4
-"""Edges that a thing is in so that it counts as a hub: so many, and one of so many of all."""
+_HUB_FACTOR = 4
+"""Edges that a thing is in so that it counts as a hub: so many, and so many times as many as others are in."""
 
 _SLIDES = 4
 """Times that the window slides at most."""
@@ -57,20 +57,23 @@ def block_order(
     together = (*hyperedges(system), *map(subjects_read, conditions))
     edges = [sorted({index[subject] for subject in edge}) for edge in together]
     edges = [edge for edge in edges if len(edge) > 1]
-    return tuple(blocks[place] for place in hubs_last(best_order(len(blocks), edges), edges))
+    hubs = hubs_of(edges)
+    # Through a hub everything is near everything: the order of the rest is found without.
+    rest = [item for item in ([place for place in edge if place not in hubs] for edge in edges) if len(item) > 1]
+    order = best_order(len(blocks), rest)
+    return tuple(blocks[place] for place in sorted(order, key=lambda place: place in hubs))
 
 
-def hubs_last(order: Sequence[int], edges: Sequence[Sequence[int]]) -> tuple[int, ...]:
-    """The order with those things last that a large part of all edges has in common.
+def hubs_of(edges: Sequence[Sequence[int]]) -> frozenset[int]:
+    """The things that are in many more edges than others; they come last in the order.
 
-    FORCE puts them in the middle. Then every edge that lies below begins at them, and saturation, which closes sets
-    under the edges that begin at one level, has half of a system to close at once. If they are last, each edge begins at
-    what is its own.
+    FORCE would put them in the middle. Then every edge that lies below begins at them, and saturation, which closes
+    sets under the edges that begin at one level, has half of a system to close at once. If they are last, each edge
+    begins at what is its own.
     """
     count_of = Counter(item for edge in edges for item in edge)
-    least = max(_HUB_EDGES, len(edges) // _HUB_SHARE)
-    hubs = {item for item, count in count_of.items() if count >= least}
-    return (*(item for item in order if item not in hubs), *(item for item in order if item in hubs))
+    least = max(_HUB_EDGES, _HUB_FACTOR * count_of.total() / max(1, len(count_of)))
+    return frozenset(item for item, count in count_of.items() if count >= least)
 
 
 def best_order(count: int, edges: Sequence[Sequence[int]]) -> tuple[int, ...]:

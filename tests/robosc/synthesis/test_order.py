@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 
 from robosc.automata import DiscreteVariable, EventCondition, System, to_automata
 from robosc.automata.state import Subject, subjects
-from robosc.expressions import Binary, BooleanType, Unary, VariableRead, conjunction
+from robosc.expressions import Binary, BooleanType, StateTest, Unary, VariableRead, conjunction
 from robosc.model.structure import Deployment
-from robosc.synthesis.order import best_order, block_order, force, hubs_last, hyperedges, slide, span, traversal
+from robosc.synthesis.order import best_order, block_order, force, hubs_of, hyperedges, slide, span, traversal
 from support.models import example_model
 from support.random_systems import any_systems
 from support.systems import automaton, system
@@ -84,14 +84,19 @@ def test_rows_and_trees_are_found_again_whatever_the_declared_order(seed: int) -
     assert span(best_order(63, tree), tree) <= 170
 
 
-def test_what_a_large_part_of_all_edges_has_in_common_is_last() -> None:
+def test_what_is_in_many_more_edges_than_others_is_last() -> None:
     spokes = [[0, item] for item in range(1, 21)]
-    order = (*range(5, 21), 0, *range(1, 5))
-    assert hubs_last(order, spokes) == (*range(5, 21), *range(1, 5), 0)
-    # Fewer edges than a hub has, and fewer than a quarter of all.
-    assert hubs_last(order, spokes[:15]) == order
-    rows = [[item, item + 1] for item in range(1, 20)] * 4
-    assert hubs_last(order, [*spokes, *rows]) == order
+    assert hubs_of(spokes) == {0}
+    # Fewer edges than a hub has, and not many more than others.
+    assert hubs_of(spokes[:15]) == frozenset()
+    assert hubs_of([*spokes, *([item, item + 1] for item in range(1, 20) for _ in range(4))]) == frozenset()
+    clients = [
+        automaton(f"C{number}", [f"idle -go{number}-> busy", f"busy -end{number}-> idle"]) for number in range(20)
+    ]
+    fault = automaton("A", ["off -fail-> on", "on -mend-> off"])
+    needs = {f"go{number}": StateTest("A", "off") for number in range(20)}
+    made = system(fault, *clients, conditions=needs)
+    assert block_order(made, [(subject,) for subject in subjects(made)])[-1] == (Subject("A"),)
 
 
 @given(any_systems())

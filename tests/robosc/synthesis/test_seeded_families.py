@@ -1,4 +1,4 @@
-"""The seeded families at sizes that the explicit twin manages: in whatever order they are declared, the same comes out."""
+"""The seeded families at sizes that the explicit twin manages: the same comes out in every order of declarations."""
 
 import pytest
 

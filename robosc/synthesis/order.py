@@ -54,10 +54,12 @@ def block_order(
         conditions: Conditions beside those of the system whose subjects are to stand near each other, too.
     """
     index = {subject: place for place, block in enumerate(blocks) for subject in block}
-    together = (*hyperedges(system), *map(subjects_read, conditions))
+    of_conditions = tuple(map(subjects_read, conditions))
+    together = (*hyperedges(system), *of_conditions)
     edges = [sorted({index[subject] for subject in edge}) for edge in together]
     edges = [edge for edge in edges if len(edge) > 1]
-    hubs = hubs_of(edges)
+    # What conditions of their own remember of a hub has to stand near it, not below everything.
+    hubs = frozenset[int]() if of_conditions else hubs_of(edges)
     # Through a hub everything is near everything: the order of the rest is found without.
     rest = [item for item in ([place for place in edge if place not in hubs] for edge in edges) if len(item) > 1]
     order = best_order(len(blocks), rest)

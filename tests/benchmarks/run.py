@@ -2,6 +2,7 @@
 
 Usage: run.py [NAME...]                       (all of them without an argument; a wrong name lists them)
        run.py cif DIR [--against FILE]    (a folder of CIF models: see cif.py)
+       run.py families DIR                (a folder of CIF models in shuffled orders: see families.py)
 """
 
 import sys
@@ -27,6 +28,7 @@ import cold_start
 import conditions
 import editor
 import execution
+import families
 import goal_checks
 import goals
 import gr1
@@ -42,6 +44,7 @@ _MODULES = (
         conditions,
         editor,
         execution,
+        families,
         goal_checks,
         goals,
         gr1,
@@ -63,6 +66,9 @@ def main() -> int:
     """Print the tables that were asked for."""
     if sys.argv[1:2] == ["cif"]:
         sys.stdout.write(cif.table(sys.argv[2:]) + "\n")
+        return 0
+    if sys.argv[1:2] == ["families"] and sys.argv[2:]:
+        sys.stdout.write(families.table(sys.argv[2:]) + "\n")
         return 0
     names = sys.argv[1:] or list(TABLES)
     unknown = [name for name in names if name not in TABLES]

@@ -4,14 +4,15 @@ from dataclasses import replace
 from itertools import permutations
 from random import Random
 
+import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
 from robosc.automata import DiscreteVariable, EventCondition, System, to_automata
 from robosc.automata.state import Subject, subjects
-from robosc.expressions import Binary, BooleanType, Unary, VariableRead, conjunction
+from robosc.expressions import Binary, BooleanType, StateTest, Unary, VariableRead, conjunction
 from robosc.model.structure import Deployment
-from robosc.synthesis.order import block_order, force, hyperedges, slide, span
+from robosc.synthesis.order import best_order, block_order, force, hubs_of, hyperedges, slide, span, traversal
 from support.models import example_model
 from support.random_systems import any_systems
 from support.systems import automaton, system
@@ -51,6 +52,51 @@ def test_a_shuffled_chain_is_put_in_order() -> None:
     edges = [shuffled[place : place + 2] for place in range(19)]
     assert span(range(20), edges) > 100
     assert span(force(20, edges), edges) <= 40
+
+
+@given(st.integers(1, 12), st.booleans(), st.integers(0, 2**32 - 1))
+def test_a_traversal_names_each_thing_once(count: int, is_depth_first: bool, seed: int) -> None:
+    random = Random(seed)
+    edges = [random.sample(range(count), random.randint(1, min(4, count))) for _ in range(random.randint(0, 8))]
+    order = traversal(count, edges, is_depth_first=is_depth_first)
+    assert sorted(order) == list(range(count))
+    place = {item: number for number, item in enumerate(order)}
+    for part in _parts(count, edges):
+        # Parts that nothing joins stand one after the other.
+        assert max(place[item] for item in part) - min(place[item] for item in part) == len(part) - 1
+    assert span(best_order(count, edges), edges) <= span(slide(force(count, edges), edges), edges)
+
+
+def _parts(count: int, edges: list[list[int]]) -> list[set[int]]:
+    parts = [{item} for item in range(count)]
+    for edge in edges:
+        together = [part for part in parts if part & set(edge)]
+        parts = [part for part in parts if part not in together] + [set().union(*together)]
+    return parts
+
+
+@pytest.mark.parametrize("seed", range(20))
+def test_rows_and_trees_are_found_again_whatever_the_declared_order(seed: int) -> None:
+    shuffled = Random(seed).sample(range(63), 63)
+    row = [shuffled[place : place + 2] for place in range(62)]
+    assert span(best_order(63, row), row) == 62
+    tree = [[shuffled[place], shuffled[(place - 1) // 2]] for place in range(1, 63)]
+    assert span(best_order(63, tree), tree) <= 170
+
+
+def test_what_is_in_many_more_edges_than_others_is_last() -> None:
+    spokes = [[0, item] for item in range(1, 21)]
+    assert hubs_of(spokes) == {0}
+    # Fewer edges than a hub has, and not many more than others.
+    assert hubs_of(spokes[:15]) == frozenset()
+    assert hubs_of([*spokes, *([item, item + 1] for item in range(1, 20) for _ in range(4))]) == frozenset()
+    clients = [
+        automaton(f"C{number}", [f"idle -go{number}-> busy", f"busy -end{number}-> idle"]) for number in range(20)
+    ]
+    fault = automaton("A", ["off -fail-> on", "on -mend-> off"])
+    needs = {f"go{number}": StateTest("A", "off") for number in range(20)}
+    made = system(fault, *clients, conditions=needs)
+    assert block_order(made, [(subject,) for subject in subjects(made)])[-1] == (Subject("A"),)
 
 
 @given(any_systems())

@@ -292,8 +292,8 @@ class AutomataWriter(ABC):
                 Assign(self._after.variable_place(automaton.name, update.variable), self._stored(type_, value))
             )
         if edge.target != edge.source:
-            place = self._after.location_place(automaton.name)
-            found.append(Assign(place, self._after.location_code(automaton.name, edge.target)))
+            target = self._after.location_place(automaton.name)
+            found.append(Assign(target, self._after.location_code(automaton.name, edge.target)))
         return found
 
 

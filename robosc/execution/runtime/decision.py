@@ -62,8 +62,9 @@ class FairPolicy:
             )
         latest_favour = self._decision - self._count
         best, best_is_new = _NEVER, False
+        known = frozenset(previous)
         for request in candidates:
-            is_new = request not in previous and self._favoured[request] <= latest_favour
+            is_new = request not in known and self._favoured[request] <= latest_favour
             if best == _NEVER or (is_new and not best_is_new):
                 best, best_is_new = request, is_new
             elif is_new is best_is_new and issued[request] < issued[best]:

@@ -9,7 +9,7 @@ import io
 import textwrap
 import tokenize
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from token import COMMENT, DEDENT, ENDMARKER, FSTRING_END, FSTRING_START, INDENT, NEWLINE, NL, OP, STRING
 
 from robosc.errors import InternalError
@@ -86,12 +86,32 @@ def folded(text: str) -> str:
     for row, line in enumerate(lines, 1):
         if row in ends:
             found.append(line + _MARK if row in marked else line)
+        elif len(line) <= WIDTH or line.endswith(_MARK):
+            found.append(line)
         else:
             found += _broken(line, tokens.get(row, []), is_inside=depths[row] > 0)
     result = "\n".join(found) + "\n"
-    if ast.dump(ast.parse(result)) != ast.dump(ast.parse(text)):
+    if not _is_same(ast.parse(result), ast.parse(text)):
         raise InternalError("a generated module has another meaning with shorter lines")
     return result
+
+
+def _is_same(first: object, second: object) -> bool:
+    """Return True if two syntax trees differ at most in places."""
+    to_do = [(first, second)]
+    while to_do:
+        one, other = to_do.pop()
+        if type(one) is not type(other):
+            return False
+        if isinstance(one, ast.AST):
+            to_do += ((getattr(one, name, None), getattr(other, name, None)) for name in one._fields)
+        elif isinstance(one, list) and isinstance(other, list):
+            if len(one) != len(other):
+                return False
+            to_do += zip(one, other, strict=True)
+        elif one is not other and repr(one) != repr(other):
+            return False
+    return True
 
 
 def _read(text: str, lines: Sequence[str]) -> Iterator[tokenize.TokenInfo]:
@@ -113,10 +133,7 @@ def _read(text: str, lines: Sequence[str]) -> Iterator[tokenize.TokenInfo]:
 
 
 def _broken(line: str, tokens: Sequence[_Token], is_inside: bool) -> Iterator[str]:
-    """A line as several; `is_inside` is true if it stands between brackets."""
-    if len(line) <= WIDTH or line.endswith(_MARK):
-        yield line
-        return
+    """A line that is too long as several; `is_inside` is true if it stands between brackets."""
     indent = line[: len(line) - len(line.lstrip())]
     if tokens[-1].kind == COMMENT:
         yield from _comment(indent, tokens[-1].text)
@@ -155,7 +172,7 @@ def _stripped(tokens: Sequence[_Token]) -> list[_Token]:
     found: list[_Token] = []
     for number, token in enumerate(kept):
         depth -= number in closing
-        found.append(replace(token, depth=depth))
+        found.append(token if token.depth == depth else _Token(token.kind, token.text, depth))
         depth += number in pairs
     return found
 

@@ -67,6 +67,7 @@ def folded(text: str) -> str:
     depths: dict[int, int] = {}
     tokens: dict[int, list[_Token]] = {}
     depth, place = 0, (0, 0)
+    long = {row for row, line in enumerate(lines, 1) if len(line) > WIDTH}
     for token in _read(text, lines):
         row, column = token.start
         # Texts of several lines, or that could be: what stands in them is no code, whatever it looks like.
@@ -75,18 +76,18 @@ def folded(text: str) -> str:
         depths.setdefault(row, depth)
         if token.type == OP:
             depth += (token.string in _OPEN) - (token.string in _CLOSE)
-        if token.type not in _LAYOUT:
+        if row in long and token.type not in _LAYOUT:
             before = lines[row - 1][place[1] : column] if row in tokens and place[0] == row else ""
             blanks = [_Token(INDENT, before)] if before else []
             tokens.setdefault(row, []).extend([*blanks, _Token(token.type, token.string)])
             place = token.end
-    marked = {ends[row] for row, line in enumerate(lines, 1) if row in ends and len(line) > WIDTH}
+    marked = {ends[row] for row, line in enumerate(lines, 1) if row in ends and row in long}
     marked -= {row for row in marked if lines[row - 1].endswith(_MARK)}
     found: list[str] = []
     for row, line in enumerate(lines, 1):
         if row in ends:
             found.append(line + _MARK if row in marked else line)
-        elif len(line) <= WIDTH or line.endswith(_MARK):
+        elif row not in long or line.endswith(_MARK):
             found.append(line)
         else:
             found += _broken(line, tokens.get(row, []), is_inside=depths[row] > 0)

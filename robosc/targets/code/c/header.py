@@ -23,7 +23,7 @@ from robosc.expressions import (
     type_text,
 )
 from robosc.model.received import required_parts
-from robosc.model.structure import CommunicationKind, EventKind
+from robosc.model.structure import Communication, CommunicationKind, EventKind
 from robosc.supervisor import Supervisor
 from robosc.targets.code.c.layer import request_declarations
 from robosc.targets.code.c.layout import Layout, data_that_comes, event_data, width
@@ -397,7 +397,7 @@ def _entries(layout: Layout) -> list[str]:
     """The functions through which data comes."""
     lines = request_declarations(layout) if layout.is_layer else []
     for identifier in layout.received_topics:
-        names = ", ".join(item.name for item in layout.batches.get(identifier, []))
+        names = ", ".join(item.name for item in batch(layout, identifier))
         lines += [
             *comment(
                 f"A message came on {identifier}: {names}.{_null_words(layout, identifier)}{_message_words(layout)}"
@@ -426,9 +426,14 @@ def _entries(layout: Layout) -> list[str]:
     return lines
 
 
+def batch(layout: Layout, identifier: str) -> list[Communication]:
+    """The outgoing messages of an identifier, in source order."""
+    return layout.batches.get(identifier, [])
+
+
 def batch_parameters(layout: Layout, identifier: str) -> dict[str, str]:
     """Parameter by type of what comes on an identifier: messages made from one type share one."""
-    types = [event_data(layout.model, item.event(EventKind.RESPONSE)) for item in layout.batches.get(identifier, [])]
+    types = [event_data(layout.model, item.event(EventKind.RESPONSE)) for item in batch(layout, identifier)]
     raws = list(dict.fromkeys(layout.raw(type_) for type_ in types if type_ is not None))
     return {raw: "data" if len(raws) == 1 else f"data_{number}" for number, raw in enumerate(raws, 1)}
 
@@ -437,7 +442,7 @@ def receive_head(layout: Layout, identifier: str) -> str:
     """The head of the function that takes a message."""
     parameters = [f"{layout.prefix}_t *r", "uint64_t now_us"]
     types: dict[str, Type] = {}
-    for item in layout.batches.get(identifier, []):
+    for item in batch(layout, identifier):
         type_ = event_data(layout.model, item.event(EventKind.RESPONSE))
         if type_ is not None:
             types.setdefault(layout.raw(type_), type_)
@@ -463,7 +468,7 @@ def reply_head(layout: Layout, event: str) -> str:
 
 def _null_words(layout: Layout, identifier: str) -> str:
     """Words on no data, where data is handed over by its address."""
-    model, events = layout.model, [item.event(EventKind.RESPONSE) for item in layout.batches.get(identifier, [])]
+    model, events = layout.model, [item.event(EventKind.RESPONSE) for item in batch(layout, identifier)]
     types = [type_ for event in events if (type_ := event_data(model, event)) is not None]
     if not any(layout.is_by_pointer(type_) for type_ in types):
         return ""
@@ -495,4 +500,4 @@ def _passed_on(layout: Layout) -> list[str]:
     return ["const void *message"] if layout.is_layer else []
 
 
-__all__ = ["counts", "head", "header_file", "receive_head", "reply_head", "runtime_text"]
+__all__ = ["batch", "counts", "head", "header_file", "receive_head", "reply_head", "runtime_text"]

@@ -1,7 +1,7 @@
 """The generated README: its files, how to build them, and what they need."""
 
 from robosc.model.structure import CommunicationKind, EventKind
-from robosc.targets.code.c.header import receive_head, reply_head
+from robosc.targets.code.c.header import batch, receive_head, reply_head
 from robosc.targets.code.c.layer import request_heads
 from robosc.targets.code.c.unit import Unit
 from robosc.targets.text import requirements_chapter
@@ -104,7 +104,7 @@ def readme_file(unit: Unit) -> str:
     layout = unit.layout
     functions = [head for _, head in request_heads(layout)] if layout.is_layer else []
     functions += [
-        receive_head(layout, identifier) for identifier in layout.received_topics if layout.batches.get(identifier, [])
+        receive_head(layout, identifier) for identifier in layout.received_topics if batch(layout, identifier)
     ]
     for item in layout.model.communications:
         if item.kind is CommunicationKind.ACTION:

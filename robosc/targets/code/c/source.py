@@ -10,7 +10,7 @@ from robosc.model.received import converted_paths, required_parts
 from robosc.model.structure import CommunicationKind, EventKind, is_tau
 from robosc.targets.code.c.conditions import CConditions
 from robosc.targets.code.c.expressions import number_code
-from robosc.targets.code.c.header import batch_parameters, counts, head, receive_head, reply_head, runtime_text
+from robosc.targets.code.c.header import batch, batch_parameters, counts, head, receive_head, reply_head, runtime_text
 from robosc.targets.code.c.helpers import HELPERS, called
 from robosc.targets.code.c.layer_source import request_functions
 from robosc.targets.code.c.layout import Layout, data_that_comes, event_data
@@ -350,12 +350,12 @@ def _entries(layout: Layout) -> list[list[str]]:
         parameters = batch_parameters(layout, identifier)
         ignored = statement_lines(unused(*parameters.values()))
         body = ["if (!r->is_started) {", "    return;", "}", _LOOK]
-        for item in layout.batches.get(identifier, []):
+        for item in batch(layout, identifier):
             data = event_data(layout.model, item.event(EventKind.RESPONSE))
             body += _refused(
                 layout, item.event(EventKind.RESPONSE), data, "" if data is None else parameters[layout.raw(data)]
             )
-        for item in layout.batches.get(identifier, []):
+        for item in batch(layout, identifier):
             event = item.event(EventKind.RESPONSE)
             data = event_data(layout.model, event)
             arguments = ["r", *([parameters[layout.raw(data)]] if data is not None else []), "true"]

@@ -4,7 +4,7 @@ The states of the whole are all combinations of those of its parts, and each eve
 safe, controllable, nonblocking and as permissive as can be exactly if each part is.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 
 from robosc.automata.compile import subjects_read
 from robosc.automata.structure import System
@@ -39,7 +39,7 @@ def independent_parts(system: System, together: Iterable[Iterable[str]] = ()) ->
     # An event, or an invariant, of no automaton is in no part: such systems are left whole.
     if len(members) < 2 or not placed <= members.keys():
         return (system,)
-    return tuple(_part(system, groups, group) for group in members)
+    return tuple(_parts(system, groups, members))
 
 
 def _constants(system: System, groups: "_Groups") -> Iterator[str]:
@@ -49,23 +49,44 @@ def _constants(system: System, groups: "_Groups") -> Iterator[str]:
             yield "constant"
 
 
-def _part(system: System, groups: "_Groups", group: str) -> System:
-    def is_inside(expression: Expression) -> bool:
-        return any(groups.of(name) == group for name in _read(expression))
+def _parts(system: System, groups: "_Groups", members: Iterable[str]) -> Iterator[System]:
+    """The part of each group."""
 
-    events = {event.name for event in system.events if groups.of(_event(event.name)) == group}
-    return System(
-        name=system.name,
-        events=tuple(event for event in system.events if event.name in events),
-        automata=tuple(automaton for automaton in system.automata if groups.of(automaton.name) == group),
-        inputs=tuple(item for item in system.inputs if item.event in events),
-        conditions=tuple(item for item in system.conditions if item.event in events),
-        invariants=tuple(filter(is_inside, system.invariants)),
-        initial=system.initial if is_inside(system.initial) else TRUE,
-        marker=system.marker if is_inside(system.marker) else TRUE,
-        plant_conditions=tuple(item for item in system.plant_conditions if item.event in events),
-        plant_invariants=tuple(filter(is_inside, system.plant_invariants)),
+    def by_event[T](items: Iterable[T], event_of: Callable[[T], str]) -> dict[str, list[T]]:
+        return _grouped(items, lambda item: groups.of(_event(event_of(item))))
+
+    def by_state(items: Iterable[Expression]) -> dict[str, list[Expression]]:
+        # What reads nothing is in no part.
+        return _grouped(items, lambda item: next((groups.of(name) for name in _read(item)), ""))
+
+    automata = _grouped(system.automata, lambda item: groups.of(item.name))
+    events = by_event(system.events, lambda item: item.name)
+    inputs = by_event(system.inputs, lambda item: item.event)
+    conditions, plant_conditions = (
+        by_event(items, lambda item: item.event) for items in (system.conditions, system.plant_conditions)
     )
+    invariants, plant_invariants = map(by_state, (system.invariants, system.plant_invariants))
+    initial, marker = by_state((system.initial,)), by_state((system.marker,))
+    for group in members:
+        yield System(
+            name=system.name,
+            events=tuple(events.get(group, ())),
+            automata=tuple(automata.get(group, ())),
+            inputs=tuple(inputs.get(group, ())),
+            conditions=tuple(conditions.get(group, ())),
+            invariants=tuple(invariants.get(group, ())),
+            initial=system.initial if group in initial else TRUE,
+            marker=system.marker if group in marker else TRUE,
+            plant_conditions=tuple(plant_conditions.get(group, ())),
+            plant_invariants=tuple(plant_invariants.get(group, ())),
+        )
+
+
+def _grouped[T](items: Iterable[T], group_of: Callable[[T], str]) -> dict[str, list[T]]:
+    found: dict[str, list[T]] = {}
+    for item in items:
+        found.setdefault(group_of(item), []).append(item)
+    return found
 
 
 def _event(name: str) -> str:

@@ -49,8 +49,9 @@ def permissive_defaults(model: Model, places: Places, defaults: Mapping[str, Loc
         findings: Findings to which the warnings are added.
     """
     reported: set[str] = set()
+    sensors = {item.event(EventKind.RESPONSE): item for item in model.communications if _is_sensor(item)}
     for component, behaviour in ((item.name, item.behaviour) for item in model.components):
-        for name, enum in _sensed(model, behaviour):
+        for name, enum in _sensed(model, sensors, behaviour):
             if enum.name in reported or enum.name not in defaults or not _falls_to_default(model, enum):
                 continue
             let_through = [
@@ -64,9 +65,10 @@ def permissive_defaults(model: Model, places: Places, defaults: Mapping[str, Loc
                 _report(enum, defaults[enum.name], forbidding, findings)
 
 
-def _sensed(model: Model, behaviour: Behaviour | None) -> Iterable[tuple[str, EnumDefinition]]:
-    """The variables of a behaviour that hold an enum of an outgoing message, with the enum."""
-    sensors = {item.event(EventKind.RESPONSE): item for item in model.communications if _is_sensor(item)}
+def _sensed(
+    model: Model, sensors: Mapping[str, Communication], behaviour: Behaviour | None
+) -> Iterable[tuple[str, EnumDefinition]]:
+    """The variables of a behaviour that hold an enum of an outgoing message, with the enum; messages by event."""
     found: dict[str, EnumDefinition] = {}
     for transition in behaviour.transitions if behaviour else ():
         sensor = sensors.get(transition.event)

@@ -61,15 +61,13 @@ class FairPolicy:
                 candidates[0] if len(candidates) == 1 else min(candidates, key=issued.__getitem__)
             )
         latest_favour = self._decision - self._count
-        best, best_is_new = _NEVER, False
-        for request in candidates:
-            is_new = request not in previous and self._favoured[request] <= latest_favour
-            if best == _NEVER or (is_new and not best_is_new):
-                best, best_is_new = request, is_new
-            elif is_new is best_is_new and issued[request] < issued[best]:
-                best = request
-        self._new = best_is_new
-        return best
+        new = [
+            request
+            for request in sorted(set(candidates).difference(previous))
+            if self._favoured[request] <= latest_favour
+        ]
+        self._new = bool(new)
+        return min(new or candidates, key=issued.__getitem__)
 
     def issued(self, request: int) -> None:
         """Remember the time, and whether the request was chosen for being new."""

@@ -127,11 +127,14 @@ class Variables:
         groups = tied(self.system, self.place_of, widths, {key: len(item.names) for key, item in self.data.items()})
         beside = self._data_beside(order, groups)
         group_of = {item: group for group in groups for item in group}
+        rank_of = {place: rank for rank, place in enumerate(order)}
         names: list[str] = []
         placed = set[int]()
         for place in order:
             if place not in placed:
-                members = [item for item in order if item in group_of.get(place, {place})]
+                # Groups hold data, too, which the order does not.
+                group = group_of.get(place, {place})
+                members = sorted((item for item in group if isinstance(item, int)), key=rank_of.__getitem__)
                 placed.update(members)
                 names += self._declare_together(members, beside)
         return tuple(names)

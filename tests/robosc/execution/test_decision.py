@@ -115,3 +115,27 @@ def test_random_is_the_same_for_the_same_seed() -> None:
     assert first == run(make_policy("random", NAMES, (), 7), *decisions)
     assert first != run(make_policy("random", NAMES, (), 8), *decisions)
     assert set(first) == {0, 1, 2}
+
+
+@given(st.lists(st.frozensets(st.integers(0, 5)), max_size=12), st.data())
+def test_fair_chooses_as_the_words_say(decisions: list[frozenset[int]], data: st.DataObject) -> None:
+    policy, before = FairPolicy(6), frozenset[int]()
+    issued, favoured = dict.fromkeys(range(6), -1), dict.fromkeys(range(6), -6)
+    for number, enabled in enumerate(decisions):
+        candidates = sorted(enabled)
+        while candidates:
+            chosen = policy.choose(tuple(candidates))
+
+            def is_old(request: int, number: int = number, before: frozenset[int] = before) -> bool:
+                return request in before or favoured[request] > number - 6
+
+            assert chosen == min(candidates, key=lambda item: (is_old(item), issued[item], item))
+            if data.draw(st.booleans()):
+                policy.issued(chosen)
+                issued[chosen] = number
+                if not is_old(chosen):
+                    favoured[chosen] = number
+                break
+            candidates.remove(chosen)
+        policy.close(tuple(sorted(enabled)))
+        before = enabled

@@ -428,7 +428,7 @@ def _entries(layout: Layout) -> list[str]:
 
 def batch(layout: Layout, identifier: str) -> list[Communication]:
     """The outgoing messages of an identifier, in source order."""
-    return [item for item in layout.of_kind(CommunicationKind.OUTGOING_MESSAGE) if item.identifier == identifier]
+    return layout.batches.get(identifier, [])
 
 
 def batch_parameters(layout: Layout, identifier: str) -> dict[str, str]:

@@ -1,6 +1,8 @@
 """Names in C for all parts of a model, and their C types."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 from robosc.automata.executable import CALLED_KINDS, ExecutableSystem
 from robosc.automata.goal_memory import MEMORY
@@ -114,6 +116,14 @@ class Layout:
     def of_kind(self, kind: CommunicationKind) -> tuple[Communication, ...]:
         """Communications of one kind, in source order."""
         return tuple(item for item in self.model.communications if item.kind is kind)
+
+    @cached_property
+    def batches(self) -> Mapping[str, list[Communication]]:
+        """The outgoing messages of each identifier that has any, in source order."""
+        found: dict[str, list[Communication]] = {}
+        for item in self.of_kind(CommunicationKind.OUTGOING_MESSAGE):
+            found.setdefault(item.identifier, []).append(item)
+        return found
 
     @property
     def releases(self) -> tuple[str, ...]:

@@ -118,16 +118,16 @@ def enabled_requests(self):
     if stale:
         self._stale ^= stale
         allowed = self._allowed
-        has_changed = False
+        changed = []
         while stale:
             number = stale.bit_length() - 1
             stale ^= 1 << number
             now = self._allow_request[number]()
             if now is not allowed[number]:
                 allowed[number] = now
-                has_changed = True
-        if has_changed:
-            self._enabled = numbers_of(allowed)
+                changed.append(number)
+        if changed:
+            self._enabled = numbers_after(self._enabled, allowed, changed)
     return self._enabled'''.splitlines()
 
 

@@ -9,7 +9,7 @@ import io
 import textwrap
 import tokenize
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from token import COMMENT, DEDENT, ENDMARKER, FSTRING_END, FSTRING_START, INDENT, NEWLINE, NL, OP, STRING
 
 from robosc.errors import InternalError
@@ -67,6 +67,7 @@ def folded(text: str) -> str:
     depths: dict[int, int] = {}
     tokens: dict[int, list[_Token]] = {}
     depth, place = 0, (0, 0)
+    long = {row for row, line in enumerate(lines, 1) if len(line) > WIDTH}
     for token in _read(text, lines):
         row, column = token.start
         # Texts of several lines, or that could be: what stands in them is no code, whatever it looks like.
@@ -75,23 +76,43 @@ def folded(text: str) -> str:
         depths.setdefault(row, depth)
         if token.type == OP:
             depth += (token.string in _OPEN) - (token.string in _CLOSE)
-        if token.type not in _LAYOUT:
+        if row in long and token.type not in _LAYOUT:
             before = lines[row - 1][place[1] : column] if row in tokens and place[0] == row else ""
             blanks = [_Token(INDENT, before)] if before else []
             tokens.setdefault(row, []).extend([*blanks, _Token(token.type, token.string)])
             place = token.end
-    marked = {ends[row] for row, line in enumerate(lines, 1) if row in ends and len(line) > WIDTH}
+    marked = {ends[row] for row, line in enumerate(lines, 1) if row in ends and row in long}
     marked -= {row for row in marked if lines[row - 1].endswith(_MARK)}
     found: list[str] = []
     for row, line in enumerate(lines, 1):
         if row in ends:
             found.append(line + _MARK if row in marked else line)
+        elif row not in long or line.endswith(_MARK):
+            found.append(line)
         else:
             found += _broken(line, tokens.get(row, []), is_inside=depths[row] > 0)
     result = "\n".join(found) + "\n"
-    if ast.dump(ast.parse(result)) != ast.dump(ast.parse(text)):
+    if not _is_same(ast.parse(result), ast.parse(text)):
         raise InternalError("a generated module has another meaning with shorter lines")
     return result
+
+
+def _is_same(first: object, second: object) -> bool:
+    """Return True if two syntax trees differ at most in places."""
+    to_do = [(first, second)]
+    while to_do:
+        one, other = to_do.pop()
+        if type(one) is not type(other):
+            return False
+        if isinstance(one, ast.AST):
+            to_do += ((getattr(one, name, None), getattr(other, name, None)) for name in one._fields)
+        elif isinstance(one, list) and isinstance(other, list):
+            if len(one) != len(other):
+                return False
+            to_do += zip(one, other, strict=True)
+        elif one is not other and repr(one) != repr(other):
+            return False
+    return True
 
 
 def _read(text: str, lines: Sequence[str]) -> Iterator[tokenize.TokenInfo]:
@@ -113,10 +134,7 @@ def _read(text: str, lines: Sequence[str]) -> Iterator[tokenize.TokenInfo]:
 
 
 def _broken(line: str, tokens: Sequence[_Token], is_inside: bool) -> Iterator[str]:
-    """A line as several; `is_inside` is true if it stands between brackets."""
-    if len(line) <= WIDTH or line.endswith(_MARK):
-        yield line
-        return
+    """A line that is too long as several; `is_inside` is true if it stands between brackets."""
     indent = line[: len(line) - len(line.lstrip())]
     if tokens[-1].kind == COMMENT:
         yield from _comment(indent, tokens[-1].text)
@@ -155,7 +173,7 @@ def _stripped(tokens: Sequence[_Token]) -> list[_Token]:
     found: list[_Token] = []
     for number, token in enumerate(kept):
         depth -= number in closing
-        found.append(replace(token, depth=depth))
+        found.append(token if token.depth == depth else _Token(token.kind, token.text, depth))
         depth += number in pairs
     return found
 

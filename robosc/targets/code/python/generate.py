@@ -105,7 +105,7 @@ def model_part(supervisor: Supervisor) -> str:
 
 
 def _model_part(writer: Writer) -> str:
-    writer.used.add("numbers_of")
+    writer.used |= {"numbers_after", "numbers_of"}
     functions = [converter(writer.layout, enum, writer.used) for enum in writer.model.enums]
     members = _class(writer)
     missing = writer.used - bundle(RUNTIME[writer.layout.supervisor.deployment]).names

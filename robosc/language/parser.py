@@ -540,7 +540,7 @@ class _Parser(MissionParser):
         communication = self.name()
         dot = self.place
         path = tuple(self._path())
-        self.take("to")
+        self._take_behind(dot if path else None, "to")
         first = self.place
         range_ = self._range()
         if path:
@@ -571,11 +571,11 @@ class _Parser(MissionParser):
         dot = None
         while self.texts[self.place] != "}" or properties:
             name = self.name()
-            word = self.texts[self.place - 1]
-            if dot is None and self.texts[self.place] == ".":
-                dot = self.place
+            word, end = self.texts[self.place - 1], self.place
             path = (word, *self._path())
-            self.take(":")
+            self._take_behind(end if len(path) > 1 else None, ":")
+            if dot is None and len(path) > 1:
+                dot = end
             first = self.place
             properties.append((name, read()))
             _nest(nested, path, self.text_since(first))
@@ -592,6 +592,12 @@ class _Parser(MissionParser):
         while self.kinds[self.place + 1] == _NAME and self.takes("."):
             self.name()
             yield self.texts[self.place - 1]
+
+    def _take_behind(self, dot: int | None, text: str) -> None:
+        """Read a sign or word; where it does not stand behind a path that begins at a dot, the dot is at fault."""
+        if dot is not None and self.texts[self.place] != text:
+            self.place = dot
+        self.take(text)
 
     def _not_nested(self, dot: int, meant: str, written: str) -> Fault:
         """Report a path where objects are nested; raise what is returned."""

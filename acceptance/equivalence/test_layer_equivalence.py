@@ -53,7 +53,7 @@ def test_every_kind_of_request(
 def test_calls_and_goals_that_share_a_name_and_are_refused(
     target: MakeTarget, on_ros1: bool, seed: int, tmp_path: Path
 ) -> None:
-    """What is let through, and as which request of the model, depends on the data, and so does what is refused."""
+    """Data decide which request of the model a call or goal is, and if it is let through."""
     supervisor = steward(Deployment.LAYER, on_ros1=on_ros1)
     scenario = layer_node_scenario(supervisor, seed, 180)
     seen = observe(supervisor, scenario)

@@ -56,7 +56,7 @@ def _parts(system: System, groups: "_Groups", members: Iterable[str]) -> Iterato
         return _grouped(items, lambda item: groups.of(_event(event_of(item))))
 
     def by_state(items: Iterable[Expression]) -> dict[str, list[Expression]]:
-        # What reads nothing is in no part.
+        # A condition that reads nothing is in no part.
         return _grouped(items, lambda item: next((groups.of(name) for name in _read(item)), ""))
 
     automata = _grouped(system.automata, lambda item: groups.of(item.name))

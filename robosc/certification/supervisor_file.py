@@ -304,7 +304,7 @@ def state_in_words(system: System, model: Model | None, state: State) -> StateIn
     variables = {variable_text(owner, name): value for (owner, name), value in values.items() if name is not None}
     if model is None:
         locations = {owner: str(value) for (owner, name), value in values.items() if name is None}
-        # Of an input variable, whose automaton has one location, the value is all that there is.
+        # An input variable's automaton has one location: its value is all that there is.
         return StateInWords({owner: item for owner, item in locations.items() if owner not in variables}, variables, {})
     components = {item.name for item in model.components}
     plants = [

@@ -74,7 +74,7 @@ class Lowering(msgspec.Struct):
         marker: Predicates on the marked states.
         roles: Roles of automata and invariants, with their places.
         event_places: Place of the declaration of each event.
-        plant_reads: What plants read, with the places where they do.
+        plant_reads: Expressions of plants, with the places where they do.
         depends: Variables that the initial value of a variable reads, with the places where it does.
     """
 
@@ -367,7 +367,7 @@ class Lowering(msgspec.Struct):
         found: dict[str, frozenset[str] | None] = {"alphabet": None, "monitor": None}
         used = frozenset(edge.event for edge in edges)
         lists = [item for item in scope.body if isinstance(item, syntax.Alphabet)]
-        # What is monitored is in the alphabet, wherever that stands.
+        # A monitored event is in the alphabet, wherever that stands.
         for item in sorted(lists, key=lambda item: item.word):
             if found[item.word] is not None:
                 self.error("cif-structure", f"there are two of '{item.word}' in '{scope.path}'", item.at,

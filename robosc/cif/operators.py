@@ -220,7 +220,7 @@ class Operators:
         """The term of a result that is a real number, if it is one."""
         if not math.isfinite(value):
             return self.mismatch("the result is larger than real numbers can be", at)
-        # There is one zero.
+        # A sum with zero makes the negative zero the one that there is.
         return static(REAL, value + 0.0)
 
     def _sets(self, node: syntax.Binary, left: Term, right: Term) -> Term:

@@ -110,7 +110,7 @@ class Cursor:
         return self._places.location(self._starts[index], self._starts[last] + len(self.texts[last]))
 
     def text_since(self, index: int) -> str:
-        """What is written from a token to the last one that was read."""
+        """The text from a token to the last one that was read."""
         last = self.place - 1
         return self._file.text[self._starts[index] : self._starts[last] + len(self.texts[last])]
 

@@ -107,7 +107,7 @@ class SystemRun(ManualRun):
         self._added = state_predicates(system, supervisor.added)
         self._disabled = Disabled(system, self._added)
         self._subjects = tuple(map(str, subjects(system)))
-        # Of an input variable, the value has the name, and not the only location of its automaton.
+        # The value of an input variable has its name, and not the only location of its automaton.
         self._places = {name: place for place, name in enumerate(self._subjects)}
         self._inputs: dict[str, list[InputVariable]] = {}
         for item in system.inputs:

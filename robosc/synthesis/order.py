@@ -58,7 +58,7 @@ def block_order(
     together = (*hyperedges(system), *of_conditions)
     edges = [sorted({index[subject] for subject in edge}) for edge in together]
     edges = [edge for edge in edges if len(edge) > 1]
-    # What conditions of their own remember of a hub has to stand near it, not below everything.
+    # Places by which conditions of their own remember a hub have to stand near it, not below everything.
     hubs = frozenset[int]() if of_conditions else hubs_of(edges)
     # Through a hub everything is near everything: the order of the rest is found without.
     rest = [item for item in ([place for place in edge if place not in hubs] for edge in edges) if len(item) > 1]
@@ -114,7 +114,7 @@ def traversal(count: int, edges: Sequence[Sequence[int]], *, is_depth_first: boo
     found: dict[int, None] = {}
     for item in sorted(range(count), key=lambda item: len(of_item[item])):
         if item not in found:
-            # What is found last of all, and from there again, is about as far out as anything.
+            # The last thing found, and the last one from there, is about as far out as anything.
             start = _followed(_followed(item, edges, of_item)[-1], edges, of_item)[-1]
             found |= dict.fromkeys(_followed(start, edges, of_item, is_depth_first=is_depth_first))
     return tuple(found)
@@ -123,7 +123,7 @@ def traversal(count: int, edges: Sequence[Sequence[int]], *, is_depth_first: boo
 def _followed(
     start: int, edges: Sequence[Sequence[int]], of_item: Sequence[Sequence[int]], *, is_depth_first: bool = False
 ) -> list[int]:
-    """What is connected with a thing, in the order in which it is found."""
+    """The things connected with one, in the order in which they are found."""
     found: dict[int, None] = {}
     followed = set[int]()
     waiting = deque([start])

@@ -386,7 +386,7 @@ class LayerTwin:
             self.reported.append(("no answer", call.service, call.caller))
             self.settle()
         for goal in self.sorted_goals():
-            # Who cancels a goal waits for its end.
+            # The one that cancels a goal waits for its end.
             if goal.runs_in_model and goal.asked is None and self.now >= goal.until:
                 goal.runs_in_model = False
                 assert self.take(f"{goal.action}.error")

@@ -322,7 +322,8 @@ MISFITS = {
     ),
     "a property that a received message does not have": (
         "interface i use LaserScan from sensor_msgs datatype object S { rages: array(double) }"
-        "component C { outgoing message m with type: S links i }",
+        "component C { outgoing message m with type: S links i"
+        " behaviour { variable n: integer initial marked state s { on response from m do n := length(value.rages) }}}",
         "message m: sensor_msgs/msg/LaserScan has no field 'rages'; it has header, angle_min,",
     ),
     "a basic type for a message of many fields": (
@@ -340,7 +341,8 @@ MISFITS = {
     ),
     "a property that a service's response does not have": (
         "interface i use SetBool from std_srvs datatype object S { succes: boolean }"
-        "component C { service s with request: none, response: S links i }",
+        "component C { service s with request: none, response: S links i"
+        "  behaviour { variable b: boolean on response from s do b := value.succes initial marked state t { } } }",
         "response of service s: std_srvs/srv/SetBool_Response has no field 'succes'; it has success, message",
     ),
     "a stamped goal without a header": (

@@ -96,7 +96,9 @@ def state_by_component(state: StateInWords) -> dict[str, dict[str, Any]]:
     }
     for name, value in state.variables.items():
         component, _, variable = name.rpartition(".")
-        found[component]["variables"][variable] = value
+        # An input variable of a CIF model, outside of automata, is one by itself.
+        owner = component if component in found else name
+        found.setdefault(owner, {"state": "", "variables": {}})["variables"][variable] = value
     return found
 
 

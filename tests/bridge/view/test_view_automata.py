@@ -140,12 +140,10 @@ async def test_events_happen_and_the_others_say_why_not(tmp_path: Path) -> None:
         }
         answer = await done(page, "event", line="tank.c_fill")
         assert (answer["steps"], answer["lines"]) == (1, ["tank.c_fill: order = b, tank.level = 1"])
-        assert answer["blocked"]["tank.c_fill"] == [
-            "requirement order: sensor.value does not hold (sensor.value is false)"
-        ]
+        assert answer["blocked"]["tank.c_fill"] == ["requirement order: sensor does not hold (sensor is false)"]
         assert [item["component"] for item in page.entries()[-1]["transitions"]] == ["tank", "order"]
         answer = await done(page, "event", line="sensor true")
-        assert answer["lines"] == ["sensor (value = true): sensor.value = true"]
+        assert answer["lines"] == ["sensor (value = true): sensor = true"]
         for _ in range(2):
             answer = await done(page, "event", line="tank.c_fill")
         assert answer["blocked"]["tank.c_fill"] == [
@@ -178,12 +176,12 @@ async def test_of_several_outcomes_one_is_chosen(tmp_path: Path) -> None:
         (taken,) = page.entries()[-1]["transitions"]
         assert (taken["component"], taken["id"]) == ("line.belt", 3)
         answer = await done(page, "event", line="sensor")
-        assert answer["choice"]["ways"] == ["sensor.value = false", "sensor.value = true"]
+        assert answer["choice"]["ways"] == ["sensor = false", "sensor = true"]
         assert answer["lines"][0].endswith("choose one beside its button, or enter its data")
         # A number beyond the states that there are chooses none.
         assert (await done(page, "event", line="sensor", way=2))["kind"] == "choose"
         answer = await done(page, "event", line="sensor", way=1)
-        assert answer["lines"] == ["sensor: sensor.value = true"]
+        assert answer["lines"] == ["sensor: sensor = true"]
 
 
 async def test_many_outcomes_are_not_all_offered(tmp_path: Path) -> None:

@@ -175,6 +175,6 @@ def test_what_helps_and_what_keeps_a_goal_from_coming_true() -> None:
 
 
 def test_a_search_that_is_given_up_blames_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("robosc.certification.pipeline.blame_goals", partial(blame_goals, effort=0, least_effort=10))
+    monkeypatch.setattr("robosc.strategies.blame_goals", partial(blame_goals, effort=0, least_effort=10))
     found = explanation_of("goal once Base.inside")
     assert (found.is_minimal, found.blamed) == (False, ())

@@ -330,7 +330,7 @@ def test_simulate_says_which_of_several_states(
 ) -> None:
     path = tmp_path / "choice.cif"
     path.write_text(CHOICE)
-    begin = ["simulate", str(path), "--initial", "sensor.value = false"]
+    begin = ["simulate", str(path), "--initial", "sensor = false"]
 
     def typed(text: str) -> tuple[int, str, str]:
         monkeypatch.setattr("sys.stdin", io.StringIO(text))
@@ -346,7 +346,7 @@ def test_simulate_says_which_of_several_states(
     for text, message in (
         ("p.u -> p = d", "p is never 'd': it is one of a, b, c"),
         ("p.u -> q = a", "there is no part of the state 'q'"),
-        ("p.u", "p: sensor.value does not hold"),
+        ("p.u", "p: sensor does not hold"),
         ("save run.jsonl", "a run of automata is not saved"),
     ):
         status, _, err = typed(f"{text}\n")

@@ -13,7 +13,7 @@
 #include <dlfcn.h>
 #include <limits.h>
 
-/* Steps between two calls of `pause`, which asks whether to go on. */
+/* Steps between two calls of `pause`, which asks whether to go on; the twin of PAUSE in saturation.py. */
 enum { PAUSE = 16 };
 
 typedef struct DdManager DdManager;
@@ -294,17 +294,18 @@ static int report_round(Closure *closure, DdNode *states) {
     return answered(PyObject_CallFunction(closure->report, "LK", closure->reported, address));
 }
 
-/* Call `pause` with the number of steps since its last call; false if it raised an exception. */
-static int may_go_on(Closure *closure) {
+/* Call `pause` with the number of steps since its last call and of the nodes that the next one is about; false if it
+   raised an exception. */
+static int may_go_on(Closure *closure, int nodes) {
     long long steps = closure->taken - closure->asked;
     closure->asked = closure->taken;
-    return answered(PyObject_CallFunction(closure->pause, "L", steps));
+    return answered(PyObject_CallFunction(closure->pause, "Li", steps, nodes));
 }
 
 /* States, and the states within a predicate that a step reaches from the new ones. */
 static DdNode *grown(Closure *closure, DdNode *states, DdNode *within, const Step *step, DdNode *new) {
     DdManager *manager = closure->manager;
-    if (closure->taken % PAUSE == 0 && !may_go_on(closure)) {
+    if (closure->taken % PAUSE == 0 && !may_go_on(closure, cudd.dag_size(new))) {
         return NULL;
     }
     closure->taken++;
@@ -579,7 +580,7 @@ PyObject *diagram_closure(PyObject *module, PyObject *arguments) {
     if (read_groups(&closure, groups) && read_identity(&closure) && make_table(&closure.known, 1024)) {
         found = of_whole(&closure, owned((DdNode *)(uintptr_t)states), (DdNode *)(uintptr_t)within);
     }
-    if (found != NULL && !may_go_on(&closure)) {
+    if (found != NULL && !may_go_on(&closure, 0)) {
         found = instead(closure.manager, found, NULL);
     }
     free_closure(&closure);

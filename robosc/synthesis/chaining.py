@@ -17,6 +17,9 @@ from typing import Any
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.step import Step, is_enough
 
+_STEP_NODES = 1000
+"""Nodes that a step counts for, whatever it is about."""
+
 
 class Chaining:
     """Closure of sets of states under some steps, whatever an engine does with its order meanwhile.
@@ -78,6 +81,8 @@ class Chaining:
 
     def _grown(self, step: Step, states: Any) -> Any:
         self._monitor.check_stop()
+        # The sizes of diagrams depend on the engine while it changes its order.
+        self._monitor.spend(_STEP_NODES)
         return step.grown(states, self._within, states)
 
 

@@ -11,7 +11,8 @@ from typing import Any
 from robosc.synthesis.chaining import Chaining
 from robosc.synthesis.compiled import kernel_of
 from robosc.synthesis.encoding import Encoding
-from robosc.synthesis.engines import Manager, is_reordering
+from robosc.synthesis.engines import Manager
+from robosc.synthesis.engines import is_reordering as may_reorder
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.result import Closure
 from robosc.synthesis.saturation import CompiledSaturation, Saturation, saturation
@@ -30,13 +31,13 @@ def closure_under(
         monitor: Monitor of the waiting caller.
     """
     levels = {name: level for level, name in enumerate(encoding.order)}
-    if is_reordering(encoding.manager):
+    if may_reorder(encoding.manager):
         return Chaining(levels, tuple(steps), within, monitor)
     return saturation(encoding.manager, levels, tuple(steps), within, monitor)
 
 
-def closure_in(manager: Manager) -> Closure:
-    """Return the order of steps that `closure_under` chooses for a manager."""
-    if is_reordering(manager):
+def closure_in(manager: Manager, *, is_reordering: bool) -> Closure:
+    """Return the order of steps that `closure_under` chooses for a manager, which may change its order or not."""
+    if is_reordering:
         return Closure.CHAINING
     return Closure.SATURATION if kernel_of(manager) is None else Closure.COMPILED_SATURATION

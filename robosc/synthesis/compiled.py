@@ -117,7 +117,7 @@ class Kernel:
         within: Any,
         groups: tuple[Any, ...],
         until: Any,
-        pause: Callable[[int], None],
+        pause: Callable[[int, int], None],
         report: Callable[[int, int], None],
     ) -> Any:
         """Return a set of states closed under some steps.
@@ -127,7 +127,8 @@ class Kernel:
             within: Predicate that added states satisfy.
             groups: Steps as `saturation` has them for the kernel.
             until: States once all of which are found the rest is not; or None.
-            pause: Called again and again with the number of steps since the last call; what it raises ends the work.
+            pause: Called again and again with the number of steps since the last call, and that of the nodes which the
+                next step is about; what it raises ends the work.
             report: Called with the number of the round and the address of the states that are found then.
         """
         begin, inside, enough = self.address(states), self.address(within), self.address(until)

@@ -207,25 +207,58 @@ def limited(manager: Manager, maximum_nodes: int | None) -> Iterator[None]:
         NodeLimitError: An operation would have grown too far.
         MemoryError: CUDD was refused memory before that. Mostly it ends the process then, by `exit(1)`.
     """
-    if maximum_nodes is None or not is_compiled(manager):
-        yield
-        return
+    allowed_bytes = _allow(manager, maximum_nodes)
     has_failed = False
-    allowed_bytes = _CUDD_BASE_BYTES + _SLACK * _CUDD_NODE_BYTES * maximum_nodes
-    manager.configure(max_memory=allowed_bytes)  # type: ignore[attr-defined]
     try:
         yield
     except ValueError as error:
-        # The library has no error of its own for this.
-        has_failed = "NULL" in str(error)
+        has_failed = _is_of_cudd(error, allowed_bytes)
         if not has_failed:
             raise
     # Outside of the handler: the error would keep the frames, and they the nodes of a manager that is to end.
     if has_failed:
-        # dd does not report CUDD's error code. The tables of the failed operation are already free again.
-        if _memory_of(manager) < _NEARLY * allowed_bytes:
-            raise MemoryError("the decision diagrams were refused memory")
-        raise node_limit_error(maximum_nodes)
+        raise _failure(manager, maximum_nodes, allowed_bytes)
+
+
+def within_limit[T](manager: Manager, maximum_nodes: int | None, work: Callable[[], T]) -> T:
+    """Return the result of some work that `limited` limits.
+
+    After an error that ends the work, nothing keeps its predicates: context managers of contextlib keep the frames of
+    an error in a cycle.
+
+    Raises:
+        NodeLimitError: An operation would have grown too far.
+        MemoryError: CUDD was refused memory before that.
+    """
+    allowed_bytes = _allow(manager, maximum_nodes)
+    try:
+        return work()
+    except ValueError as error:
+        if not _is_of_cudd(error, allowed_bytes):
+            raise
+    raise _failure(manager, maximum_nodes, allowed_bytes)
+
+
+def _allow(manager: Manager, maximum_nodes: int | None) -> int | None:
+    """Set and return the bytes that CUDD may have for a number of nodes; None for no limit."""
+    if maximum_nodes is None or not is_compiled(manager):
+        return None
+    allowed_bytes = _CUDD_BASE_BYTES + _SLACK * _CUDD_NODE_BYTES * maximum_nodes
+    manager.configure(max_memory=allowed_bytes)  # type: ignore[attr-defined]
+    return allowed_bytes
+
+
+def _is_of_cudd(error: ValueError, allowed_bytes: int | None) -> bool:
+    """Return True if CUDD, whose memory is limited, has given an operation up; it has no error of its own for this."""
+    return allowed_bytes is not None and "NULL" in str(error)
+
+
+def _failure(manager: Manager, maximum_nodes: int | None, allowed_bytes: int | None) -> NodeLimitError | MemoryError:
+    """Return the error for a failed operation: dd does not report CUDD's error code."""
+    # The tables of the failed operation are already free again.
+    if _memory_of(manager) < _NEARLY * (allowed_bytes or 0):
+        return MemoryError("the decision diagrams were refused memory")
+    return node_limit_error(maximum_nodes or 0)
 
 
 def _memory_of(manager: Any) -> float:
@@ -236,11 +269,15 @@ def _memory_of(manager: Any) -> float:
         return float(manager.statistics()["mem"])
 
 
-def node_check(manager: Manager, maximum_nodes: int | None) -> Callable[[], None]:
-    """Return a check that raises NodeLimitError once a manager has more nodes in use than it may."""
+def node_check(managers: Sequence[Manager], maximum_nodes: int | None) -> Callable[[], None]:
+    """Return a check that raises NodeLimitError once some managers together have more nodes in use than they may."""
 
     def check() -> None:
-        if maximum_nodes is not None and len(manager) > maximum_nodes and node_count_of(manager) > maximum_nodes:
+        if (
+            maximum_nodes is not None
+            and sum(map(len, managers)) > maximum_nodes
+            and sum(map(node_count_of, managers)) > maximum_nodes
+        ):
             raise node_limit_error(maximum_nodes)
 
     return check

@@ -9,6 +9,7 @@ the order of the events.
 from collections.abc import Callable, Iterable, Iterator
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from robosc.expressions import Expression
@@ -16,13 +17,11 @@ from robosc.synthesis.chaining import Chaining
 from robosc.synthesis.closure import closure_under
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.expression_encoder import ExpressionEncoder
-from robosc.synthesis.monitor import BoundedMonitor, ProgressMonitor
+from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.race import Race, Runner
 from robosc.synthesis.saturation import CompiledSaturation, Saturation
 from robosc.synthesis.step import Step
 from robosc.synthesis.transitions import Steps
-
-_FIRST_STEPS = 16_000
-"""Steps that each of two ways is tried with at first; most systems need fewer."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -112,9 +111,7 @@ class FixedPoint:
         """The good states, of which some that no run reaches may be left out.
 
         From the marked states backwards there may be very many that no run reaches, with large diagrams; onwards from
-        the initial ones there may be very many that are not good. Neither is known beforehand, so both are tried in
-        turn, each time with more steps, until one of them comes to its end: then so does the other within what it has
-        found, or need not. A step is the same for every engine, and so is the result.
+        the initial ones there may be very many that are not good. Neither is known beforehand, so there is a race.
 
         Args:
             problem: The problem.
@@ -122,15 +119,9 @@ class FixedPoint:
         """
         if self._encoding.system.is_controlled:
             return self._given(problem)
-        start = self.initial & problem.safe
-        found, reached = self._first_of(
-            lambda solver: solver.good_states(problem, known),
-            lambda solver: solver.states_from(problem, start, problem.safe),
+        return self._first_of(
+            lambda solver: solver.good_states(problem, known), lambda solver: solver.reached_good_states(problem, known)
         )
-        if found is not None:
-            return found
-        found = self.good_states(Problem(problem.steps, reached), known & reached)
-        return replace(found, is_of_reached=True)
 
     def _given(self, problem: Problem) -> GoodStates:
         """The states that a supervisor may be in which is in the system already: all that it lets be."""
@@ -143,11 +134,10 @@ class FixedPoint:
         As in `solution` some may be left out, but none that a step leads to which may lead out of the safe states, too:
         a supervisor never lets it happen, and whoever asks why looks at all of its targets.
         """
-        found, ahead = self._first_of(
+        return self._first_of(
             lambda solver: solver.nonblocking_states(problem, states),
-            lambda solver: solver._states_ahead(problem),
+            lambda solver: solver.nonblocking_states(problem, states & solver._states_ahead(problem)),
         )
-        return self.nonblocking_states(problem, states & ahead) if found is None else found
 
     def _states_ahead(self, problem: Problem) -> Any:
         """The safe states that steps lead to from the initial ones and from each other, wherever else they may lead."""
@@ -155,25 +145,23 @@ class FixedPoint:
         closure = self._closure((self._onwards(steps, everywhere) for steps in self._each(problem)), problem.safe)
         return closure.of(self.initial & problem.safe, "reachability")
 
-    def _first_of[First, Second](
-        self, first: Callable[["FixedPoint"], First], second: Callable[["FixedPoint"], Second]
-    ) -> tuple[First | None, Second | None]:
-        """Return the result of one of two works, tried in turn with more and more steps; None for the other."""
-        limit = _FIRST_STEPS
-        while True:
-            found = self._bounded(limit, first)
-            if found is not None:
-                return found, None
-            other = self._bounded(limit, second)
-            if other is not None:
-                return None, other
-            limit *= 2
+    def _first_of[T](self, *works: "Callable[[FixedPoint], T]") -> T:
+        """Return the result of the work that comes to its end first."""
+        race = Race(self._monitor)
+        solver = self.under(race)
+        return race.first_of([Runner(partial(work, solver)) for work in works])
 
-    def _bounded[T](self, limit: int, work: Callable[["FixedPoint"], T]) -> T | None:
-        """Return the result of some work, or None if it takes more steps than a limit."""
-        solver, monitor = copy(self), BoundedMonitor(self._monitor, limit)
-        solver._monitor = monitor
-        return monitor.result_of(lambda: work(solver))
+    def under(self, monitor: ProgressMonitor) -> "FixedPoint":
+        """The same under another monitor."""
+        other = copy(self)
+        other._monitor = monitor
+        return other
+
+    def reached_good_states(self, problem: Problem, known: Any) -> GoodStates:
+        """The good states among those that the problem lets runs reach; `known` states are known to be good."""
+        reached = self.states_from(problem, self.initial & problem.safe, problem.safe)
+        found = self.good_states(Problem(problem.steps, reached), known & reached)
+        return replace(found, is_of_reached=True)
 
     def good_states(self, problem: Problem, known: Any) -> GoodStates:
         """The states from which a supervisor can solve a problem; `known` states are known beforehand to be good."""

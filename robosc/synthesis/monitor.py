@@ -44,11 +44,21 @@ class ProgressMonitor:
             raise SynthesisCancelled("synthesis was stopped")
         self._check_nodes()
 
+    def spend(self, nodes: int) -> None:
+        """After some work.
+
+        Args:
+            nodes: Nodes that it was about, the same for every engine.
+        """
+
     def report(self, phase: str, rounds: int, states: Any) -> None:
         """After each round: its phase and number, and the predicate that was found."""
-        nodes = states.dag_size
-        self.peak_nodes = max(self.peak_nodes, nodes)
-        self._on_progress(SynthesisProgress(phase, rounds, nodes))
+        self.tell(SynthesisProgress(phase, rounds, states.dag_size))
+
+    def tell(self, progress: SynthesisProgress) -> None:
+        """Pass on progress."""
+        self.peak_nodes = max(self.peak_nodes, progress.nodes)
+        self._on_progress(progress)
 
 
 class EffortSpentError(Exception):
@@ -100,9 +110,13 @@ class BoundedMonitor(ProgressMonitor):
         if self.limit is not None and self.steps > self.limit:
             raise EffortSpentError(self)
 
-    def report(self, phase: str, rounds: int, states: Any) -> None:
+    def spend(self, nodes: int) -> None:
+        """Pass on work."""
+        self._monitor.spend(nodes)
+
+    def tell(self, progress: SynthesisProgress) -> None:
         """Pass on progress."""
-        self._monitor.report(phase, rounds, states)
+        self._monitor.tell(progress)
 
     def result_of[T](self, work: Callable[[], T]) -> T | None:
         """Return the result of some work under this monitor, or None if its limit has ended the work."""

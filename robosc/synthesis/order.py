@@ -28,6 +28,7 @@ from robosc.expressions import (
     leaves,
     simple_parts,
 )
+from robosc.synthesis.result import Order
 
 _WINDOW = 4
 """Neighbours that are permuted together: 24 ways."""
@@ -43,10 +44,17 @@ _SLIDES = 4
 """Times that the window slides at most."""
 
 
-def block_order(
+Blocks = tuple[tuple[Subject, ...], ...]
+Orders = tuple[tuple[Order, Blocks], ...]
+"""Orders of blocks by name, the likeliest first."""
+
+
+def block_orders(
     system: System, blocks: Sequence[tuple[Subject, ...]], conditions: Iterable[Expression] = ()
-) -> tuple[tuple[Subject, ...], ...]:
+) -> Orders:
     """The blocks of places of a state, so that those that an event touches together stand near each other.
+
+    There are several such orders, no two alike, the likeliest first.
 
     Args:
         system: The system.
@@ -62,8 +70,10 @@ def block_order(
     hubs = frozenset[int]() if of_conditions else hubs_of(edges)
     # Through a hub everything is near everything: the order of the rest is found without.
     rest = [item for item in ([place for place in edge if place not in hubs] for edge in edges) if len(item) > 1]
-    order = best_order(len(blocks), rest)
-    return tuple(blocks[place] for place in sorted(order, key=lambda place: place in hubs))
+    found: dict[Blocks, Order] = {}
+    for name, order in ranked_orders(len(blocks), rest):
+        found.setdefault(tuple(blocks[place] for place in sorted(order, key=lambda place: place in hubs)), name)
+    return tuple((name, order) for order, name in found.items())
 
 
 def hubs_of(edges: Sequence[Sequence[int]]) -> frozenset[int]:
@@ -78,16 +88,19 @@ def hubs_of(edges: Sequence[Sequence[int]]) -> frozenset[int]:
     return frozenset(item for item, count in count_of.items() if count >= least)
 
 
-def best_order(count: int, edges: Sequence[Sequence[int]]) -> tuple[int, ...]:
-    """The order of `count` things with the least span that FORCE and a window find from several starts."""
-    best = _improved(range(count), edges)
-    least = _CLEARLY * span(best, edges)
-    for is_depth_first in (False, True):
-        other = _improved(traversal(count, edges, is_depth_first=is_depth_first), edges)
-        found = span(other, edges)
-        if found < least:
-            best, least = other, found
-    return best
+def ranked_orders(count: int, edges: Sequence[Sequence[int]]) -> list[tuple[Order, tuple[int, ...]]]:
+    """The orders of `count` things that FORCE and a window find from several starts, that with the least span first."""
+    starts = {
+        Order.DECLARED: range(count),
+        Order.LEVELS: traversal(count, edges, is_depth_first=False),
+        Order.DEPTHS: traversal(count, edges, is_depth_first=True),
+    }
+    found = [(name, _improved(start, edges)) for name, start in starts.items()]
+
+    def cost(item: tuple[Order, tuple[int, ...]]) -> float:
+        return span(item[1], edges) * (_CLEARLY if item[0] is Order.DECLARED else 1)
+
+    return sorted(found, key=cost)
 
 
 def _improved(start: Sequence[int], edges: Sequence[Sequence[int]]) -> tuple[int, ...]:
@@ -157,6 +170,9 @@ def hyperedges(system: System) -> tuple[frozenset[Subject], ...]:
         touched[item.event] |= subjects_read(item.condition)
     found.update((frozenset(touched[event.name]), None) for event in system.events)
     on_events = (item.condition for item in (*system.conditions, *system.plant_conditions))
+    # Where the system begins and what is marked is mostly one long list, of which the parts alone say anything.
+    for condition in (system.initial, system.marker):
+        found.update((subjects_read(part), None) for part in simple_parts(condition))
     for condition in (*on_events, *system.invariants, *system.plant_invariants):
         found[subjects_read(condition)] = None
         # Compared subjects belong closer together than those that a long condition merely lists.

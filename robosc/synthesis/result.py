@@ -45,12 +45,43 @@ class Search(StrEnum):
     """Within the states that plants and requirements let runs reach."""
 
 
+class Order(StrEnum):
+    """Static variable order, by what the heuristic FORCE began with; `block_orders` finds them."""
+
+    DECLARED = "as declared"
+    LEVELS = "level by level"
+    DEPTHS = "depth first"
+
+
 class Closure(StrEnum):
     """Order in which the steps of events are applied to sets of states; `closure_under` chooses."""
 
     COMPILED_SATURATION = "saturation in C"
     SATURATION = "saturation"
     CHAINING = "chaining"
+
+
+@dataclass(frozen=True, slots=True)
+class Strategy:
+    """A strategy that took part in the race for the good states and those of the controlled system.
+
+    Attributes:
+        order: Its variable order.
+        search: Its direction.
+        nodes: Nodes that it had worked on when the race was over; the same for every engine.
+        won: Number of systems for which it came to its end first: 0 or 1, or more for a system in several parts.
+        given_up: Number of systems for which it would have taken more nodes than there may be.
+    """
+
+    order: Order
+    search: Search
+    nodes: int
+    won: int
+    given_up: int = 0
+
+    def __str__(self) -> str:
+        ends = f", won {self.won}" * bool(self.won) + f", too many nodes {self.given_up}" * bool(self.given_up)
+        return f"{self.search}, {self.order}: {self.nodes:,} nodes{ends}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,7 +94,9 @@ class Statistics:
         iterations: Rounds of the fixed point.
         peak_nodes: Most nodes that such a predicate took at the end of a round; the same for every engine.
         states: Reachable states of the controlled system, exact; 0 where there is no supervisor.
-        search: Direction of the search for good states.
+        search: Direction of the search for good states, that of the strategy that won the race.
+        order: Variable order of that strategy.
+        race: Every strategy that began, the winner among them; for a system in parts their sums.
         closure: Order of steps.
         parts: Number of independent parts that were synthesized one by one; their rounds and nodes are the most of one.
     """
@@ -74,6 +107,8 @@ class Statistics:
     peak_nodes: int
     states: int
     search: Search = Search.BACKWARDS
+    order: Order = Order.DECLARED
+    race: tuple[Strategy, ...] = ()
     closure: Closure = Closure.SATURATION
     parts: int = 1
 

@@ -24,6 +24,12 @@ from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.nodes import cofactors
 from robosc.synthesis.step import Step, is_enough
 
+PAUSE = 16
+"""Steps of which one is looked at to estimate what they cost: to count the nodes of each would take as long as it."""
+
+_STEP_NODES = 100
+"""Nodes that a step counts for beside those that it is about."""
+
 _FRAMES_PER_LEVEL = 2
 """Python frames for each level of a diagram, and for each group of steps, that saturation goes down."""
 
@@ -36,6 +42,11 @@ def saturation(
     if kernel is None or not all(isinstance(step.add, Image) for step in steps):
         return Saturation(manager, levels, steps, within, monitor)
     return CompiledSaturation(kernel, manager, levels, steps, within, monitor)
+
+
+def work_of(steps: int, nodes: int) -> int:
+    """Return the estimated work of some steps, as a number of nodes, from the nodes that one of them is about."""
+    return steps * (_STEP_NODES + nodes)
 
 
 def _grouped(levels: Mapping[str, int], steps: Sequence[Step]) -> list[tuple[int, list[Step]]]:
@@ -72,7 +83,7 @@ class Saturation:
         allow_depth(len(levels) + len(self._groups), _FRAMES_PER_LEVEL)
         self._known: dict[tuple[int, int, int], tuple[Any, Any, Any]] = {}
         self._phase = ""
-        self._taken = self._reports = 0
+        self._taken = self._reports = self._spent = 0
 
     def of(self, states: Any, phase: str, until: Any = None) -> Any:
         """Return `states` and all that steps from them add.
@@ -85,9 +96,10 @@ class Saturation:
         """
         if not self._groups:
             return states
-        self._taken = self._reports = 0
+        self._taken = self._reports = self._spent = 0
         self._phase = phase
         states = self._of_whole(states, until)
+        self._spend(0)
         self._report(states)
         self._known.clear()
         return states
@@ -140,10 +152,16 @@ class Saturation:
 
     def _grown(self, states: Any, within: Any, step: Step, new: Any) -> Any:
         self._monitor.check_stop()
+        if self._taken % PAUSE == 0:
+            self._spend(new.dag_size)
         self._taken += 1
         if self._taken >= (self._reports + 1) * self._count:
             self._report(states)
         return states if new == self._false else step.grown(states, within, new)
+
+    def _spend(self, nodes: int) -> None:
+        steps, self._spent = self._taken - self._spent, self._taken
+        self._monitor.spend(work_of(steps, nodes))
 
     def _report(self, states: Any) -> None:
         self._reports += 1
@@ -201,7 +219,11 @@ class CompiledSaturation:
             rounds = number
             self._monitor.report(phase, number, self._kernel.predicate(address))
 
-        states = self._kernel.closure(states, self._within, self._groups, until, self._monitor.check_stop, report)
+        def pause(steps: int, nodes: int) -> None:
+            self._monitor.check_stop(steps)
+            self._monitor.spend(work_of(steps, nodes))
+
+        states = self._kernel.closure(states, self._within, self._groups, until, pause, report)
         self._monitor.report(phase, rounds + 1, states)
         return states
 

@@ -1,7 +1,9 @@
 """Synthesis of the maximally permissive supervisor: encoding, fixed point, added conditions, figures."""
 
 from collections.abc import Callable
-from typing import Any
+from contextlib import nullcontext
+from functools import partial
+from typing import Any, NamedTuple
 
 from robosc.automata.structure import System
 from robosc.supervisor import AddedCondition, DecisionDiagram
@@ -10,18 +12,21 @@ from robosc.synthesis.controlled import ControlledSystem
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.fixed_point import FixedPoint, GoodStates, Problem, safe_states
 from robosc.synthesis.nodes import count_models
+from robosc.synthesis.order import Orders
 from robosc.synthesis.questions import Questions
+from robosc.synthesis.race import Race, Runner
 from robosc.synthesis.result import (
-    Closure,
+    Order,
     Search,
     Statistics,
+    Strategy,
     SynthesisProgress,
     SynthesisResult,
     SynthesisStatus,
 )
 from robosc.synthesis.simplify import Simplifier
 from robosc.synthesis.transitions import Steps, transition_of
-from robosc.synthesis.workspace import Workspace, workspace
+from robosc.synthesis.workspace import Workspace, Workspaces
 
 _NOTHING = Questions()
 
@@ -57,49 +62,152 @@ def synthesize(
         UnknownEngineError: There is no such engine.
         UnsupportedModelError: An expression computes with too many doubles, or a condition would be too large.
     """
-    with workspace(system, engine, should_stop, on_progress) as place:
-        return _Synthesis(system, place).result(questions)
+    places = Workspaces(engine, should_stop, on_progress)
+    solved, race = _Portfolio(system, places).solved()
+    synthesis = _Synthesis(solved, race)
+    return places.limited(solved.attempt.place, lambda: synthesis.result(questions))
+
+
+class _Attempt:
+    """The system in one variable order: its manager is its own.
+
+    Args:
+        place: The system, encoded.
+    """
+
+    def __init__(self, place: Workspace) -> None:
+        self.place = place
+        self.encoding = place.encoding
+        self.problem = Problem(self._steps(), safe_states(self.encoding, self.encoding.system.invariants))
+        self.fixed_point = FixedPoint(self.encoding, place.monitor)
+        place.monitor.spend(self.fixed_point.initial.dag_size)
+
+    def _steps(self) -> tuple[Steps, ...]:
+        monitor, found = self.place.monitor, list[Steps]()
+        for event in self.encoding.system.events:
+            monitor.check_stop()
+            found.append(Steps(self.encoding, transition_of(self.encoding, event)))
+            monitor.report("encoding", len(found), found[-1].plant)
+            monitor.spend(found[-1].plant.dag_size)
+        return tuple(found)
+
+    def solved(self, search: Search) -> "_Solved":
+        """The solution, found in one direction."""
+        fixed_point, nothing = self.fixed_point, self.encoding.manager.false
+        if search is Search.BACKWARDS:
+            good = fixed_point.good_states(self.problem, nothing)
+        else:
+            good = fixed_point.reached_good_states(self.problem, nothing)
+        reachable = None if good.reason else fixed_point.reachable_states(self.problem, good.states)
+        return _Solved(self, good, reachable)
+
+
+class _Solved(NamedTuple):
+    """A solved system: the good states, and those of the controlled system, None if it is empty."""
+
+    attempt: _Attempt
+    good: GoodStates
+    reachable: Any
+
+
+class _Portfolio:
+    """Strategies that race for the solution of a system: the likeliest one, its other direction, and another order.
+
+    There are three at most, so that no system takes longer than three times the quickest one. Measured on the families
+    of the benchmarks, the search from the marked states is nearly always the quicker one in a good order, so that the
+    second order is tried in this direction alone.
+
+    Args:
+        system: The system.
+        places: Workspaces, none of which is open.
+    """
+
+    def __init__(self, system: System, places: Workspaces) -> None:
+        self._system = system
+        self._places = places
+        self._race = Race(places.monitor)
+        self._first: Workspace | None = places.opened(system, self._race)
+        self._orders = self._first.encoding.orders
+        self._attempts: dict[Order, _Attempt] = {}
+
+    def solved(self) -> tuple[_Solved, tuple[Strategy, ...]]:
+        """The solution that is found first, and all strategies that have begun."""
+        is_reordering = self._places.options.is_reordering
+        ways = [(self._orders, Search.BACKWARDS)]
+        if not self._system.is_controlled:
+            ways.append((self._orders, Search.REACHABLE_FIRST))
+        # An engine that changes the order needs no other one to begin with.
+        if not self._system.is_controlled and not is_reordering and len(self._orders) > 1:
+            ways.append((self._orders[1:], Search.BACKWARDS))
+        runners = [Runner(partial(self._solved, *way)) for way in ways]
+        context = self._attempt(self._orders).place.reordering() if is_reordering else nullcontext()
+        with context:
+            found = self._race.first_of(runners)
+        self._places.keep(found.attempt.place)
+        race = tuple(
+            Strategy(orders[0][0], search, runner.nodes, int(runner.has_won), int(runner.is_given_up))
+            for (orders, search), runner in zip(ways, runners, strict=True)
+            if runner.nodes
+        )
+        return found, race
+
+    def _solved(self, orders: Orders, search: Search) -> _Solved:
+        attempt = self._attempt(orders)
+        try:
+            return self._places.limited(attempt.place, lambda: attempt.solved(search))
+        except BaseException:
+            # Two strategies share the first order, and one of them may go on.
+            if orders is not self._orders:
+                self._places.close(self._attempts.pop(orders[0][0]).place)
+            raise
+
+    def _attempt(self, orders: Orders) -> _Attempt:
+        """The system in the first of some orders, encoded once."""
+        name, _ = orders[0]
+        if name not in self._attempts:
+            place, self._first = self._first, None
+            if place is None:
+                place = self._places.opened(self._system, self._race, orders=orders)
+            try:
+                self._attempts[name] = self._places.limited(place, lambda: _Attempt(place))
+            except BaseException:
+                self._places.close(place)
+                raise
+        return self._attempts[name]
 
 
 class _Synthesis:
-    """One synthesis: its manager is its own."""
+    """The supervisor of a solved system.
 
-    def __init__(self, system: System, place: Workspace) -> None:
-        self._place = place
-        self._monitor = place.monitor
-        self._encoding = place.encoding
-        self._manager = place.encoding.manager
-        self._problem = Problem(self._steps(), safe_states(self._encoding, system.invariants))
+    Args:
+        solved: The solution.
+        race: The strategies that have raced for it.
+    """
 
-    def _steps(self) -> tuple[Steps, ...]:
-        found: list[Steps] = []
-        for event in self._encoding.system.events:
-            self._monitor.check_stop()
-            found.append(Steps(self._encoding, transition_of(self._encoding, event)))
-            self._monitor.report("encoding", len(found), found[-1].plant)
-        return tuple(found)
+    def __init__(self, solved: _Solved, race: tuple[Strategy, ...]) -> None:
+        self._attempt, self._good, self._reachable = solved
+        self._race = race
+        self._place = self._attempt.place
+        self._monitor = self._place.monitor
+        self._encoding = self._place.encoding
+        self._problem = self._attempt.problem
 
     def result(self, questions: Questions) -> SynthesisResult:
         """The supervisor, or why there is none."""
-        fixed_point = FixedPoint(self._encoding, self._monitor)
-        with self._place.reordering():
-            good = fixed_point.solution(self._problem, self._manager.false)
-            reachable = None if good.reason else fixed_point.reachable_states(self._problem, good.states)
-            closure = closure_in(self._manager)
+        good, reachable = self._good, self._reachable
         if good.reason:
-            statistics = self._statistics(good, 0, closure)
-            return SynthesisResult(SynthesisStatus.EMPTY, (), statistics, good.reason)
-        states = count_models(self._manager, reachable, self._encoding.state_names)
+            return SynthesisResult(SynthesisStatus.EMPTY, (), self._statistics(0), good.reason)
+        states = count_models(self._encoding.manager, reachable, self._encoding.state_names)
         added: list[AddedCondition] = []
         simplifier = Simplifier(self._encoding, self._place.condition_seconds)
         for steps in self._problem.steps:
             self._monitor.check_stop()
-            condition = self._added(simplifier, steps, good.states, reachable)
+            condition = self._added(simplifier, steps)
             if condition is not None:
                 added.append(AddedCondition(steps.event.name, condition))
-        initial = simplifier.condition(good.states, fixed_point.initial)
+        initial = simplifier.condition(good.states, self._attempt.fixed_point.initial)
         # The figures are those of the synthesis: what the questions take on top is not in them.
-        statistics = self._statistics(good, states, closure)
+        statistics = self._statistics(states)
         controlled = ControlledSystem(self._encoding, self._monitor, self._problem, good.states, reachable)
         return SynthesisResult(
             SynthesisStatus.SUPERVISOR,
@@ -109,19 +217,22 @@ class _Synthesis:
             initial=initial,
         )
 
-    def _statistics(self, good: GoodStates, states: int, closure: Closure) -> Statistics:
+    def _statistics(self, states: int) -> Statistics:
         return Statistics(
             engine=self._place.engine,
             state_bits=len(self._encoding.state_names),
-            iterations=good.rounds,
+            iterations=self._good.rounds,
             peak_nodes=self._monitor.peak_nodes,
             states=states,
-            search=Search.REACHABLE_FIRST if good.is_of_reached else Search.BACKWARDS,
-            closure=closure,
+            search=Search.REACHABLE_FIRST if self._good.is_of_reached else Search.BACKWARDS,
+            order=self._encoding.orders[0][0],
+            race=self._race,
+            closure=closure_in(self._encoding.manager, is_reordering=self._place.is_reordering),
         )
 
-    def _added(self, simplifier: Simplifier, steps: Steps, good: Any, reachable: Any) -> DecisionDiagram | None:
+    def _added(self, simplifier: Simplifier, steps: Steps) -> DecisionDiagram | None:
         """The condition to add to an event, simplified where it does not matter; None if there is nothing to add."""
         if not steps.event.is_controllable:
             return None
-        return simplifier.condition(steps.only(good), reachable & steps.plant & steps.condition)
+        care = self._reachable & steps.plant & steps.condition
+        return simplifier.condition(steps.only(self._good.states), care)

@@ -11,14 +11,17 @@ from robosc.expressions import Expression
 from robosc.synthesis.encoding import Encoding
 from robosc.synthesis.engines import (
     EngineOptions,
+    Manager,
     engine_options,
     limited,
     make_manager,
     node_check,
     reordering,
     resolve_engine,
+    within_limit,
 )
 from robosc.synthesis.monitor import ProgressMonitor
+from robosc.synthesis.order import Orders
 from robosc.synthesis.result import SynthesisProgress
 
 
@@ -44,6 +47,68 @@ class Workspace(msgspec.Struct, frozen=True):
         return reordering(self.encoding.manager, self.encoding.order, is_wanted=self.is_reordering)
 
 
+class Workspaces:
+    """Workspaces of one work, whose nodes are counted together.
+
+    Args:
+        engine: Name of the engine for decision diagrams, or more about it.
+        should_stop: Asked again and again; once true, the work ends.
+        on_progress: Called with the progress of the work.
+
+    Attributes:
+        options: The engine's options.
+        monitor: Monitor of the waiting caller.
+
+    Raises:
+        UnknownEngineError: There is no such engine.
+    """
+
+    def __init__(
+        self,
+        engine: str | EngineOptions,
+        should_stop: Callable[[], bool],
+        on_progress: Callable[[SynthesisProgress], None],
+    ) -> None:
+        self.options = engine_options(engine)
+        self._engine = resolve_engine(self.options.name)
+        self._managers: list[Manager] = []
+        self.monitor = ProgressMonitor(should_stop, on_progress, node_check(self._managers, self.options.maximum_nodes))
+
+    def opened(
+        self,
+        system: System,
+        monitor: ProgressMonitor,
+        conditions: Iterable[Expression] = (),
+        followed: Collection[Subject] = (),
+        orders: Orders = (),
+    ) -> Workspace:
+        """A workspace for a system, whose nodes count until it is closed.
+
+        Args:
+            system: The system.
+            monitor: Monitor of the work there.
+            conditions: Conditions on the system's states that the work is about, besides its own.
+            followed: Places that get next-state variables, besides those that images need.
+            orders: Orders of its places, of which it gets the first; none to find some.
+        """
+        manager = make_manager(self._engine)
+        encoding = Encoding(system, manager, monitor.check_stop, conditions, followed, orders)
+        self._managers.append(manager)
+        return Workspace(self._engine, encoding, monitor, self.options.is_reordering, self.options.condition_seconds)
+
+    def limited[T](self, place: Workspace, work: Callable[[], T]) -> T:
+        """Return the result of some work in a workspace, no operation of which may take far too many nodes."""
+        return within_limit(place.encoding.manager, self.options.maximum_nodes, work)
+
+    def keep(self, place: Workspace) -> None:
+        """Count the nodes of one workspace alone: nobody needs the others."""
+        self._managers[:] = [place.encoding.manager]
+
+    def close(self, place: Workspace) -> None:
+        """Count the nodes of a workspace no more: nobody needs it."""
+        self._managers[:] = [manager for manager in self._managers if manager is not place.encoding.manager]
+
+
 @contextmanager
 def workspace(
     system: System,
@@ -53,25 +118,14 @@ def workspace(
     conditions: Iterable[Expression] = (),
     followed: Collection[Subject] = (),
 ) -> Iterator[Workspace]:
-    """A workspace of its own for a system.
-
-    Args:
-        system: The system.
-        engine: Name of the engine for decision diagrams, or more about it.
-        should_stop: Asked again and again; once true, the work ends.
-        on_progress: Called with the progress of the work.
-        conditions: Conditions on the system's states that the work is about, besides its own.
-        followed: Places that get next-state variables, besides those that images need.
+    """A workspace of its own for a system: the arguments are those of `Workspaces` and `opened`.
 
     Raises:
         NodeLimitError: Diagrams became larger than the options allow.
         SynthesisCancelled: `should_stop` became true.
         UnknownEngineError: There is no such engine.
     """
-    options = engine_options(engine)
-    name = resolve_engine(options.name)
-    manager = make_manager(name)
-    monitor = ProgressMonitor(should_stop, on_progress, node_check(manager, options.maximum_nodes))
-    with limited(manager, options.maximum_nodes):
-        encoding = Encoding(system, manager, monitor.check_stop, conditions, followed)
-        yield Workspace(name, encoding, monitor, options.is_reordering, options.condition_seconds)
+    all_ = Workspaces(engine, should_stop, on_progress)
+    place = all_.opened(system, all_.monitor, conditions, followed)
+    with limited(place.encoding.manager, all_.options.maximum_nodes):
+        yield place

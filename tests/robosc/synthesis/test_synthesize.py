@@ -21,7 +21,7 @@ from robosc.synthesis import (
     SynthesisResult,
     SynthesisStatus,
     UnknownEngineError,
-    fixed_point,
+    race,
     synthesize,
 )
 from robosc.synthesis.result import Search
@@ -93,8 +93,9 @@ def assert_verified(system: System, result: SynthesisResult) -> None:
 @pytest.mark.parametrize("make", [random_system, wide_system])
 def test_random_systems(make: Callable[[int], System], part: int, monkeypatch: pytest.MonkeyPatch) -> None:
     for seed in seeds(15):
-        # The few first steps let small systems be searched either way, too.
-        monkeypatch.setattr(fixed_point, "_FIRST_STEPS", (16_000, 1, 2, 5)[seed % 4])
+        # Without a head start, and with short turns, small systems are solved by every strategy.
+        monkeypatch.setattr(race, "HEAD_START", (10**7, 1, 2_000, 10_000)[seed % 4])
+        monkeypatch.setattr(race, "SHARE", (500, 1, 100, 3_000)[seed % 4])
         # The seeds are the same in every part, the systems are not.
         system = make(seed * PARTS + part)
         # The plain engine is slow: every other time will do.
@@ -103,8 +104,11 @@ def test_random_systems(make: Callable[[int], System], part: int, monkeypatch: p
 
 @pytest.mark.random
 def test_either_search_comes_first(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(fixed_point, "_FIRST_STEPS", 1)
-    assert {synthesize(random_system(seed)).statistics.search for seed in seeds(40)} == set(Search)
+    monkeypatch.setattr(race, "HEAD_START", 1)
+    monkeypatch.setattr(race, "SHARE", 1)
+    found = [synthesize(random_system(seed)).statistics for seed in seeds(60)]
+    assert {item.search for item in found} == set(Search)
+    assert len({item.order for item in found}) > 1
 
 
 def test_states_that_no_run_reaches_do_not_hold_up_synthesis() -> None:

@@ -22,6 +22,25 @@ from robosc.pipeline.results import (
 
 
 @dataclass(frozen=True, slots=True)
+class Strategy:
+    """A strategy of a synthesis, as far as it had come when the race for the result was over.
+
+    Attributes:
+        order: Variable order, in words.
+        search: Direction of the search for good states, in words.
+        nodes: Number of nodes of decision diagrams that it had worked on.
+        won: Number of systems for which it came to its end first: several where a model is synthesized part by part.
+        given_up: Number of systems for which it would have taken more nodes than there may be.
+    """
+
+    order: str
+    search: str
+    nodes: int
+    won: int
+    given_up: int
+
+
+@dataclass(frozen=True, slots=True)
 class Statistics:
     """Figures of one synthesis, the same on any machine.
 
@@ -30,12 +49,14 @@ class Statistics:
         state_bits: Number of Boolean variables that encode a state.
         iterations: Number of iterations of the fixed point.
         peak_nodes: Largest number of nodes of a set of states at the end of an iteration.
+        race: Strategies that raced for the result; empty from servers that do not say so.
     """
 
     engine: str
     state_bits: int
     iterations: int
     peak_nodes: int
+    race: tuple[Strategy, ...] = ()
 
 
 @dataclass(frozen=True, slots=True, repr=False)
@@ -200,6 +221,7 @@ __all__ = [
     "StateGraph",
     "StateValues",
     "Statistics",
+    "Strategy",
     "Summary",
     "Synthesis",
     "SynthesisStatus",

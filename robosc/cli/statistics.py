@@ -12,6 +12,8 @@ if TYPE_CHECKING:
 _NAMES = {
     "engine": "engine",
     "search": "search",
+    "order": "variable order",
+    "race": "race",
     "kernel": "kernel",
     "closure": "order of steps",
     "parts": "independent parts",
@@ -54,6 +56,9 @@ class Figures(msgspec.Struct, frozen=True):
 
     def __str__(self) -> str:
         figures, width = self.document() or {}, max(map(len, _NAMES.values()))
+        if self.statistics is not None:
+            # Each strategy has a line of its own.
+            figures["race"] = f"\n{'':{width + 4}}".join(map(str, self.statistics.race))
         return "".join(f"  {_NAMES[name]:<{width}}  {figure}\n" for name, figure in figures.items())
 
 

@@ -29,6 +29,7 @@ from robosc.supervisor.structure import FORMAT, FORMAT_VERSION
 from robosc.supervisor.validation import validate_added, validate_condition
 from robosc.synthesis import EngineOptions, Statistics, SynthesisProgress, synthesize
 from robosc.synthesis import SynthesisStatus as CoreStatus
+from robosc.synthesis.result import statistics_of
 from robosc.tables import html_table
 
 if TYPE_CHECKING:
@@ -293,15 +294,7 @@ def _synthesized_in_modules(
         words = SystemWords(*found.partition.problem_of(found.unsolved.module, places))
         return _empty(words, reason, found.unsolved.result.statistics, engine, on_progress, should_stop)
     figures = [item.result.statistics for item in found.modules]
-    statistics = Statistics(
-        engine=figures[0].engine,
-        state_bits=sum(item.state_bits for item in figures),
-        iterations=max(item.iterations for item in figures),
-        peak_nodes=max(item.peak_nodes for item in figures),
-        states=found.states or 0,
-        search=max(item.search for item in figures),
-        closure=figures[0].closure,
-    )
+    statistics = statistics_of(figures, states=found.states or 0)
     group_of = {place: number for number, group in enumerate(found.groups, start=1) for place in group}
     modules = tuple(
         SupervisedModule(item.automata, item.result.statistics.states, group_of[place])

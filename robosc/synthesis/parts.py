@@ -11,7 +11,7 @@ from robosc.automata.parts import independent_parts
 from robosc.automata.structure import System
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.questions import Answers, Questions, Restriction
-from robosc.synthesis.result import Search, Statistics, SynthesisProgress, SynthesisResult, SynthesisStatus
+from robosc.synthesis.result import SynthesisProgress, SynthesisResult, SynthesisStatus, statistics_of
 from robosc.synthesis.synthesize import synthesize
 
 SMALLEST = 50
@@ -162,16 +162,7 @@ def _whole(system: System, made: list[tuple[_Part, SynthesisResult]], questions:
         unreached=tuple(item for item in questions.locations if item in unreached),
         unprompted=tuple(unprompted[event] for event in questions.prompted if event in unprompted),
     )
-    statistics = Statistics(
-        engine=figures[0].engine,
-        closure=figures[0].closure,
-        state_bits=sum(item.state_bits for item in figures),
-        iterations=max(item.iterations for item in figures),
-        peak_nodes=max(item.peak_nodes for item in figures),
-        states=prod(item.states for item in figures),
-        search=Search.BACKWARDS if all(item.search is Search.BACKWARDS for item in figures) else Search.REACHABLE_FIRST,
-        parts=len(figures),
-    )
+    statistics = statistics_of(figures, states=prod(item.states for item in figures), parts=len(figures))
     return SynthesisResult(
         SynthesisStatus.SUPERVISOR,
         tuple(added[event.name] for event in system.events if event.name in added),

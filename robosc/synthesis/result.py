@@ -1,5 +1,6 @@
 """Results that synthesis returns: outcomes are values."""
 
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from enum import StrEnum
 
@@ -80,8 +81,12 @@ class Strategy:
     given_up: int = 0
 
     def __str__(self) -> str:
-        ends = f", won {self.won}" * bool(self.won) + f", too many nodes {self.given_up}" * bool(self.given_up)
-        return f"{self.search}, {self.order}: {self.nodes:,} nodes{ends}"
+        ends = [f"{self.nodes:,} nodes"]
+        if self.won:
+            ends.append("won" if self.won == 1 else f"won {self.won} times")
+        if self.given_up:
+            ends.append("given up, too many nodes" + f" {self.given_up} times" * (self.given_up > 1))
+        return f"{self.search}, {self.order}: {', '.join(ends)}"
 
 
 @dataclass(frozen=True, slots=True)
@@ -92,13 +97,15 @@ class Statistics:
         engine: Engine that was used.
         state_bits: Boolean variables that encode a state.
         iterations: Rounds of the fixed point.
-        peak_nodes: Most nodes that such a predicate took at the end of a round; the same for every engine.
+        peak_nodes: Most nodes that such a predicate took at the end of a round of the strategy that won; the same for
+            every engine.
         states: Reachable states of the controlled system, exact; 0 where there is no supervisor.
         search: Direction of the search for good states, that of the strategy that won the race.
         order: Variable order of that strategy.
-        race: Every strategy that began, the winner among them; for a system in parts their sums.
+        race: Every strategy that began, the winner among them.
         closure: Order of steps.
-        parts: Number of independent parts that were synthesized one by one; their rounds and nodes are the most of one.
+        parts: Number of independent parts that were synthesized one by one; their rounds and nodes are the most of one,
+            search and order those of the one with the most nodes, and those of the race the sums.
     """
 
     engine: str
@@ -111,6 +118,39 @@ class Statistics:
     race: tuple[Strategy, ...] = ()
     closure: Closure = Closure.SATURATION
     parts: int = 1
+
+
+def statistics_of(figures: Sequence[Statistics], *, states: int, parts: int = 1) -> Statistics:
+    """Return the figures of systems that were synthesized one by one, as those of one synthesis.
+
+    Args:
+        figures: The figures of each system.
+        states: States of all of them together.
+        parts: Number of independent parts that they are.
+    """
+    largest = max(figures, key=lambda item: item.peak_nodes)
+    return Statistics(
+        engine=largest.engine,
+        state_bits=sum(item.state_bits for item in figures),
+        iterations=max(item.iterations for item in figures),
+        peak_nodes=largest.peak_nodes,
+        states=states,
+        search=largest.search,
+        order=largest.order,
+        race=_summed(strategy for item in figures for strategy in item.race),
+        closure=largest.closure,
+        parts=parts,
+    )
+
+
+def _summed(strategies: Iterable[Strategy]) -> tuple[Strategy, ...]:
+    """Strategies of several races with what they did in all of them."""
+    found: dict[tuple[Order, Search], Strategy] = {}
+    for item in strategies:
+        name = item.order, item.search
+        before = found.get(name, Strategy(*name, 0, 0))
+        found[name] = Strategy(*name, before.nodes + item.nodes, before.won + item.won, before.given_up + item.given_up)
+    return tuple(found.values())
 
 
 @dataclass(frozen=True, slots=True)

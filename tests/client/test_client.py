@@ -65,8 +65,8 @@ def test_public_names() -> None:
         "Explained", "Exploration", "Explore", "Format", "Formatted", "Generate", "Generation", "GoalSummary", "Job",
         "JobError", "JobFailure", "JobState", "NO_RETRIES", "NotThereError", "Progress", "RequestRefusedError",
         "RetryPolicy", "ServerBusyError", "ServerInfo", "ServerLimits", "ServerUnavailableError",
-        "ServiceError", "ServiceLoad", "StateGraph", "StateValues", "Statistics", "Submission", "Summary",
-        "Synthesis", "SynthesisOptions", "SynthesisStatus", "Synthesize", "Task", "TaskKind", "TaskResult",
+        "ServiceError", "ServiceLoad", "StateGraph", "StateValues", "Statistics", "Strategy", "Submission",
+        "Summary", "Synthesis", "SynthesisOptions", "SynthesisStatus", "Synthesize", "Task", "TaskKind", "TaskResult",
         "Verification", "VerificationStatus", "Verify",
     ]  # fmt: skip
     assert all(hasattr(robosc_client, name) for name in robosc_client.__all__)
@@ -465,13 +465,16 @@ class TestConversion:
             text="text\n",
             goals=pb.Goals(aims=["once Base.here"], assumptions=["A leads to B"], has_strategy=True, modes=1),
         )
-        statistics = pb.Statistics(engine="autoref", state_bits=7, iterations=3, peak_nodes=10**12)
+        race = [pb.Strategy(order="as declared", search="backwards", nodes=10**11, won=1)]
+        statistics = pb.Statistics(engine="autoref", state_bits=7, iterations=3, peak_nodes=10**12, race=race)
         answer = supervisor(b"x", summary=summary, statistics=statistics, signature=b"s")
         with talk(Synthesize=[[answer]]) as (client, _):
             found = client.synthesize(BUNDLE)
         goals = robosc_client.GoalSummary(("once Base.here",), ("A leads to B",), True, 1)
         assert found.summary == robosc_client.Summary(2, 3, 10**40, None, (("move.request", "true"),), "text\n", goals)
-        assert found.statistics == robosc_client.Statistics("autoref", 7, 3, 10**12)
+        assert found.statistics == robosc_client.Statistics(
+            "autoref", 7, 3, 10**12, (robosc_client.Strategy("as declared", "backwards", 10**11, 1, 0),)
+        )
         assert (found.supervisor, found.signature, found.reason) == (b"x", b"s", "")
 
     def test_about_the_server(self, talk: Talk) -> None:

@@ -18,6 +18,7 @@ from robosc_client.results import (
     ServerInfo,
     ServerLimits,
     Statistics,
+    Strategy,
     Summary,
     SynthesisStatus,
     VerificationStatus,
@@ -237,7 +238,8 @@ def _goals_of(message: pb.Goals) -> GoalSummary:
 
 def statistics_of(message: pb.Statistics) -> Statistics:
     """Return the statistics of a synthesis."""
-    return Statistics(message.engine, message.state_bits, message.iterations, message.peak_nodes)
+    race = tuple(Strategy(item.order, item.search, item.nodes, item.won, item.given_up) for item in message.race)
+    return Statistics(message.engine, message.state_bits, message.iterations, message.peak_nodes, race)
 
 
 def targets_of(message: pb.ListTargetsResponse) -> tuple[TargetInfo, ...]:

@@ -286,16 +286,32 @@ class PartValue(_message.Message):
     def __init__(self, name: _Optional[str] = ..., truth: _Optional[bool] = ..., integer: _Optional[int] = ..., number: _Optional[float] = ..., text: _Optional[str] = ...) -> None: ...
 
 class Statistics(_message.Message):
-    __slots__ = ("engine", "state_bits", "iterations", "peak_nodes")
+    __slots__ = ("engine", "state_bits", "iterations", "peak_nodes", "race")
     ENGINE_FIELD_NUMBER: _ClassVar[int]
     STATE_BITS_FIELD_NUMBER: _ClassVar[int]
     ITERATIONS_FIELD_NUMBER: _ClassVar[int]
     PEAK_NODES_FIELD_NUMBER: _ClassVar[int]
+    RACE_FIELD_NUMBER: _ClassVar[int]
     engine: str
     state_bits: int
     iterations: int
     peak_nodes: int
-    def __init__(self, engine: _Optional[str] = ..., state_bits: _Optional[int] = ..., iterations: _Optional[int] = ..., peak_nodes: _Optional[int] = ...) -> None: ...
+    race: _containers.RepeatedCompositeFieldContainer[Strategy]
+    def __init__(self, engine: _Optional[str] = ..., state_bits: _Optional[int] = ..., iterations: _Optional[int] = ..., peak_nodes: _Optional[int] = ..., race: _Optional[_Iterable[_Union[Strategy, _Mapping]]] = ...) -> None: ...
+
+class Strategy(_message.Message):
+    __slots__ = ("order", "search", "nodes", "won", "given_up")
+    ORDER_FIELD_NUMBER: _ClassVar[int]
+    SEARCH_FIELD_NUMBER: _ClassVar[int]
+    NODES_FIELD_NUMBER: _ClassVar[int]
+    WON_FIELD_NUMBER: _ClassVar[int]
+    GIVEN_UP_FIELD_NUMBER: _ClassVar[int]
+    order: str
+    search: str
+    nodes: int
+    won: int
+    given_up: int
+    def __init__(self, order: _Optional[str] = ..., search: _Optional[str] = ..., nodes: _Optional[int] = ..., won: _Optional[int] = ..., given_up: _Optional[int] = ...) -> None: ...
 
 class Summary(_message.Message):
     __slots__ = ("controllable_events", "uncontrollable_events", "states", "transitions", "added", "text", "goals")

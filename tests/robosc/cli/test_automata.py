@@ -113,12 +113,15 @@ def test_synth(model: str, capsys: pytest.CaptureFixture[str]) -> None:
 def test_figures_of_the_synthesis(model: str, capsys: pytest.CaptureFixture[str]) -> None:
     status, out, _ = run(capsys, "synth", model, "--statistics")
     assert status == 0
-    lines = [line.split(maxsplit=1) for line in out.splitlines()[-8:]]
+    lines = [line.split(maxsplit=1) for line in out.splitlines()[-11:]]
     assert ["search", "backwards"] in lines
+    assert any(line[0] == "race" and line[1].startswith("backwards, ") and line[1].endswith(" won") for line in lines)
     assert ["rounds", "1"] in lines
     status, out, _ = run(capsys, "synth", model, "--json", "--statistics")
     found = json.loads(out)["statistics"]
     assert (found["search"], found["state_bits"], found["iterations"]) == ("backwards", 2, 1)
+    (strategy,) = found["race"]
+    assert (strategy["order"], strategy["search"], strategy["won"]) == (found["order"], "backwards", 1)
     assert found["seconds"] >= 0
     assert found["kernel"].startswith(("used", "not used"))
     Path(model).write_text(f"{TANK}marked false;\n")

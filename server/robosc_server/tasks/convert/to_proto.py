@@ -112,6 +112,10 @@ def statistics(found: Statistics) -> pb.Statistics:
         state_bits=found.state_bits,
         iterations=found.iterations,
         peak_nodes=found.peak_nodes,
+        race=[
+            pb.Strategy(order=item.order, search=item.search, nodes=item.nodes, won=item.won, given_up=item.given_up)
+            for item in found.race
+        ],
     )
 
 

@@ -77,6 +77,19 @@ def test_a_traversal_names_each_thing_once(count: int, is_depth_first: bool, see
     assert span(best_order(count, edges)[1], edges) <= span(slide(force(count, edges), edges), edges)
 
 
+@given(st.integers(4, 10), st.integers(0, 2**32 - 1))
+def test_an_edge_of_some_weight_is_as_many_edges(count: int, seed: int) -> None:
+    random = Random(seed)
+    # Of two or four members, so that their centres are exact.
+    edges = [random.sample(range(count), random.choice((2, 4))) for _ in range(random.randint(0, 8))]
+    weights = [random.randint(1, 5) for _ in edges]
+    repeated = [edge for edge, weight in zip(edges, weights, strict=True) for _ in range(weight)]
+    order = random.sample(range(count), count)
+    assert span(order, edges, weights) == span(order, repeated)
+    assert force(count, edges, weights) == force(count, repeated)
+    assert slide(order, edges, weights) == slide(order, repeated)
+
+
 def _parts(count: int, edges: list[list[int]]) -> list[set[int]]:
     parts = [{item} for item in range(count)]
     for edge in edges:

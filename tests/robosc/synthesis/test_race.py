@@ -1,5 +1,6 @@
 """Races: fair turns, one thread at a time, the caller's business in the caller's thread, and no thread that is left."""
 
+import signal
 import threading
 from collections.abc import Callable, Iterator, Sequence
 
@@ -165,6 +166,22 @@ def test_the_caller_ends_a_race(error: BaseException | None, asked: int) -> None
     with pytest.raises(SynthesisCancelled if error is None else KeyboardInterrupt):
         monitor.first_of([endless(monitor) for _ in range(3)])
     assert len(times) == asked
+
+
+def test_an_interrupt_while_another_way_runs() -> None:
+    caller = threading.current_thread()
+    if caller is not threading.main_thread():
+        pytest.skip("interrupts reach the main thread alone")
+    monitor = Race(silent())
+
+    def work() -> int:
+        monitor.spend(25)
+        signal.pthread_kill(caller.ident or 0, signal.SIGINT)
+        while True:
+            monitor.check_stop()
+
+    with pytest.raises(KeyboardInterrupt):
+        monitor.first_of([endless(monitor), endless(monitor), Runner(work), endless(monitor)])
 
 
 def test_a_limit_of_steps_around_a_race_ends_it() -> None:

@@ -21,11 +21,11 @@ from robosc.errors import NodeLimitError
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.result import SynthesisProgress
 
-HEAD_START = 10_000_000
-"""Nodes that the first way may work on alone: a tenth of a second or a few with the fastest engine."""
+HEAD_START = 100_000_000
+"""Nodes that the first way may work on alone: from a fifth of a second to a second or two with the fastest engine."""
 
-SHARE = 100_000
-"""Nodes of one turn: a millisecond with the fastest engine, and a tenth of a second with the slowest one."""
+SHARE = 1_000_000
+"""Nodes of one turn: some milliseconds with the fastest engine, and some tenths of a second with the slowest one."""
 
 _STACK_BYTES = 64 * 2**20
 """Stack of a thread: diagrams are walked recursively, a level at a time. Only what is used takes memory."""

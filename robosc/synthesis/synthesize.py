@@ -114,9 +114,9 @@ class _Solved(NamedTuple):
 class _Portfolio:
     """Strategies that race for the solution of a system: the likeliest one, its other direction, and another order.
 
-    There are three at most, so that all of them work on at most three times the nodes of the quickest one. Measured on the families
-    of the benchmarks, the search from the marked states is nearly always the quicker one in a good order, so that the
-    second order is tried in this direction alone.
+    There are three at most, so that all of them work on at most three times the nodes of the quickest one. Measured on
+    the families of the benchmarks, the search from the marked states is nearly always the quicker one in a good order,
+    so that the second order is tried in this direction alone.
 
     Args:
         system: The system.

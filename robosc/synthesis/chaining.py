@@ -17,7 +17,7 @@ from typing import Any
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.step import Step, is_enough
 
-_STEP_NODES = 1000
+_STEP_NODES = 200
 """Nodes that a step counts for, whatever it is about."""
 
 

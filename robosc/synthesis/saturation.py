@@ -28,7 +28,7 @@ from robosc.synthesis.step import Step, is_enough
 PAUSE = 16
 """Steps of which one is looked at to estimate what they cost: to count the nodes of each would take as long as it."""
 
-_STEP_NODES = 1000
+_STEP_NODES = 200
 """Nodes that a step counts for beside those that it is about, most of which it finds in caches."""
 
 _FRAMES_PER_LEVEL = 2

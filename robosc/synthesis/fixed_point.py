@@ -24,6 +24,9 @@ from robosc.synthesis.transitions import Steps
 _FIRST_STEPS = 16_000
 """Steps that each of two ways is tried with at first; most systems need fewer."""
 
+_FIRST_STEPS_OF_LESS = 2_000
+"""The same where there are many problems that restrict little less than one that is solved."""
+
 
 @dataclass(frozen=True, slots=True)
 class Problem:
@@ -107,6 +110,7 @@ class FixedPoint:
         """The initial states."""
         self.marked = marked_states(encoding)
         """The marked states."""
+        self._begins_with_good, self._steps_of_less = False, _FIRST_STEPS_OF_LESS
 
     def solution(self, problem: Problem, known: Any) -> GoodStates:
         """The good states, of which some that no run reaches may be left out.
@@ -131,6 +135,26 @@ class FixedPoint:
             return found
         found = self.good_states(Problem(problem.steps, reached), known & reached)
         return replace(found, is_of_reached=True)
+
+    def solution_of_less(self, problem: Problem, good: Any) -> GoodStates:
+        """The solution of a problem that restricts less than another one whose good states are known.
+
+        Those are good here, too. But what else is to be found from them may come in few steps, each of which works on
+        their whole diagram, or from the marked states alone in steps that cost far less: both are tried in turn. What
+        ended first in one problem is tried first in the next one, with as many steps.
+
+        Args:
+            problem: The problem.
+            good: The good states of the other one.
+        """
+        while True:
+            for is_begun_with in (self._begins_with_good, not self._begins_with_good):
+                known = good if is_begun_with else self._encoding.manager.false
+                found = self._bounded(self._steps_of_less, lambda solver, known=known: solver.solution(problem, known))
+                if found is not None:
+                    self._begins_with_good = is_begun_with
+                    return found
+            self._steps_of_less *= 2
 
     def _given(self, problem: Problem) -> GoodStates:
         """The states that a supervisor may be in which is in the system already: all that it lets be."""

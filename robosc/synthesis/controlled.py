@@ -133,7 +133,7 @@ class ControlledSystem(SolvedProblem):
     def _is_the_same_without(self, restrictions: Sequence[Restriction]) -> bool:
         """Return True if the controlled system of the problem without some restrictions allows nothing more."""
         problem = self._without(restrictions)
-        good = self._fixed_point.solution(problem, known=self.good)
+        good = self._fixed_point.solution_of_less(problem, self.good)
         if good.states == self.good:
             changed = [steps for steps in problem.steps if steps is not self._steps[steps.event.name]]
         else:

@@ -86,7 +86,7 @@ class Vocabulary:
         values = ((subject, item.type, item[:]) for subject, item in self.domains.items())
         # A range may be wide, and is not listed.
         places = tuple((*place, found if isinstance(found, range) else tuple(found)) for *place, found in values)
-        return places, frozenset(self._components)
+        return _Hashed((places, frozenset(self._components)))
 
     def test(self, subject: Subject, indices: Indices) -> Membership:
         """The shortest test whether a place holds one of some values: some, but not all that it can hold."""
@@ -96,6 +96,24 @@ class Vocabulary:
                 subject, self.domains[subject], indices, self._components
             )
         return found
+
+
+class _Hashed:
+    """A value whose hash is worked out once: that of all places of a large robot takes as long as a search.
+
+    Args:
+        value: The value.
+    """
+
+    def __init__(self, value: Hashable) -> None:
+        self._value = value
+        self._hash = hash(value)
+
+    def __hash__(self) -> int:
+        return self._hash
+
+    def __eq__(self, other: object) -> bool:
+        return isinstance(other, _Hashed) and self._value == other._value
 
 
 def membership(

@@ -131,8 +131,8 @@ class FixedPoint:
         """The solution of a problem that restricts less than another one whose good states are known.
 
         Those are good here, too. But what else is to be found from them may come in few steps, each of which works on
-        their whole diagram, or from the marked states alone in steps that cost far less: so all ways race, and the winner
-        of one problem has the head start in the next one.
+        their whole diagram, or from the marked states alone in steps that cost far less. So all ways race, and the
+        winner of one problem has the head start in the next one.
 
         Args:
             problem: The problem.

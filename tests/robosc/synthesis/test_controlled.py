@@ -228,7 +228,12 @@ def without_traces(answers: Answers) -> object:
 
 
 @pytest.mark.random
-def test_random_systems(record_property: Callable[[str, object], None]) -> None:
+@pytest.mark.parametrize("smallest", [0, 100])
+def test_random_systems(
+    smallest: int, record_property: Callable[[str, object], None], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """By what is near each event, and by predicates of the whole."""
+    monkeypatch.setattr("robosc.synthesis.conjuncts.SMALLEST", smallest)
     met: Counter[str] = Counter()
 
     def compare(seed: int) -> None:

@@ -292,17 +292,7 @@ def _synthesized_in_modules(
         reason = f"no supervisor exists: {names}: {found.unsolved.result.reason}"
         words = SystemWords(*found.partition.problem_of(found.unsolved.module, places))
         return _empty(words, reason, found.unsolved.result.statistics, engine, on_progress, should_stop)
-    figures = [item.result.statistics for item in found.modules]
-    statistics = Statistics(
-        engine=figures[0].engine,
-        state_bits=sum(item.state_bits for item in figures),
-        iterations=max(item.iterations for item in figures),
-        peak_nodes=max(item.peak_nodes for item in figures),
-        states=found.states or 0,
-        search=max(item.search for item in figures),
-        closure=figures[0].closure,
-    )
-    group_of = {place: number for number, group in enumerate(found.groups, start=1) for place in group}
+    statistics, group_of = found.statistics, found.group_of
     modules = tuple(
         SupervisedModule(item.automata, item.result.statistics.states, group_of[place])
         for place, item in enumerate(found.modules)

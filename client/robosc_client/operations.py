@@ -80,7 +80,7 @@ def synthesize(
     deadline_s: float | None = None,
     on_progress: OnProgress = ignored,
 ) -> Operation[Synthesis]:
-    """Synthesize and certify a supervisor; `is_modular` synthesizes automata in modules."""
+    """Synthesize and certify a supervisor; with `is_modular` in modules."""
     task = Synthesize(loaded(model), options, is_modular)
     return _streaming_task("Synthesize", task, SynthesisReader, deadline_s, on_progress)
 

@@ -24,7 +24,7 @@ class Synthesize:
     Attributes:
         model: The model and its libraries, or automata.
         options: Options for making the supervisor; of automata, those about the engine.
-        is_modular: True if automata are to be synthesized in modules.
+        is_modular: True for a synthesis in modules.
     """
 
     model: Bundle

@@ -188,7 +188,14 @@ def synthesize_robot(
     if found.unsolved is not None:
         return RobotSynthesis(found.unsolved.result, found, shown)
     answers = _Answers(parts, system, found, shown).merged()
-    result = SynthesisResult(SynthesisStatus.SUPERVISOR, found.added, found.statistics, answers=answers)
+    independent = found.modules if found.states is not None and len(found.modules) > 1 else ()
+    result = SynthesisResult(
+        SynthesisStatus.SUPERVISOR,
+        found.added,
+        found.statistics,
+        answers=answers,
+        parts=tuple((item.system, item.result) for item in independent),
+    )
     return RobotSynthesis(result, found, shown)
 
 

@@ -19,7 +19,7 @@ from robosc.cli.output import CommandError, ExitCode, UsageError, print_json
 from robosc.cli.properties import add_arguments as add_property_arguments
 from robosc.cli.properties import property_file
 from robosc.cli.sign import read_supervisor
-from robosc.cli.synth import add_modular_argument, refuse_modular
+from robosc.cli.synth import add_modular_argument
 from robosc.exploration import DEFAULT_LIMIT
 from robosc.model.structure import Deployment
 from robosc.pipeline.options import FOREIGN_STATES
@@ -169,8 +169,7 @@ def _task(arguments: argparse.Namespace) -> Task | None:
         case "check":
             return Check(bundle)
         case "synth":
-            refuse_modular(arguments)
-            return Synthesize(bundle, synthesis_options(arguments))
+            return Synthesize(bundle, synthesis_options(arguments), arguments.modular)
         case "generate":
             refuse_initial(arguments)
             return Generate(bundle, arguments.target, _generation(arguments), synthesis_options(arguments))

@@ -359,7 +359,6 @@ def _check(message: Any, reader: _RequestReader) -> object:
 
 def _synthesize(message: Any, reader: _RequestReader) -> object:
     bundle = reader.bundle(message.bundle)
-    reader.refuse_of_automata(modular=message.modular)
     return bundle, reader.options(message.options), message.modular
 
 

@@ -230,7 +230,8 @@ def _synthesize(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iter
     attempt = SynthesisAttempt()
     result = pb.SynthesisResult()
     with attempt:
-        made = attempt.make(request, limits.nodes, on_report, allow_livelock=request.options.allow_livelock)
+        allow_livelock, is_modular = request.options.allow_livelock, request.modular
+        made = attempt.make(request, limits.nodes, on_report, allow_livelock=allow_livelock, is_modular=is_modular)
         result.accepted.extend(to_proto.findings(made.accepted))
         if made.statistics is not None:
             result.statistics.CopyFrom(to_proto.statistics(made.statistics))

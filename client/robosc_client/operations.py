@@ -92,6 +92,7 @@ def generate(
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     initial: str | None = None,
+    is_modular: bool = False,
     deadline_s: float | None = None,
     on_progress: OnProgress = ignored,
 ) -> Operation[Generation]:
@@ -103,10 +104,11 @@ def generate(
         generation: Choices about the files.
         options: Options for making the supervisor.
         initial: Description of the state in which automata begin that may begin in several, such as `tank.level = 1`.
+        is_modular: True for a synthesis in modules.
         deadline_s: See the class.
         on_progress: See the class.
     """
-    task = Generate(loaded(model), target, generation, options, initial)
+    task = Generate(loaded(model), target, generation, options, initial, is_modular)
     return _streaming_task("Generate", task, lambda: GenerationReader(target), deadline_s, on_progress)
 
 

@@ -38,6 +38,7 @@ class Generate:
 
     Attributes:
         initial: Description of the state in which automata begin that may begin in several; None: as the model says.
+        is_modular: True for a synthesis in modules.
     """
 
     model: Bundle
@@ -45,6 +46,7 @@ class Generate:
     generation: GenerateOptions = DEFAULT_GENERATION
     options: SynthesisOptions = DEFAULT_OPTIONS
     initial: str | None = None
+    is_modular: bool = False
 
 
 @dataclass(frozen=True, slots=True)

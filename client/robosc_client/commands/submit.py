@@ -101,6 +101,7 @@ def _add_tasks(submit: argparse.ArgumentParser) -> None:
             parser.add_argument("--target", required=True, metavar="NAME", help="target to generate: see 'targets'")
             parser.add_argument("--package", metavar="NAME", help="name of the generated package")
             add_initial_argument(parser)
+            add_modular_argument(parser)
         if name == "explore":
             _add_limit(parser, DEFAULT_LIMIT, "give up beyond N states")
         parser.add_argument("--label", type=_label, default="", metavar="TEXT", help="name of the job in lists")
@@ -172,7 +173,8 @@ def _task(arguments: argparse.Namespace) -> Task | None:
             return Synthesize(bundle, synthesis_options(arguments), arguments.modular)
         case "generate":
             refuse_initial(arguments)
-            return Generate(bundle, arguments.target, _generation(arguments), synthesis_options(arguments))
+            options = synthesis_options(arguments)
+            return Generate(bundle, arguments.target, _generation(arguments), options, is_modular=arguments.modular)
         case "explain-synthesis":
             return Explain(
                 model=bundle,

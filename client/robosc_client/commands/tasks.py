@@ -226,6 +226,7 @@ def _generate(arguments: argparse.Namespace, client: Client) -> int:
             arguments.target,
             generation,
             synthesis_options(arguments),
+            is_modular=arguments.modular,
             deadline_s=arguments.deadline,
             on_progress=line.report,
         )

@@ -336,18 +336,20 @@ class AddedCondition(_message.Message):
     def __init__(self, event: _Optional[str] = ..., condition: _Optional[str] = ...) -> None: ...
 
 class GenerateRequest(_message.Message):
-    __slots__ = ("bundle", "options", "target", "generation", "initial")
+    __slots__ = ("bundle", "options", "target", "generation", "initial", "modular")
     BUNDLE_FIELD_NUMBER: _ClassVar[int]
     OPTIONS_FIELD_NUMBER: _ClassVar[int]
     TARGET_FIELD_NUMBER: _ClassVar[int]
     GENERATION_FIELD_NUMBER: _ClassVar[int]
     INITIAL_FIELD_NUMBER: _ClassVar[int]
+    MODULAR_FIELD_NUMBER: _ClassVar[int]
     bundle: Bundle
     options: SynthesisOptions
     target: str
     generation: GenerateOptions
     initial: str
-    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., target: _Optional[str] = ..., generation: _Optional[_Union[GenerateOptions, _Mapping]] = ..., initial: _Optional[str] = ...) -> None: ...
+    modular: bool
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., target: _Optional[str] = ..., generation: _Optional[_Union[GenerateOptions, _Mapping]] = ..., initial: _Optional[str] = ..., modular: _Optional[bool] = ...) -> None: ...
 
 class GenerateOptions(_message.Message):
     __slots__ = ("package", "publish_state", "log_events", "supervised", "metadata", "state_message")

@@ -394,6 +394,7 @@ def _generate(message: Any, reader: _RequestReader) -> object:
         bundle,
         options,
         reader.text(message.initial),
+        message.modular,
         reader.name(message.target, "the target's name"),
         reader.name(choices.package, "the package's name"),
         choices.publish_state,

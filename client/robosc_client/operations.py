@@ -190,6 +190,7 @@ def explain(
     event: str | None = None,
     state: str | None = None,
     after: str | None = None,
+    is_modular: bool = False,
     deadline_s: float | None = None,
     on_progress: OnProgress = ignored,
 ) -> Operation[Explained]:
@@ -203,11 +204,12 @@ def explain(
         event: The event to explain; None: all of them, and warnings.
         state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
         after: Run after which to explain what can happen, such as `open, jam.response`.
+        is_modular: True if the events of a robot are explained module by module.
         deadline_s: See the class.
         on_progress: See the class.
     """
     bundle = loaded(model)
-    task = Explain(model=bundle, options=options, event=event, state=state, after=after)
+    task = Explain(model=bundle, options=options, event=event, state=state, after=after, is_modular=is_modular)
     return _streaming_task("Explain", task, lambda: ExplanationReader(bundle), deadline_s, on_progress)
 
 

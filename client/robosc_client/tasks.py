@@ -103,6 +103,7 @@ class Explain:
         event: The event to explain; None: none in particular.
         state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
         after: Run after which to explain what can happen, such as `open, jam.response`.
+        is_modular: True if the events of a robot are explained module by module.
     """
 
     model: Bundle
@@ -110,6 +111,7 @@ class Explain:
     event: str | None = None
     state: str | None = None
     after: str | None = None
+    is_modular: bool = False
 
 
 @dataclass(frozen=True, slots=True)

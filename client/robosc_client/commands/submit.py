@@ -13,7 +13,7 @@ from robosc.cli.arguments import (
     given_path,
     read_bundle,
 )
-from robosc.cli.explain_synthesis import add_question_arguments
+from robosc.cli.explain_synthesis import add_question_arguments, refuse_modular
 from robosc.cli.generate import add_initial_argument, refuse_initial
 from robosc.cli.output import CommandError, ExitCode, UsageError, print_json
 from robosc.cli.properties import add_arguments as add_property_arguments
@@ -161,6 +161,8 @@ def _task(arguments: argparse.Namespace) -> Task | None:
     """Return the task to be done; None: it cannot be done, and the reason has been reported."""
     if arguments.task == "format":
         return Format(SourceFile(arguments.file.name, property_file(arguments.file).text))
+    if arguments.task == "explain-synthesis":
+        refuse_modular(arguments)
     if automata.is_given(arguments):
         return task_of(arguments, _generation(arguments).package if arguments.task == "generate" else None)
     if arguments.task == "verify":
@@ -182,6 +184,7 @@ def _task(arguments: argparse.Namespace) -> Task | None:
                 event=arguments.event,
                 state=arguments.state,
                 after=arguments.after,
+                is_modular=arguments.modular,
             )
         case _:
             return Explore(bundle, synthesis_options(arguments), arguments.limit)

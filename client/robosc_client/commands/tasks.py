@@ -367,6 +367,7 @@ def _report_verdicts(
 
 
 def _explain_synthesis(arguments: argparse.Namespace, client: Client) -> int:
+    explain_here.refuse_modular(arguments)
     if automata.is_given(arguments):
         return automata.explain_synthesis(arguments, Server(client, arguments.deadline))
 
@@ -378,6 +379,7 @@ def _explain_synthesis(arguments: argparse.Namespace, client: Client) -> int:
                 event=arguments.event,
                 state=arguments.state,
                 after=arguments.after,
+                is_modular=arguments.modular,
                 deadline_s=arguments.deadline,
                 on_progress=line.report,
             )

@@ -97,6 +97,7 @@ def _request(task: Task) -> Request:
                 event=task.event,
                 state=task.state,
                 after=task.after,
+                modular=task.is_modular,
             )
         case Format():
             return pb.FormatRequest(file=_file(task.file))

@@ -522,18 +522,20 @@ class VerificationResult(_message.Message):
     def __init__(self, status: _Optional[_Union[VerificationStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., report: _Optional[str] = ...) -> None: ...
 
 class ExplainRequest(_message.Message):
-    __slots__ = ("bundle", "options", "event", "state", "after")
+    __slots__ = ("bundle", "options", "event", "state", "after", "modular")
     BUNDLE_FIELD_NUMBER: _ClassVar[int]
     OPTIONS_FIELD_NUMBER: _ClassVar[int]
     EVENT_FIELD_NUMBER: _ClassVar[int]
     STATE_FIELD_NUMBER: _ClassVar[int]
     AFTER_FIELD_NUMBER: _ClassVar[int]
+    MODULAR_FIELD_NUMBER: _ClassVar[int]
     bundle: Bundle
     options: SynthesisOptions
     event: str
     state: str
     after: str
-    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., event: _Optional[str] = ..., state: _Optional[str] = ..., after: _Optional[str] = ...) -> None: ...
+    modular: bool
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., event: _Optional[str] = ..., state: _Optional[str] = ..., after: _Optional[str] = ..., modular: _Optional[bool] = ...) -> None: ...
 
 class ExplainResponse(_message.Message):
     __slots__ = ("progress", "result")

@@ -448,7 +448,10 @@ def _explain(message: Any, reader: _RequestReader) -> object:
     asked = [
         reader.text(getattr(message, name)) if message.HasField(name) else None for name in ("event", "state", "after")
     ]
-    return bundle, deployment, engine, rest, asked
+    reader.refuse_of_robots(modular=message.modular)
+    if message.modular and (message.HasField("state") or message.HasField("after")):
+        raise _malformed("modular explains events: state and after are about the whole robot")
+    return bundle, deployment, engine, rest, asked, message.modular
 
 
 def _format(message: Any, reader: _RequestReader) -> object:

@@ -19,7 +19,7 @@ from robosc.automata.plants import communication_plant_name
 from robosc.automata.semantics import Semantics, TooManyChoicesError
 from robosc.automata.structure import System
 from robosc.model.places import Places
-from robosc.model.structure import Behaviour, Component, Deployment, Model
+from robosc.model.structure import Component, Deployment, Model
 from robosc.modular.clusters import MAXIMUM_BITS
 from robosc.modular.partition import Module, Partition
 from robosc.modular.synthesize import STATES, ModularResult, synthesize_modular
@@ -79,30 +79,31 @@ class RobotParts:
         self.deployment = deployment
         self._places = places
         self.questions = questions_about(model, system, deployment)
+        self._communications = {communication_plant_name(item): item for item in model.communications}
+        self._behaviours = {item.name: item.behaviour for item in model.components}
         self._requirement_of = {
             place: number
             for number in range(len(model.requirements))
             for place in self.questions.restrictions[number].conditions
         }
 
-    def part(self, partition: Partition, module: Module) -> RobotPart:
-        """Return a module of the robot as a model."""
-        system = partition.system_of(module)
-        names = {item.name for item in system.automata}
+    def part(self, partition: Partition, module: Module, system: System) -> RobotPart:
+        """Return a module of the robot, with its synthesis problem, as a model."""
+        # Automata stand in the order of the model's text.
+        order = [item.name for item in system.automata]
+        names = set(order)
         restricted: dict[int, list[str]] = {}
         for place in partition.conditions_of(module):
             if place in self._requirement_of:
                 communication = partition.system.conditions[place].event.rpartition(".")[0]
                 restricted.setdefault(self._requirement_of[place], []).append(communication)
         requirements, invariants = tuple(sorted(restricted)), partition.invariants_of(module)
-        communications = tuple(item for item in self.model.communications if communication_plant_name(item) in names)
-        owners = {item.component for item in communications}
+        communications = tuple(self._communications[item] for item in order if item in self._communications)
+        owners = [self._communications[item].component if item in self._communications else item for item in order]
         model = replace(
             self.model,
             components=tuple(
-                Component(item.name, _behaviour(item, names))
-                for item in self.model.components
-                if item.name in owners or _behaviour(item, names)
+                Component(name, self._behaviours[name] if name in names else None) for name in dict.fromkeys(owners)
             ),
             communications=communications,
             requirements=tuple(
@@ -122,10 +123,6 @@ class RobotParts:
         """Return the questions about a module; what other modules could prevent is not asked, but for rivals."""
         found = questions_about(part.model, part.system, self.deployment)
         return found if is_alone else replace(found, prompted=())
-
-
-def _behaviour(component: Component, names: set[str]) -> Behaviour | None:
-    return component.behaviour if component.name in names else None
 
 
 @dataclass(frozen=True)
@@ -171,8 +168,8 @@ def synthesize_robot(
     parts = RobotParts(model, places, system, deployment)
     made: dict[Module, RobotPart] = {}
 
-    def questions(partition: Partition, module: Module, is_alone: bool) -> Questions:
-        made[module] = parts.part(partition, module)
+    def questions(partition: Partition, module: Module, problem: System, is_alone: bool) -> Questions:
+        made[module] = parts.part(partition, module, problem)
         return parts.questions_on(made[module], is_alone=is_alone)
 
     found = synthesize_modular(

@@ -106,7 +106,9 @@ def synthesize_modular(
     engine: str | EngineOptions = "auto",
     limit: int = STATES,
     module_bits: float = MAXIMUM_BITS,
-    questions: Callable[[Partition, Module, bool], Questions] = lambda parts, module, is_alone: Questions(),
+    questions: Callable[[Partition, Module, System, bool], Questions] = lambda parts, module, system, is_alone: (
+        Questions()
+    ),
     should_stop: Callable[[], bool] = lambda: False,
     on_progress: Callable[[str], None] = lambda message: None,
 ) -> ModularResult:
@@ -117,8 +119,8 @@ def synthesize_modular(
         engine: Name of the engine for decision diagrams, or its options.
         limit: Maximum number of states of a module, or of a composition, for the check of mutual blocking.
         module_bits: Logarithm of the combinations of values up to which requirements share a module.
-        questions: Questions about the states of a module under its supervisor, by the parts, the module, and whether
-            it shares nothing with other modules.
+        questions: Questions about the states of a module under its supervisor, by the parts, the module, its synthesis
+            problem, and whether it shares nothing with other modules.
         should_stop: Function called before each step of the work; once it returns true, the work ends.
         on_progress: Function called with the progress of the work, in words.
 
@@ -139,7 +141,7 @@ class _Synthesis:
         parts: Partition,
         engine: str | EngineOptions,
         limit: int,
-        questions: Callable[[Partition, Module, bool], Questions],
+        questions: Callable[[Partition, Module, System, bool], Questions],
         should_stop: Callable[[], bool],
         on_progress: Callable[[str], None],
     ) -> None:
@@ -206,7 +208,7 @@ class _Synthesis:
             found = synthesize(
                 system,
                 engine=self._engine,
-                questions=self._questions(self._partition, module, is_alone),
+                questions=self._questions(self._partition, module, system, is_alone),
                 should_stop=self._should_stop,
                 on_progress=report,
             )

@@ -25,7 +25,7 @@ from robosc.automata.controlled import TRANSITIONS_PER_STATE
 from robosc.automata.decision import Decision
 from robosc.automata.semantics import Semantics, TooManyChoicesError
 from robosc.automata.state import subjects
-from robosc.automata.structure import Automaton, Role, System
+from robosc.automata.structure import Automaton, Edge, Role, System
 from robosc.errors import SynthesisCancelled
 from robosc.expressions import TRUE, Expression
 from robosc.verification.explicit_check import CheckOutcome
@@ -66,7 +66,8 @@ def verify_modules(
     Raises:
         SynthesisCancelled: `should_stop` became true.
     """
-    parts = [_part(system, frozenset(names)) for names in modules]
+    alone = _Parts(system)
+    parts = [alone.of(frozenset(names)) for names in modules]
     known = [part for part in parts if part is not None]
     check = _Check(system, added, known, limit, should_stop)
     reason = "some depend on automata that are not in them" if len(known) < len(parts) else ""
@@ -84,43 +85,60 @@ def _outcome(holds: bool) -> CheckOutcome:
     return CheckOutcome.PASSED if holds else CheckOutcome.NOT_CHECKED
 
 
-def _part(system: System, names: Set[str]) -> System | None:
-    """The system of some automata alone; None if the others could prevent an uncontrollable event of them."""
-    if system.plant_conditions or system.plant_invariants or not (system.initial == TRUE == system.marker):
-        return None
-    automata = tuple(item for item in system.automata if item.name in names)
-    events = frozenset(event for item in automata for event in item.alphabet)
-    free = {event.name for event in system.events if not event.is_controllable} & events
-    read = {name for item in automata for edge in item.edges for name in _read_by(edge.guard, edge.updates)}
-    if not read <= names or len(automata) < len(names):
-        return None
-    for other in system.automata:
-        if other.name not in names and (other.role is not Role.PLANT or not _accepts(other, free & other.alphabet)):
+class _Parts:
+    """Automata of a system that can be looked at alone."""
+
+    def __init__(self, system: System) -> None:
+        self._system = system
+        self._automata = {item.name: item for item in system.automata}
+        self._takers: dict[str, list[Automaton]] = {}
+        for automaton in system.automata:
+            for event in automaton.alphabet:
+                self._takers.setdefault(event, []).append(automaton)
+        self._free = {event.name for event in system.events if not event.is_controllable}
+        self._conditions = [(item, _read(item.condition)) for item in system.conditions]
+        self._invariants = [(item, _read(item)) for item in system.invariants]
+        self._is_plain = (
+            not (system.plant_conditions or system.plant_invariants)
+            and system.initial == TRUE == system.marker
+            and all(item.role is Role.PLANT for item in system.automata)
+        )
+
+    def of(self, names: Set[str]) -> System | None:
+        """The system of some automata alone; None if the others could prevent an uncontrollable event of them."""
+        if not self._is_plain or not names <= self._automata.keys():
             return None
-    return replace(
-        system,
-        events=tuple(item for item in system.events if item.name in events),
-        automata=automata,
-        inputs=tuple(item for item in system.inputs if item.event in events),
-        conditions=tuple(item for item in system.conditions if item.event in events and _read(item.condition) <= names),
-        invariants=tuple(item for item in system.invariants if _read(item) <= names),
-    )
+        automata = [self._automata[name] for name in names]
+        events = frozenset(event for item in automata for event in item.alphabet)
+        read = {name for item in automata for edge in item.edges for name in _read_by(edge)}
+        others = (
+            (item, event) for event in events & self._free for item in self._takers[event] if item.name not in names
+        )
+        if not read <= names or not all(_accepts(item, event) for item, event in others):
+            return None
+        system = self._system
+        return replace(
+            system,
+            events=tuple(item for item in system.events if item.name in events),
+            automata=tuple(item for item in system.automata if item.name in names),
+            inputs=tuple(item for item in system.inputs if item.event in events),
+            conditions=tuple(item for item, read in self._conditions if item.event in events and read <= names),
+            invariants=tuple(item for item, read in self._invariants if read <= names),
+        )
 
 
 def _read(expression: Expression) -> frozenset[str]:
     return frozenset(subject.automaton for subject in subjects_read(expression))
 
 
-def _read_by(guard: Expression, updates: Iterable[object]) -> frozenset[str]:
-    return _read(guard).union(*(_read(item.expression) for item in updates))  # type: ignore[attr-defined]
+def _read_by(edge: Edge) -> frozenset[str]:
+    return _read(edge.guard).union(*(_read(update.expression) for update in edge.updates))
 
 
-def _accepts(automaton: Automaton, events: Collection[str]) -> bool:
-    """Return True if an automaton can always take each of some events."""
-    free = {(edge.source, edge.event) for edge in automaton.edges if edge.guard == TRUE}
-    return all(
-        event in automaton.monitors or (location, event) in free for event in events for location in automaton.locations
-    )
+def _accepts(automaton: Automaton, event: str) -> bool:
+    """Return True if an automaton can always take an event."""
+    free = {edge.source for edge in automaton.edges if edge.event == event and edge.guard == TRUE}
+    return event in automaton.monitors or free.issuperset(automaton.locations)
 
 
 class _Check:

@@ -80,7 +80,7 @@ def synthesize(
     deadline_s: float | None = None,
     on_progress: OnProgress = ignored,
 ) -> Operation[Synthesis]:
-    """Synthesize and certify a supervisor; `is_modular` synthesizes automata in modules."""
+    """Synthesize and certify a supervisor; with `is_modular` in modules."""
     task = Synthesize(loaded(model), options, is_modular)
     return _streaming_task("Synthesize", task, SynthesisReader, deadline_s, on_progress)
 
@@ -92,6 +92,7 @@ def generate(
     options: SynthesisOptions = DEFAULT_OPTIONS,
     *,
     initial: str | None = None,
+    is_modular: bool = False,
     deadline_s: float | None = None,
     on_progress: OnProgress = ignored,
 ) -> Operation[Generation]:
@@ -103,10 +104,11 @@ def generate(
         generation: Choices about the files.
         options: Options for making the supervisor.
         initial: Description of the state in which automata begin that may begin in several, such as `tank.level = 1`.
+        is_modular: True for a synthesis in modules.
         deadline_s: See the class.
         on_progress: See the class.
     """
-    task = Generate(loaded(model), target, generation, options, initial)
+    task = Generate(loaded(model), target, generation, options, initial, is_modular)
     return _streaming_task("Generate", task, lambda: GenerationReader(target), deadline_s, on_progress)
 
 
@@ -188,6 +190,7 @@ def explain(
     event: str | None = None,
     state: str | None = None,
     after: str | None = None,
+    is_modular: bool = False,
     deadline_s: float | None = None,
     on_progress: OnProgress = ignored,
 ) -> Operation[Explained]:
@@ -201,11 +204,12 @@ def explain(
         event: The event to explain; None: all of them, and warnings.
         state: Description of a state in which to explain what can happen, such as `Door.closed, Lift.n = 2`.
         after: Run after which to explain what can happen, such as `open, jam.response`.
+        is_modular: True if the events of a robot are explained module by module.
         deadline_s: See the class.
         on_progress: See the class.
     """
     bundle = loaded(model)
-    task = Explain(model=bundle, options=options, event=event, state=state, after=after)
+    task = Explain(model=bundle, options=options, event=event, state=state, after=after, is_modular=is_modular)
     return _streaming_task("Explain", task, lambda: ExplanationReader(bundle), deadline_s, on_progress)
 
 

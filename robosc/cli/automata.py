@@ -288,6 +288,7 @@ def generate(
         GenerateOptions(package=package),
         synthesis_options(arguments),
         initial=arguments.initial,
+        is_modular=arguments.modular,
     )
     require_supported(made)
     return model, made

@@ -53,6 +53,7 @@ class Machine(Protocol):
         options: "SynthesisOptions",
         *,
         initial: str | None,
+        is_modular: bool,
     ) -> "Generation":
         """Generate the files of a target."""
 
@@ -116,11 +117,16 @@ class ThisMachine:
         options: "SynthesisOptions",
         *,
         initial: str | None,
+        is_modular: bool,
     ) -> "Generation":
         """Generate the files of a target."""
         from robosc.pipeline.generating import generate
 
-        return watched(lambda report: generate(model, target, generation, options, initial=initial, on_progress=report))
+        return watched(
+            lambda report: generate(
+                model, target, generation, options, initial=initial, is_modular=is_modular, on_progress=report
+            )
+        )
 
     def explain(
         self,

@@ -11,9 +11,10 @@ from robosc.automata.compile import NO_DATA, State, compile_expression, subjects
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.state import Subject, subject_type, subjects
 from robosc.automata.structure import System
+from robosc.conditions.requirements import invariant_text, requirement_text
 from robosc.explanation.analysis import BlockingCause, BlockingCauseKind
 from robosc.explanation.constraints import ConstraintKind, RelaxableConstraint
-from robosc.explanation.notation import MAXIMUM_NAMES, cut, requirement_text, value_text
+from robosc.explanation.notation import MAXIMUM_NAMES, cut, value_text
 from robosc.explanation.parts import Part, StateValues
 from robosc.expressions import TRUE, Expression, Value, type_text
 from robosc.expressions.text import automaton_text, expression_text
@@ -236,9 +237,7 @@ class ModelTerms(Terms):
             return text, self._places.requirements[number]
         if item.invariants:
             (place,) = item.invariants
-            invariant = self._model.invariants[place]
-            word = "never" if invariant.is_never else "always"
-            return f"requirement {word} {self._text(invariant.expression)}", self._places.invariants[place]
+            return invariant_text(self._model.invariants[place], self._whole_names), self._places.invariants[place]
         (place,) = item.conditions
         event = self._system.conditions[place].event
         name = event.rpartition(".")[0]

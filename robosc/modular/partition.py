@@ -66,6 +66,14 @@ class Partition:
     parts: tuple[frozenset[str], ...]
     demands: tuple[Demand, ...]
 
+    def conditions_of(self, module: Module) -> tuple[int, ...]:
+        """Places of a module's event conditions among those of the system."""
+        return tuple(sorted(place for number in module.demands for place in self.demands[number].conditions))
+
+    def invariants_of(self, module: Module) -> tuple[int, ...]:
+        """Places of a module's invariants among those of the system."""
+        return tuple(sorted(place for number in module.demands for place in self.demands[number].invariants))
+
     def system_of(self, module: Module) -> System:
         """The synthesis problem of a module."""
         return self.problem_of(module, SystemPlaces())[0]
@@ -78,10 +86,9 @@ class Partition:
         system = self.system
         automata = tuple(item for item in system.automata if item.name in names)
         events = {event for item in automata for event in item.alphabet}
-        conditions = sorted(place for demand in demands for place in demand.conditions)
-        conditions = [place for place in conditions if system.conditions[place].event in events]
+        conditions, invariants = self.conditions_of(module), self.invariants_of(module)
+        conditions = tuple(place for place in conditions if system.conditions[place].event in events)
         plant_conditions = [place for place, item in enumerate(system.plant_conditions) if item.event in events]
-        invariants = sorted(place for demand in demands for place in demand.invariants)
         problem = replace(
             system,
             events=tuple(item for item in system.events if item.name in events),

@@ -29,7 +29,6 @@ from robosc.supervisor.structure import FORMAT, FORMAT_VERSION
 from robosc.supervisor.validation import validate_added, validate_condition
 from robosc.synthesis import EngineOptions, Statistics, SynthesisProgress, synthesize
 from robosc.synthesis import SynthesisStatus as CoreStatus
-from robosc.synthesis.result import statistics_of
 from robosc.tables import html_table
 
 if TYPE_CHECKING:
@@ -293,9 +292,7 @@ def _synthesized_in_modules(
         reason = f"no supervisor exists: {names}: {found.unsolved.result.reason}"
         words = SystemWords(*found.partition.problem_of(found.unsolved.module, places))
         return _empty(words, reason, found.unsolved.result.statistics, engine, on_progress, should_stop)
-    figures = [item.result.statistics for item in found.modules]
-    statistics = statistics_of(figures, states=found.states or 0)
-    group_of = {place: number for number, group in enumerate(found.groups, start=1) for place in group}
+    statistics, group_of = found.statistics, found.group_of
     modules = tuple(
         SupervisedModule(item.automata, item.result.statistics.states, group_of[place])
         for place, item in enumerate(found.modules)

@@ -202,7 +202,10 @@ class TestCommands:
 
     def test_what_is_of_automata_is_refused_for_robots(self, folder: Path, both: Run) -> None:
         Path("robot.rscd").write_text("robot R { component C { incoming message m with type: none } }")
-        assert "--modular is for automata" in both("synth", "robot.rscd", "--modular")[2]
+        assert both("synth", "robot.rscd", "--modular")[0] == 0
+        assert both("explain-synthesis", "robot.rscd", "--modular", "--event", "m")[0] == 0
+        assert "leave it out with --state" in both("explain-synthesis", "robot.rscd", "--modular", "--after", "m")[2]
+        assert "as a whole" in both("explain-synthesis", "models/tank.cif", "--modular")[2]
         generate = ("generate", "robot.rscd", "--target", "python", "-o", "out", "--initial", "C = a")
         assert "a robot begins in one state" in both(*generate)[2]
 
@@ -336,9 +339,6 @@ class TestPython:
             client.verify(automata(), "invariant true")
         with pytest.raises(RequestRefusedError, match="log_events applies to RoboSC models"):
             client.generate(automata(), "python", robosc.GenerateOptions(log_events=True))
-        robot = robosc.load(text="robot R { component C { incoming message m with type: none } }")
-        with pytest.raises(RequestRefusedError, match="modular applies to automata"):
-            client.synthesize(robot, is_modular=True)
 
 
 class TestAnswers:

@@ -111,6 +111,7 @@ class Server:
         options: SynthesisOptions,
         *,
         initial: str | None,
+        is_modular: bool,
     ) -> "Generation":
         """Generate the files of a target."""
         with ProgressLine() as line:
@@ -120,6 +121,7 @@ class Server:
                 generation,
                 _sendable(options),
                 initial=initial,
+                is_modular=is_modular,
                 deadline_s=self._deadline_s,
                 on_progress=line.report,
             )
@@ -166,7 +168,9 @@ def task_of(arguments: argparse.Namespace, package: str | None) -> Task:
             return Synthesize(automata.loaded_for_synthesis(arguments), options, arguments.modular)
         case "generate":
             model = automata.loaded_for_generation(arguments)
-            return Generate(model, arguments.target, GenerateOptions(package=package), options, arguments.initial)
+            return Generate(
+                model, arguments.target, GenerateOptions(package=package), options, arguments.initial, arguments.modular
+            )
         case "explore":
             return Explore(automata.loaded(arguments), options, arguments.limit)
         case "explain-synthesis":

@@ -80,6 +80,7 @@ def _request(task: Task) -> Request:
                 target=task.target,
                 generation=_generate_options(task.generation),
                 initial=task.initial or "",
+                modular=task.is_modular,
             )
         case Explore():
             return pb.ExploreRequest(
@@ -96,6 +97,7 @@ def _request(task: Task) -> Request:
                 event=task.event,
                 state=task.state,
                 after=task.after,
+                modular=task.is_modular,
             )
         case Format():
             return pb.FormatRequest(file=_file(task.file))

@@ -359,7 +359,6 @@ def _check(message: Any, reader: _RequestReader) -> object:
 
 def _synthesize(message: Any, reader: _RequestReader) -> object:
     bundle = reader.bundle(message.bundle)
-    reader.refuse_of_automata(modular=message.modular)
     return bundle, reader.options(message.options), message.modular
 
 
@@ -395,6 +394,7 @@ def _generate(message: Any, reader: _RequestReader) -> object:
         bundle,
         options,
         reader.text(message.initial),
+        message.modular,
         reader.name(message.target, "the target's name"),
         reader.name(choices.package, "the package's name"),
         choices.publish_state,
@@ -448,7 +448,10 @@ def _explain(message: Any, reader: _RequestReader) -> object:
     asked = [
         reader.text(getattr(message, name)) if message.HasField(name) else None for name in ("event", "state", "after")
     ]
-    return bundle, deployment, engine, rest, asked
+    reader.refuse_of_robots(modular=message.modular)
+    if message.modular and (message.HasField("state") or message.HasField("after")):
+        raise _malformed("modular explains events: state and after are about the whole robot")
+    return bundle, deployment, engine, rest, asked, message.modular
 
 
 def _format(message: Any, reader: _RequestReader) -> object:

@@ -87,8 +87,6 @@ def test_what_is_of_robots_is_refused(tmp_path: Path) -> None:
     with pytest.raises(TypeError, match="library_paths and interface_paths are for RoboSC models"):
         robosc.load(text=TANK, name="tank.cif", library_paths=[tmp_path])
     robot = robosc.load(text="robot R { component C { incoming message m with type: none } }")
-    with pytest.raises(TypeError, match="is_modular is for automata"):
-        robosc.synthesize(robot, is_modular=True)
     with pytest.raises(TypeError, match="a robot begins in one state"):
         robosc.generate(robot, "python", initial="C = a")
     made = robosc.synthesize(model).supervisor

@@ -146,9 +146,6 @@ def test_no_supervisor_in_modules() -> None:
     assert "M0" not in result.reason
     assert isinstance(result.explanation, EmptyExplanation)
     assert "requirement invariant not M7.idle" in str(result)
-    model = robosc.load(text="robot R { component C { incoming message m with type: none } }")
-    with pytest.raises(TypeError, match="is_modular is for automata"):
-        robosc.synthesize(model, is_modular=True)
 
 
 def test_no_supervisor_and_automata_that_do_not_fit() -> None:

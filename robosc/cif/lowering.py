@@ -36,6 +36,7 @@ from robosc.expressions import (
     IntegerType,
     StateTest,
     Type,
+    Unary,
     VariableRead,
     conjunction,
     default_value,
@@ -301,6 +302,9 @@ class Lowering(msgspec.Struct):
         condition = self.used_by(item.role, predicate, scope, item.predicate.at)
         if not scope.is_real:
             return
+        if item.form is syntax.InvariantForm.DISABLES and isinstance(condition, Unary) and place is None:
+            # The form of `disables`, so that texts have it as it was written.
+            condition = Unary("not", Unary("holds", condition.operand))
         if item.form is syntax.InvariantForm.STATE:
             if item.role == "plant":
                 self.plant_invariants.append(condition)

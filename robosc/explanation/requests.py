@@ -23,6 +23,7 @@ from robosc.expressions import (
     VariableRead,
     conjunction,
 )
+from robosc.expressions.text import literal_named
 from robosc.model.findings import did_you_mean
 from robosc.model.structure import Model
 from robosc.source import visible
@@ -110,6 +111,8 @@ class Requests(ABC):
                 return Constant(int(text))
         else:
             values = {value_text(value): value for value in subject_domain(self._system, subject)}
+            if isinstance(type_, EnumType):
+                text = literal_named(type_, text)
             if text in values:
                 return EnumValue(type_.name, text) if isinstance(type_, EnumType) else Constant(values[text])
         raise RequestError(

@@ -18,6 +18,7 @@ from robosc.automata import (
     Role,
     System,
     SystemPlaces,
+    as_controlled,
 )
 from robosc.automata.environment import environment_variable
 from robosc.automata.structure import InputVariable
@@ -180,7 +181,9 @@ class Lowering(msgspec.Struct):
                 self.typing.findings.warning("cif-no-effect", message, item.at, "Remove it, or use the event.")
             elif item.condition != TRUE:
                 conditions[item.role == "plant"].append((EventCondition(event, item.condition), item.at))
-        if not any(item.role is Role.PLANT for item in self.automata) and not self.typing.findings.has_errors:
+        # A supervisor alone says what happens, too.
+        has_plant = is_controlled or any(item.role is Role.PLANT for item in self.automata)
+        if not (self.automata and has_plant) and not self.typing.findings.has_errors:
             self.error("cif-unsupported", "there is no plant automaton", self.scopes.root.at, "Add one.")
         system = System(
             name=name,
@@ -189,12 +192,10 @@ class Lowering(msgspec.Struct):
             inputs=tuple(self.inputs),
             conditions=tuple(item for item, _ in conditions[False]),
             invariants=tuple(item for item, _ in self.invariants),
-            # No state is one that a supervisor excludes; against a requirement the system may begin.
-            initial=conjunction(*self.initial, *(item for item, _ in self.invariants if is_controlled)),
+            initial=conjunction(*self.initial),
             marker=conjunction(*self.marker),
             plant_conditions=tuple(item for item, _ in conditions[True]),
             plant_invariants=tuple(self.plant_invariants),
-            is_controlled=is_controlled,
         )
         places = SystemPlaces(
             automata=self.places,
@@ -202,7 +203,8 @@ class Lowering(msgspec.Struct):
             invariants=tuple(at for _, at in self.invariants),
             plant_conditions=tuple(at for _, at in conditions[True]),
         )
-        return system, places
+        # A supervisor excludes initial states, too; against a requirement the system may begin.
+        return as_controlled(system) if is_controlled else system, places
 
     def _is_controlled(self) -> bool:
         """Return True if there is a supervisor; then there must be no requirement."""

@@ -3,7 +3,7 @@
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from robosc.automata import CheckedSystem, System
+from robosc.automata import CheckedSystem, System, as_controlled
 from robosc.errors import InvalidSupervisorError
 from robosc.expressions import conjunction
 from robosc.json_documents import diagnostics_json
@@ -52,8 +52,11 @@ def automata_synthesis(
     *,
     is_modular: bool = False,
     initial: str | None = None,
+    as_is: bool = False,
 ) -> SystemSynthesis:
     """Synthesize the supervisor of automata; parameters and errors as of `robosc.synthesize`.
+
+    With `as_is`, nothing is added: the requirements are taken for a supervisor that was made already.
 
     Raises:
         ValueError: An option is for models of robots alone.
@@ -67,6 +70,8 @@ def automata_synthesis(
         return SystemSynthesis(SynthesisStatus.MODEL_ERRORS, "", None, None, diagnostics, explanation)
     if initial is not None:
         system = begun(system, initial)
+    if as_is:
+        system = as_controlled(system)
     made = synthesize_system(system, options, on_progress, should_stop, found.places, is_modular=is_modular)
     return replace(made, diagnostics=diagnostics)
 
@@ -80,11 +85,15 @@ def automata_verification(
     *,
     is_strict: bool,
     controller: bool = False,
+    as_is: bool = False,
 ) -> Verification:
-    """Synthesize the supervisor of automata, and verify it independently, with `controller` its properties, too."""
+    """Synthesize the supervisor of automata, and verify it independently, with `controller` its properties, too.
+
+    With `as_is`, nothing is synthesized: the automata are verified as they stand.
+    """
     from robosc.explanation import EmptyExplanation, document
 
-    made = automata_synthesis(model, options, on_progress, should_stop)
+    made = automata_synthesis(model, options, on_progress, should_stop, as_is=as_is)
     if made.status is SynthesisStatus.UNSUPPORTED_MODEL:
         return Verification(VerificationStatus.UNSUPPORTED_MODEL, made.diagnostics, made.reason, {})
     findings = diagnostics_json(made.diagnostics)

@@ -9,6 +9,7 @@ from robosc.automata.structure import System
 from robosc.errors import RoboscError
 from robosc.explanation.notation import value_text
 from robosc.expressions import (
+    ITSELF,
     Binary,
     BinaryOperator,
     BooleanType,
@@ -200,10 +201,12 @@ class SystemQuestionReader(Requests):
         rest = text[negated.end() :] if negated else text
         result = self._comparison(rest)
         if result is None:
+            # An input variable is no automaton to a user.
+            inputs = {item.automaton for item in self._known if item.variable == ITSELF}
             locations = [
                 f"{item.automaton}.{name}"
                 for item in self._known
-                if item.variable is None
+                if item.variable is None and item.automaton not in inputs
                 for name in subject_domain(self._system, item)
             ]
             variables = [str(item) for item in self._known if item.variable is not None]

@@ -27,6 +27,7 @@ from robosc.expressions import (
     VariableRead,
 )
 from robosc.expressions.text import cif_text
+from robosc.pipeline.steps import event_text
 from robosc.pipeline.system_runs import state_parts
 from robosc.source import Bundle, SourceFile
 
@@ -184,13 +185,17 @@ def test_literals_go_by_both_names(tmp_path: Path, capsys: pytest.CaptureFixture
         printed = run(capsys, "explain-synthesis", path, "--event", "p.c_off", "--state", f"g.wish = {name}")
         assert "p is off, where it has no edge for p.c_off" in printed
         assert state_parts(checked(path.read_text()), f"g.wish = {name}") == {"g.wish": "HAND"}
+    printed = run(capsys, "explain-synthesis", path, "--state", "g.wsh")
+    assert "unknown location or variable 'g.wsh'; did you mean 'g.wish'?" in printed
+    printed = run(capsys, "explain-synthesis", path, "--state", "nothing of it")
+    assert "here" not in printed.replace("there", "")
     printed = run(capsys, "explain-synthesis", path, "--state", "g.wish = io.FOOT")
     assert "'io.FOOT' is not a value of g.wish" in printed
     made = robosc.synthesize(path).supervisor
     assert made is not None
     stepped = robosc.simulate(made, initial={"g.wish": "AUTO", "io.hit": True, "io.level": 0})
     assert stepped.reasons("q.u") == ("q: g.wish = io.HAND does not hold (g.wish is AUTO)",)
-    stepped.step("g.wish", "io.HAND")
+    assert event_text(stepped.step("g.wish", "io.HAND")) == "g.wish (HAND)"
     assert "q.u" in stepped.possible
 
 

@@ -168,6 +168,7 @@ class Lowering(msgspec.Struct):
             conditions=tuple(at for _, at in conditions[False]),
             invariants=tuple(at for _, at in self.invariants),
             plant_conditions=tuple(at for _, at in conditions[True]),
+            events=self.event_places,
         )
         # A supervisor excludes initial states, too; against a requirement the system may begin.
         return as_controlled(system) if is_controlled else system, places

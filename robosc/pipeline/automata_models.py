@@ -1,10 +1,11 @@
 """Automata as models: loaded from a file (CIF, libFAUDES, Supremica), checked, synthesized and verified."""
 
+from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from robosc.automata import CheckedSystem, System, as_controlled
-from robosc.errors import InvalidSupervisorError
+from robosc.automata import CheckedSystem, System, SystemPlaces, as_controlled
+from robosc.errors import Diagnostic, InvalidSupervisorError, Severity, sorted_diagnostics
 from robosc.expressions import conjunction
 from robosc.json_documents import diagnostics_json
 from robosc.pipeline.automata_files import check_automata_file
@@ -73,7 +74,23 @@ def automata_synthesis(
     if as_is:
         system = as_controlled(system)
     made = synthesize_system(system, options, on_progress, should_stop, found.places, is_modular=is_modular)
+    if made.supervisor is not None and not isinstance(model, System):
+        forbidden = _forbidden(made.supervisor, found.places)
+        diagnostics = Findings(sorted_diagnostics([*diagnostics, *forbidden]), model)
     return replace(made, diagnostics=diagnostics)
+
+
+def _forbidden(supervisor: SystemSupervisor, places: SystemPlaces) -> Iterator[Diagnostic]:
+    """Yield warnings of events that the supervisor always forbids."""
+    for item in supervisor.added:
+        if not item.condition.root:
+            yield Diagnostic(
+                Severity.WARNING,
+                "never-enabled",
+                f"'{item.event}' can never happen: the supervisor forbids it wherever plants and requirements allow it",
+                places.events.get(item.event),
+                f"Run 'robosc explain-synthesis --event {item.event}' to see why.",
+            )
 
 
 def automata_verification(

@@ -134,6 +134,8 @@ def verify(
     options: SynthesisOptions | None = None,
     maximum_states: int | None = None,
     is_strict: bool = False,
+    controller: bool = False,
+    as_is: bool = False,
     deadline_s: float | None = None,
     on_progress: OnProgress = ignored,
 ) -> Operation[Verification]:
@@ -147,6 +149,9 @@ def verify(
         options: Options for making the supervisor, and the deployment that a given one must have; None: its own.
         maximum_states: States up to which a given supervisor is searched one by one; None: 1,000,000.
         is_strict: True if a given supervisor passes only if permissiveness was checked, too.
+        controller: True if automata are also checked for bounded and finite response, confluence and nonblocking under
+            control.
+        as_is: True if nothing is synthesized: automata are verified as they stand.
         deadline_s: See the class.
         on_progress: See the class.
     """
@@ -164,8 +169,14 @@ def verify(
             maximum_nodes=chosen.maximum_nodes,
             maximum_states=maximum_states,
             is_strict=is_strict,
+            controller=controller,
+            as_is=as_is,
         )
-    elif properties or property_files or supervisor is not None or options or maximum_states is not None or is_strict:
+    elif (
+        any((properties, property_files, options, is_strict, controller, as_is))
+        or supervisor is not None
+        or maximum_states is not None
+    ):
         raise TypeError("a task contains all options: give either a task, or a model with options")
     return _streaming_task("Verify", task, VerificationReader, deadline_s, on_progress)
 

@@ -79,6 +79,9 @@ class Verify:
         maximum_nodes: As in SynthesisOptions.
         maximum_states: States up to which a given supervisor is searched one by one; None: 1,000,000.
         is_strict: True if a given supervisor passes only if permissiveness was checked, too.
+        controller: True if automata are also checked for bounded and finite response, confluence and nonblocking under
+            control.
+        as_is: True if nothing is synthesized: automata are verified as they stand.
     """
 
     model: Bundle
@@ -91,6 +94,8 @@ class Verify:
     maximum_nodes: int | None = None
     maximum_states: int | None = None
     is_strict: bool = False
+    controller: bool = False
+    as_is: bool = False
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)

@@ -18,6 +18,7 @@ from robosc.automata import (
     Role,
     System,
     SystemPlaces,
+    as_controlled,
 )
 from robosc.automata.environment import environment_variable
 from robosc.automata.structure import InputVariable
@@ -27,15 +28,15 @@ from robosc.cif.terms import Term, flat, logic, negation, truth, widened
 from robosc.cif.types import CifType, fits
 from robosc.cif.typing import NAMELESS, Typing
 from robosc.cif.updates import Updates
+from robosc.cif.warnings import Exclusion, Reading, warn
 from robosc.expressions import (
-    FALSE,
     TRUE,
     BooleanType,
     EnumType,
     Expression,
     IntegerType,
-    StateTest,
     Type,
+    Unary,
     VariableRead,
     conjunction,
     default_value,
@@ -46,15 +47,6 @@ from robosc.source import Location
 
 MAXIMUM_VALUES = 2**20
 """Values of a variable's type beyond which it is refused."""
-
-
-class Exclusion(msgspec.Struct, frozen=True):
-    """An event that is allowed only where a condition is true."""
-
-    event: Entity
-    condition: Expression
-    role: str
-    at: Location
 
 
 class Lowering(msgspec.Struct):
@@ -70,6 +62,7 @@ class Lowering(msgspec.Struct):
         exclusions: Event exclusions of plants and requirements.
         invariants: State invariants of requirements, with their places.
         plant_invariants: State invariants of plants.
+        plant_places: Their places.
         initial: Predicates on the initial states.
         marker: Predicates on the marked states.
         roles: Roles of automata and invariants, with their places.
@@ -87,6 +80,7 @@ class Lowering(msgspec.Struct):
     exclusions: list[Exclusion] = msgspec.field(default_factory=list)
     invariants: list[tuple[Expression, Location]] = msgspec.field(default_factory=list)
     plant_invariants: list[Expression] = msgspec.field(default_factory=list)
+    plant_places: list[Location] = msgspec.field(default_factory=list)
     initial: list[Expression] = msgspec.field(default_factory=list)
     marker: list[Expression] = msgspec.field(default_factory=list)
     event_places: dict[str, Location] = msgspec.field(default_factory=dict)
@@ -132,37 +126,11 @@ class Lowering(msgspec.Struct):
             if scope.is_automaton:
                 self._automaton(scope)
         self._check_initial_values()
+        system, places = self._system(name)
         if not self.typing.findings.has_errors:
-            self._warn()
-        return self._system(name)
-
-    def _warn(self) -> None:
-        """Report what is mostly meant otherwise: plants that read requirements, and events that never happen."""
-        warn = self.typing.findings.warning
-        requirements = {item.name for item in self.automata if item.role is Role.REQUIREMENT}
-        for expression, at in self.plant_reads:
-            read = {leaf.component for leaf in leaves(expression) if isinstance(leaf, VariableRead | StateTest)}
-            if names := sorted(read & requirements):
-                message = f"a plant reads the state of the requirement '{names[0]}'"
-                warn("cif-plant-reads-requirement", message, at, "Make it a plant, or let a requirement say this.")
-        # An invariant about an event that is in no alphabet has a finding of its own.
-        excluded = {item.event.name for item in self.exclusions}
-        unused: dict[Location, list[str]] = {}
-        for event, at in self.event_places.items():
-            having = [item for item in self.automata if event in item.alphabet]
-            if not having and event not in excluded:
-                unused.setdefault(at, []).append(event)
-            for item in having:
-                guards = [edge.guard for edge in item.edges if edge.event == event]
-                if event not in item.monitors and all(guard == FALSE for guard in guards):
-                    why = "has only edges of it whose guards are false" if guards else "has no edge of it"
-                    message = f"'{event}' never happens: '{item.name}' {why}"
-                    fix = "Add an edge, or take the event out of the alphabet."
-                    warn("cif-event-never-happens", message, self.places[item.name], fix)
-        for at, events in unused.items():
-            more = f" and {len(events) - 1} more" if len(events) > 1 else ""
-            message = f"no automaton has '{events[0]}'{more} in its alphabet"
-            warn("cif-unused-event", message, at, "Remove it, or use it on an edge.")
+            warn(Reading(system, places, self.exclusions, self.plant_reads, self.plant_places, self.event_places,
+                         self.scopes), self.typing.findings)  # fmt: skip
+        return system, places
 
     def _system(self, name: str) -> tuple[System, SystemPlaces]:
         alphabet = frozenset[str]().union(*(item.alphabet for item in self.automata))
@@ -179,7 +147,9 @@ class Lowering(msgspec.Struct):
                 self.typing.findings.warning("cif-no-effect", message, item.at, "Remove it, or use the event.")
             elif item.condition != TRUE:
                 conditions[item.role == "plant"].append((EventCondition(event, item.condition), item.at))
-        if not any(item.role is Role.PLANT for item in self.automata) and not self.typing.findings.has_errors:
+        # A supervisor alone says what happens, too.
+        has_plant = is_controlled or any(item.role is Role.PLANT for item in self.automata)
+        if not (self.automata and has_plant) and not self.typing.findings.has_errors:
             self.error("cif-unsupported", "there is no plant automaton", self.scopes.root.at, "Add one.")
         system = System(
             name=name,
@@ -188,20 +158,20 @@ class Lowering(msgspec.Struct):
             inputs=tuple(self.inputs),
             conditions=tuple(item for item, _ in conditions[False]),
             invariants=tuple(item for item, _ in self.invariants),
-            # No state is one that a supervisor excludes; against a requirement the system may begin.
-            initial=conjunction(*self.initial, *(item for item, _ in self.invariants if is_controlled)),
+            initial=conjunction(*self.initial),
             marker=conjunction(*self.marker),
             plant_conditions=tuple(item for item, _ in conditions[True]),
             plant_invariants=tuple(self.plant_invariants),
-            is_controlled=is_controlled,
         )
         places = SystemPlaces(
             automata=self.places,
             conditions=tuple(at for _, at in conditions[False]),
             invariants=tuple(at for _, at in self.invariants),
             plant_conditions=tuple(at for _, at in conditions[True]),
+            events=self.event_places,
         )
-        return system, places
+        # A supervisor excludes initial states, too; against a requirement the system may begin.
+        return as_controlled(system) if is_controlled else system, places
 
     def _is_controlled(self) -> bool:
         """Return True if there is a supervisor; then there must be no requirement."""
@@ -301,9 +271,13 @@ class Lowering(msgspec.Struct):
         condition = self.used_by(item.role, predicate, scope, item.predicate.at)
         if not scope.is_real:
             return
+        if item.form is syntax.InvariantForm.DISABLES and isinstance(condition, Unary) and place is None:
+            # The form of `disables`, so that texts have it as it was written.
+            condition = Unary("not", Unary("holds", condition.operand))
         if item.form is syntax.InvariantForm.STATE:
             if item.role == "plant":
                 self.plant_invariants.append(condition)
+                self.plant_places.append(item.at)
             else:
                 self.invariants.append((condition, item.at))
             return

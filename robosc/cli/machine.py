@@ -41,9 +41,16 @@ class Machine(Protocol):
         """Return the graph of the controlled system."""
 
     def verify(
-        self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int, is_strict: bool
+        self,
+        model: "LoadedAutomata",
+        options: "SynthesisOptions",
+        *,
+        maximum_states: int,
+        is_strict: bool,
+        controller: bool,
+        as_is: bool,
     ) -> "Verification":
-        """Synthesize the supervisor, and verify it."""
+        """Synthesize the supervisor, unless automata are verified `as_is`, and verify it."""
 
     def generate(
         self,
@@ -98,14 +105,27 @@ class ThisMachine:
         return watched(lambda report: explore(model, options, maximum_states=maximum_states, on_progress=report))
 
     def verify(
-        self, model: "LoadedAutomata", options: "SynthesisOptions", *, maximum_states: int, is_strict: bool
+        self,
+        model: "LoadedAutomata",
+        options: "SynthesisOptions",
+        *,
+        maximum_states: int,
+        is_strict: bool,
+        controller: bool,
+        as_is: bool,
     ) -> "Verification":
-        """Synthesize the supervisor, and verify it."""
+        """Synthesize the supervisor, unless automata are verified `as_is`, and verify it."""
         from robosc.pipeline.verifying import verify
 
         return watched(
             lambda report: verify(
-                model, options=options, maximum_states=maximum_states, is_strict=is_strict, on_progress=report
+                model,
+                options=options,
+                maximum_states=maximum_states,
+                is_strict=is_strict,
+                controller=controller,
+                as_is=as_is,
+                on_progress=report,
             )
         )
 

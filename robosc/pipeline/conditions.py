@@ -1,6 +1,6 @@
 """Conditions that a supervisor adds to events, in the model's words."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from robosc.automata import System
@@ -105,26 +105,37 @@ def unknown_event(event: object, known: Sequence[str] | Mapping[str, object], wh
     return f"there is no {what} {str(event)!r:.100}; {hint}"
 
 
-def conditions_of(added: Sequence[AddedCondition], system: System, components: frozenset[str]) -> Conditions:
+def conditions_of(
+    added: Sequence[AddedCondition],
+    system: System,
+    components: frozenset[str],
+    text: Callable[[Expression], str] | None = None,
+) -> Conditions:
     """Return the conditions that a supervisor adds to each controllable event.
 
     Args:
         added: Conditions that the supervisor adds.
         system: Automata that it supervises.
         components: Names of the automata that go by their own names in conditions.
+        text: Function that writes a formula; None for that of models of robots.
     """
     found = added_formulas(added, system)
     vocabulary = Vocabulary(diagram_domains(system), components)
     return Conditions(
         [
-            Condition(event, condition_line(diagram, formula, components), formula, diagram, vocabulary)
+            Condition(event, _line(diagram, formula, components, text), formula, diagram, vocabulary)
             for event, diagram, formula in found
         ]
     )
 
 
 def condition_of(
-    event: str, diagram: DecisionDiagram, formula: Expression | None, system: System, components: frozenset[str]
+    event: str,
+    diagram: DecisionDiagram,
+    formula: Expression | None,
+    system: System,
+    components: frozenset[str],
+    text: Callable[[Expression], str] | None = None,
 ) -> Condition:
     """Return a condition in words.
 
@@ -134,6 +145,18 @@ def condition_of(
         formula: The same as an expression, or None where none reads well.
         system: Automata that it is about.
         components: Names of the automata that go by their own names in conditions.
+        text: Function that writes a formula; None for that of models of robots.
     """
     vocabulary = Vocabulary(diagram_domains(system), components)
-    return Condition(event, condition_line(diagram, formula, components), formula, diagram, vocabulary)
+    return Condition(event, _line(diagram, formula, components, text), formula, diagram, vocabulary)
+
+
+def _line(
+    diagram: DecisionDiagram,
+    formula: Expression | None,
+    components: frozenset[str],
+    text: Callable[[Expression], str] | None,
+) -> str:
+    if formula is None or text is None:
+        return condition_line(diagram, formula, components)
+    return text(formula)

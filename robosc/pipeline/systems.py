@@ -15,6 +15,7 @@ from robosc.automata.state import subjects, whole_names
 from robosc.certification import Progress
 from robosc.conditions.rendering import Formulas
 from robosc.errors import InvalidSupervisorError, InvalidSystemError, NodeLimitError, UnsupportedModelError
+from robosc.expressions.text import cif_text
 from robosc.pipeline.conditions import Condition, Conditions, condition_of, conditions_of
 from robosc.pipeline.files import FileName, SupervisorFile, given_path, read_bounded
 from robosc.pipeline.findings import Findings
@@ -85,7 +86,7 @@ class SystemSupervisor(SupervisorFile):
     @cached_property
     def conditions(self) -> Conditions:
         """Conditions that it adds to each controllable event, in words."""
-        return conditions_of(self.added, self.system, whole_names(self.system))
+        return conditions_of(self.added, self.system, whole_names(self.system), cif_text)
 
     @property
     def initial_condition(self) -> Condition | None:
@@ -93,7 +94,7 @@ class SystemSupervisor(SupervisorFile):
         if self.initial is None:
             return None
         formula = Formulas(diagram_domains(self.system)).formula(self.initial)
-        return condition_of(INITIALLY, self.initial, formula, self.system, whole_names(self.system))
+        return condition_of(INITIALLY, self.initial, formula, self.system, whole_names(self.system), cif_text)
 
     def may_begin(self, state: State) -> bool:
         """Return True if it allows an initial state, given by its values in the order of `subjects`."""
@@ -484,6 +485,7 @@ def _verified(
         initial=None if supervisor.initial is None else state_predicate(system, supervisor.initial),
         expected_states=supervisor.states,
         engine=options.engine_options().name,
+        text=cif_text,
         should_stop=should_stop,
         on_progress=report,
     )

@@ -51,6 +51,8 @@ COMMANDS = {
     "verify": ["verify"],
     "verify --strict": ["verify", "--strict", "--limit", "10"],
     "verify --quiet": ["verify", "--quiet"],
+    "verify --controller": ["verify", "--controller"],
+    "verify --as-is": ["verify", "--as-is", "--controller"],
 }
 
 Run = Callable[..., tuple[int, str, str]]
@@ -208,6 +210,8 @@ class TestCommands:
         assert "as a whole" in both("explain-synthesis", "models/tank.cif", "--modular")[2]
         generate = ("generate", "robot.rscd", "--target", "python", "-o", "out", "--initial", "C = a")
         assert "a robot begins in one state" in both(*generate)[2]
+        for option in ("--controller", "--as-is"):
+            assert f"{option} is for automata" in both("verify", "robot.rscd", option, "--property", "AG true")[2]
 
     def test_a_file_that_is_not_there(self, folder: Path, both: Run) -> None:
         assert both("synth", "none.cif") == (2, "", "robosc: there is no file none.cif\n")
@@ -277,6 +281,13 @@ class TestJobs:
         assert json.loads(Path("graph.json").read_text())["initial_states"] == [0, 1, 2]
         verified = self.submitted(remote, "verify", "models/tank.cif", "--strict")
         assert json.loads(remote("get", verified, "--result")[1])["status"] == "passed"
+        properties = self.submitted(remote, "verify", "models/tank.cif", "--controller", "--as-is")
+        assert set(json.loads(remote("get", properties, "--result")[1])["controller"]["checks"]) == {
+            "bounded_response",
+            "finite_response",
+            "confluence",
+            "nonblocking_under_control",
+        }
         generated = self.submitted(
             remote, "generate", "models/several.cif", "--target", "python", "--initial", "tank.level = 1"
         )
@@ -315,6 +326,8 @@ class TestPython:
         assert decode_system(remote.supervisor) == local.supervisor
         assert local.supervisor.modules == decode_system(remote.supervisor).modules
         assert client.verify(model, is_strict=True).report == robosc.verify(model, is_strict=True).report
+        for asked in ({"controller": True}, {"as_is": True}, {"controller": True, "as_is": True}):
+            assert client.verify(model, **asked).report == robosc.verify(model, **asked).report
         assert client.generate(model, "c99") == robosc.generate(model, "c99")
         assert client.explain(model) == robosc.explain(model)
         graph, explored = robosc.explore(model).graph, client.explore(model).graph

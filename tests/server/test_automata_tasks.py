@@ -80,6 +80,8 @@ class TestAcceptance:
             (TaskKind.SYNTHESIZE, {"modular": True}),
             (TaskKind.GENERATE, {"initial": "tank.level = 1"}),
             (TaskKind.VERIFY, {"strict": True}),
+            (TaskKind.VERIFY, {"controller": True}),
+            (TaskKind.VERIFY, {"as_is": True}),
         ):
             assert key(kind) != key(kind, **more)
 
@@ -143,6 +145,9 @@ class TestAcceptance:
         assert refusal(TaskKind.GENERATE, message) == problem
         message = pb.VerifyRequest(bundle=small_request(TaskKind.CHECK).bundle, strict=True)
         assert "apply only to a given supervisor" in refusal(TaskKind.VERIFY, message)
+        for name in ("controller", "as_is"):
+            message = pb.VerifyRequest(bundle=small_request(TaskKind.CHECK).bundle, supervisor=b"x", **{name: True})
+            assert refusal(TaskKind.VERIFY, message) == "controller and as_is apply only to automata"
 
     def test_targets_that_cannot_be_are_refused(self) -> None:
         message = request(TaskKind.GENERATE, cif(), target="all")

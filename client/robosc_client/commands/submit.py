@@ -20,6 +20,7 @@ from robosc.cli.properties import add_arguments as add_property_arguments
 from robosc.cli.properties import property_file
 from robosc.cli.sign import read_supervisor
 from robosc.cli.synth import add_modular_argument
+from robosc.cli.verify import add_automata_arguments
 from robosc.exploration import DEFAULT_LIMIT
 from robosc.model.structure import Deployment
 from robosc.pipeline.options import FOREIGN_STATES
@@ -144,6 +145,7 @@ def _add_verify_arguments(parser: argparse.ArgumentParser) -> None:
     )
     _add_limit(parser, FOREIGN_STATES, "verify up to N states of a supervisor file one by one")
     parser.add_argument("--strict", action="store_true", help="fail if maximal permissiveness could not be checked")
+    add_automata_arguments(parser)
     add_engine_options(parser)
     # A server has no keys to check a file with.
     parser.set_defaults(signed_by=[])

@@ -161,6 +161,8 @@ def _verify_request(task: Verify) -> pb.VerifyRequest:
         property_files=map(_listing, task.property_files),
         maximum_states=_limit(task.maximum_states, "maximum_states"),
         strict=task.is_strict,
+        controller=task.controller,
+        as_is=task.as_is,
     )
 
 

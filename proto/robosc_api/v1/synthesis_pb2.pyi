@@ -500,7 +500,7 @@ class ExplorationResult(_message.Message):
     def __init__(self, status: _Optional[_Union[SynthesisStatus, str]] = ..., diagnostics: _Optional[_Iterable[_Union[Diagnostic, _Mapping]]] = ..., reason: _Optional[str] = ..., explanation: _Optional[str] = ..., states: _Optional[int] = ..., transitions: _Optional[int] = ..., size: _Optional[int] = ..., digest: _Optional[bytes] = ..., goals: _Optional[_Union[GoalExplanation, _Mapping]] = ...) -> None: ...
 
 class VerifyRequest(_message.Message):
-    __slots__ = ("bundle", "options", "supervisor", "properties", "property_files", "maximum_states", "strict")
+    __slots__ = ("bundle", "options", "supervisor", "properties", "property_files", "maximum_states", "strict", "controller", "as_is")
     BUNDLE_FIELD_NUMBER: _ClassVar[int]
     OPTIONS_FIELD_NUMBER: _ClassVar[int]
     SUPERVISOR_FIELD_NUMBER: _ClassVar[int]
@@ -508,6 +508,8 @@ class VerifyRequest(_message.Message):
     PROPERTY_FILES_FIELD_NUMBER: _ClassVar[int]
     MAXIMUM_STATES_FIELD_NUMBER: _ClassVar[int]
     STRICT_FIELD_NUMBER: _ClassVar[int]
+    CONTROLLER_FIELD_NUMBER: _ClassVar[int]
+    AS_IS_FIELD_NUMBER: _ClassVar[int]
     bundle: Bundle
     options: SynthesisOptions
     supervisor: bytes
@@ -515,7 +517,9 @@ class VerifyRequest(_message.Message):
     property_files: _containers.RepeatedCompositeFieldContainer[SourceFile]
     maximum_states: int
     strict: bool
-    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., supervisor: _Optional[bytes] = ..., properties: _Optional[_Iterable[str]] = ..., property_files: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ..., maximum_states: _Optional[int] = ..., strict: _Optional[bool] = ...) -> None: ...
+    controller: bool
+    as_is: bool
+    def __init__(self, bundle: _Optional[_Union[Bundle, _Mapping]] = ..., options: _Optional[_Union[SynthesisOptions, _Mapping]] = ..., supervisor: _Optional[bytes] = ..., properties: _Optional[_Iterable[str]] = ..., property_files: _Optional[_Iterable[_Union[SourceFile, _Mapping]]] = ..., maximum_states: _Optional[int] = ..., strict: _Optional[bool] = ..., controller: _Optional[bool] = ..., as_is: _Optional[bool] = ...) -> None: ...
 
 class VerifyResponse(_message.Message):
     __slots__ = ("progress", "result")

@@ -18,6 +18,7 @@ from robosc.conditions.formula import to_expression
 from robosc.conditions.literals import membership, merged
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import (
+    MAXIMUM_INTEGER,
     MINIMUM_INTEGER,
     TRUE,
     Binary,
@@ -342,14 +343,37 @@ class _Writer:
                 for update in edge.updates if edge.event == event else ():
                     match types[update.variable]:
                         case IntegerType(low=int(low), high=int(high)):
-                            least, greatest = self._bounds(update.expression)
-                            new = self._text(update.expression, scope).within(Level.SUM)
-                            stays = [compared(str(_integer(low)), "<=", new)] if least < low else []
-                            stays += [compared(new, "<=", str(_integer(high)))] if greatest > high else []
+                            stays = list(self._stays(update.expression, low, high))
                             here = self._text(StateTest(automaton.name, edge.source), scope)
                             if len(automaton.locations) == 1:
                                 here = text.TRUE
                             yield implied(all_of([here, self._text(edge.guard, scope)]), all_of(stays))
+
+    def _stays(self, expression: Expression, low: int, high: int) -> Iterator[Text]:
+        """Yield the conditions that a value is in a range, as far as it need not be."""
+        scope = (self._supervisor,)
+        least, greatest = self._bounds(expression)
+        match expression:
+            case Binary(operator="-", left=left, right=right) if (
+                low >= 0 and self._bounds(right)[1] + high <= MAXIMUM_INTEGER
+            ):
+                # In conditions, tools of CIF take sums and no differences.
+                whole = self._text(left, scope).within(Level.SUM)
+                if least < low:
+                    yield compared(self._plus(right, low).within(Level.SUM), "<=", whole)
+                if greatest > high:
+                    yield compared(whole, "<=", self._plus(right, high).within(Level.SUM))
+            case _:
+                new = self._text(expression, scope).within(Level.SUM)
+                if least < low:
+                    yield compared(str(_integer(low)), "<=", new)
+                if greatest > high:
+                    yield compared(new, "<=", str(_integer(high)))
+
+    def _plus(self, expression: Expression, number: int) -> Text:
+        if isinstance(expression, Constant) and isinstance(expression.value, int):
+            return _integer(expression.value + number)
+        return self._text(Binary("+", expression, Constant(number)) if number else expression, (self._supervisor,))
 
     def _condition(self, diagram: DecisionDiagram | None) -> Text:
         """A condition as a formula, or by algebraic variables that stand for the nodes of its diagram."""

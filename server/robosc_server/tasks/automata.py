@@ -88,13 +88,17 @@ class Automata:
         made = explore(self._model, self._options, maximum_states=maximum_states, on_progress=self._report)
         return made.graph, _result_fields(made)
 
-    def verification(self, maximum_states: int, *, is_strict: bool) -> pb.VerificationResult:
-        """Return the report about a supervisor that is made."""
+    def verification(
+        self, maximum_states: int, *, is_strict: bool, controller: bool, as_is: bool
+    ) -> pb.VerificationResult:
+        """Return the report about a supervisor that is made, or about automata as they stand."""
         found = verify(
             self._model,
             options=self._options,
             maximum_states=maximum_states,
             is_strict=is_strict,
+            controller=controller,
+            as_is=as_is,
             on_progress=self._report,
         )
         return pb.VerificationResult(

@@ -420,6 +420,8 @@ def _verify(message: Any, reader: _RequestReader) -> object:
     is_given, is_robot = bool(message.supervisor), not reader.is_automata
     if is_robot and not is_given and (message.maximum_states or message.strict):
         raise _malformed("maximum_states and strict apply only to a given supervisor, and the request has none")
+    if is_robot and (message.controller or message.as_is):
+        raise _malformed("controller and as_is apply only to automata")
     if is_robot and not is_given and not message.properties and not message.property_files:
         raise _malformed("the request has neither a supervisor nor properties")
     if message.maximum_states > _MAXIMUM_VERIFIED_STATES:
@@ -438,6 +440,8 @@ def _verify(message: Any, reader: _RequestReader) -> object:
         [reader.file(file) for file in message.property_files],
         message.maximum_states or _DEFAULT_VERIFIED_STATES,
         message.strict,
+        message.controller,
+        message.as_is,
     )
 
 

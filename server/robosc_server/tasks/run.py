@@ -340,7 +340,12 @@ def _verify(content: bytes, limits: TaskLimits, on_report: OnReport) -> Iterator
     if (automata := _automata(request, limits, on_report)) is None:
         result = verification(request, limits.nodes, on_report)
     else:
-        result = automata.verification(request.maximum_states or DEFAULT_STATES, is_strict=request.strict)
+        result = automata.verification(
+            request.maximum_states or DEFAULT_STATES,
+            is_strict=request.strict,
+            controller=request.controller,
+            as_is=request.as_is,
+        )
     yield pb.VerifyResponse(result=result)
 
 

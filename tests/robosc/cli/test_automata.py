@@ -68,7 +68,7 @@ def test_what_is_to_blame_is_reported(model: str, capsys: pytest.CaptureFixture[
         assert lines[-4:] == [
             "    tank.u_drain can take tank.level, which is 0, out of its range",
             "to blame: this alone leaves no supervisor",
-            "  tank.cif:1:7: the range of tank.level: integer(0..3)",
+            "  tank.cif:1:7: the range of tank.level: int[0..3]",
             "there is a supervisor without it",
         ]
     assert sentences[0] in lines

@@ -1,4 +1,4 @@
-"""Check in C, after every command, that what a generated executor knows of its events is what a full look would find."""
+"""Check in C, after every command, that what a generated executor knows of its events is what a full look finds."""
 
 from robosc.model.structure import CommunicationKind, EventKind
 from robosc.targets.code.c.layout import Layout
@@ -19,7 +19,7 @@ static bool is_member(const @p@_set_t *set, int number)
 static void check_set(const char *name, const @p@_set_t *set)
 {
     for (int word = 0; word < (@P@_SET_COUNT + 31) / 32; word++) {
-        if ((set->used[word / 32] >> (word % 32) & 1U) != (set->bits[word] != 0)) {
+        if (@P@_SET_COUNT > 32 && (set->used[word / 32] >> (word % 32) & 1U) != (set->bits[word] != 0)) {
             complain(name, word);
         }
     }
@@ -50,7 +50,8 @@ static void check_changes(void)
     check_set("withheld", &r.withheld);
     check_set("unchanging", &r.unchanging);
     for (int turn = 0; turn < 2 * @P@_REQUEST_COUNT && r.is_started; turn++) {
-        if (r.owners[turn] >= 0 ? r.turns[r.owners[turn]] != turn : is_member(&r.candidates, turn)) {
+        const bool has_owner = turn < r.next_turn && r.owners[turn] >= 0;
+        if (has_owner ? r.turns[r.owners[turn]] != turn : is_member(&r.candidates, turn)) {
             complain("wrong turn", turn);
         }
         if (r.fault == @P@_FAULT_NONE && (is_member(&r.fresh, turn) || is_member(&r.withheld, turn))) {
@@ -92,7 +93,11 @@ static void check_changes(void)
 def check_changes(layout: Layout) -> str:
     """The text of the function `check_changes`, which writes what is wrong to standard error."""
     requests = [] if layout.is_layer else layout.requests
-    asked = [*layout.description.resets, *layout.description.taus, *(item.event(EventKind.REQUEST) for item in requests)]
+    asked = [
+        *layout.description.resets,
+        *layout.description.taus,
+        *(item.event(EventKind.REQUEST) for item in requests),
+    ]
     actions = [item.name for item in layout.of_kind(CommunicationKind.ACTION)]
     is_open = [
         f"        is_enabled = is_enabled && !(request == {number} && r.goals[{actions.index(item.name)}].is_open);"

@@ -53,8 +53,8 @@ class Readers:
             words = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
             rows.append(f"    {', '.join(map(str, numbers))}, /* {place}: {words} */")
         return [
-            "/* Readers of parts of the state: how many there are, then the silent steps and requests, in this order, that",
-            "   may be allowed now or no longer where such a part has changed; more than there are: all of them. */",
+            "/* Readers of parts of the state: how many there are, then the silent steps and requests, in this order,",
+            "   that may be allowed now or no longer where such a part has changed; a higher number: all of them. */",
             f"static const {width(self._count + 2)} READERS[] = {{",
             *rows,
             "};",

@@ -148,16 +148,17 @@ static bool may_be_issued(const robot_t *r, int request)
 /* Look at the requests that may be enabled now or no longer. */
 static void find_candidates(robot_t *r)
 {
-    int number = next_in(&r->stale, ROBOT_SILENT_COUNT - 1);
-    for (; number >= 0; number = next_in(&r->stale, number)) {
+    for (int number = first_in(&r->stale); number >= 0; number = next_in(&r->stale, number)) {
         const int request = number - ROBOT_SILENT_COUNT;
-        const int turn = r->turns[request];
-        remove_from(&r->stale, number);
-        if (!may_be_issued(r, request)) {
-            remove_from(&r->candidates, turn);
-        } else if (!is_in(&r->candidates, turn)) {
-            add_to(&r->candidates, turn);
-            add_to(&r->fresh, turn);
+        if (request >= 0) {
+            const int turn = r->turns[request];
+            remove_from(&r->stale, number);
+            if (!may_be_issued(r, request)) {
+                remove_from(&r->candidates, turn);
+            } else if (!is_in(&r->candidates, turn)) {
+                add_to(&r->candidates, turn);
+                add_to(&r->fresh, turn);
+            }
         }
     }
 }

@@ -92,11 +92,7 @@ bool robot_init(robot_t *r, const robot_settings_t *settings, const robot_callba
     }
 #if ROBOT_REQUEST_COUNT > 0
     for (int place = 0; place < r->settings.priority_count; place++) {
-        bool is_request = false;
-        for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-            is_request = is_request || REQUESTS[request].communication == r->settings.priority[place];
-        }
-        if (!is_request) {
+        if (request_of(r->settings.priority[place]) == ROBOT_REQUEST_COUNT) {
             return false;
         }
     }

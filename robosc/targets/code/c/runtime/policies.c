@@ -8,68 +8,68 @@ enum {
     NOBODY = -1 /* instead of a request, or of a turn's owner */
 };
 
-/* A request has another turn now. */
-static void give_turn(robot_t *r, int request, int turn)
+/* The request of a communication. */
+static int request_of(robot_communication_t communication)
 {
-    r->owners[r->turns[request]] = NOBODY;
-    r->owners[turn] = request;
-    r->turns[request] = turn;
+    int request = 0;
+    while (request < ROBOT_REQUEST_COUNT && REQUESTS[request].communication != communication) {
+        request++;
+    }
+    return request;
+}
+
+/* A request gets the next turn after all others. */
+static void give_turn(robot_t *r, int request)
+{
+    r->turns[request] = r->next_turn;
+    r->owners[r->next_turn] = request;
+    r->next_turn++;
 }
 
 /* In the beginning the list of the policy `priority` comes first, and then all others in source order. */
 static void new_policy(robot_t *r)
 {
-    int turn = 0;
+    const int listed_count = r->settings.policy == ROBOT_POLICY_PRIORITY ? r->settings.priority_count : 0;
     r->decision = 0;
-    r->is_new = false;
     r->random = r->settings.seed;
-    memset(&r->candidates, 0, sizeof r->candidates);
-    memset(&r->fresh, 0, sizeof r->fresh);
-    memset(&r->withheld, 0, sizeof r->withheld);
-    memset(&r->unchanging, 0, sizeof r->unchanging);
+    r->next_turn = 0;
+    empty(&r->candidates);
+    empty(&r->fresh);
+    empty(&r->withheld);
+    empty(&r->unchanging);
     for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
         r->turns[request] = NOBODY;
         r->favoured[request] = -ROBOT_REQUEST_COUNT;
     }
-    if (r->settings.policy == ROBOT_POLICY_PRIORITY) {
-        for (int place = 0; place < r->settings.priority_count; place++) {
-            for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
-                if (REQUESTS[request].communication == r->settings.priority[place] && r->turns[request] == NOBODY) {
-                    r->owners[turn] = request;
-                    r->turns[request] = turn++;
-                }
-            }
+    for (int place = 0; place < listed_count; place++) {
+        const int request = request_of(r->settings.priority[place]);
+        if (r->turns[request] == NOBODY) {
+            give_turn(r, request);
         }
     }
-    r->listed_count = turn;
+    r->listed_count = r->next_turn;
     for (int request = 0; request < ROBOT_REQUEST_COUNT; request++) {
         if (r->turns[request] == NOBODY) {
-            r->owners[turn] = request;
-            r->turns[request] = turn++;
+            give_turn(r, request);
         }
     }
-    while (turn < TURN_COUNT) {
-        r->owners[turn++] = NOBODY;
-    }
-    r->next_turn = ROBOT_REQUEST_COUNT;
 }
 
-/* Number the turns anew, in the same order, which nothing but `candidates` remembers between decisions. */
+/* Number the turns anew, in the same order. Between decisions nothing but `candidates` has any. */
 static void renumber_turns(robot_t *r)
 {
-    int next = 0;
+    r->next_turn = 0;
     for (int turn = 0; turn < TURN_COUNT; turn++) {
         const int request = r->owners[turn];
-        if (request != NOBODY && next++ < turn) {
-            const bool is_candidate = is_in(&r->candidates, turn);
-            remove_from(&r->candidates, turn);
-            give_turn(r, request, next - 1);
-            if (is_candidate) {
-                add_to(&r->candidates, next - 1);
+        if (request != NOBODY) {
+            if (is_in(&r->candidates, turn)) {
+                remove_from(&r->candidates, turn);
+                add_to(&r->candidates, r->next_turn);
             }
+            r->owners[turn] = NOBODY;
+            give_turn(r, request);
         }
     }
-    r->next_turn = next;
 }
 
 /* The splitmix64 generator (Steele, Lea and Flood, OOPSLA 2014). */
@@ -148,7 +148,8 @@ static void remember_issued(robot_t *r, int turn)
         }
         remove_from(&r->candidates, turn);
         add_to(&r->candidates, r->next_turn);
-        give_turn(r, request, r->next_turn++);
+        r->owners[turn] = NOBODY;
+        give_turn(r, request);
     }
 }
 

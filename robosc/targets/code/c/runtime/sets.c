@@ -24,64 +24,70 @@ enum {
 
 static void add_to(robot_set_t *set, int number)
 {
-    const unsigned place = (unsigned)number;
-    set->bits[place / 32] |= UINT32_C(1) << (place % 32);
-    set->used[place / 1024] |= UINT32_C(1) << (place / 32 % 32);
+    const unsigned place = SET_WORDS == 1 ? 0 : (unsigned)number / 32;
+    set->bits[place] |= UINT32_C(1) << ((unsigned)number % 32);
+    if (SET_WORDS > 1) {
+        set->used[place / 32] |= UINT32_C(1) << (place % 32);
+    }
 }
 
 static void remove_from(robot_set_t *set, int number)
 {
-    const unsigned place = (unsigned)number;
-    set->bits[place / 32] &= ~(UINT32_C(1) << (place % 32));
-    if (set->bits[place / 32] == 0) {
-        set->used[place / 1024] &= ~(UINT32_C(1) << (place / 32 % 32));
+    const unsigned place = SET_WORDS == 1 ? 0 : (unsigned)number / 32;
+    set->bits[place] &= ~(UINT32_C(1) << ((unsigned)number % 32));
+    if (SET_WORDS > 1 && set->bits[place] == 0) {
+        set->used[place / 32] &= ~(UINT32_C(1) << (place % 32));
     }
+}
+
+/* The least member from a word on, or -1. */
+static int first_from(const robot_set_t *set, unsigned word)
+{
+    uint32_t wanted = UINT32_MAX << (word % 32);
+    for (unsigned part = word / 32; part < SET_PARTS; part++) {
+        const uint32_t used = set->used[part] & wanted;
+        if (used != 0) {
+            const int found = 32 * (int)part + lowest_bit(used);
+            return 32 * found + lowest_bit(set->bits[found]);
+        }
+        wanted = UINT32_MAX;
+    }
+    return -1;
 }
 
 /* The least member, or -1. */
 static int first_in(const robot_set_t *set)
 {
-    for (int part = 0; part < SET_PARTS; part++) {
-        if (set->used[part] != 0) {
-            const int word = 32 * part + lowest_bit(set->used[part]);
-            return 32 * word + lowest_bit(set->bits[word]);
-        }
+    if (SET_WORDS == 1) {
+        return set->bits[0] == 0 ? -1 : lowest_bit(set->bits[0]);
     }
-    return -1;
+    return first_from(set, 0);
 }
 
 /* The next member after another one, or -1. */
 static int next_in(const robot_set_t *set, int member)
 {
-    const unsigned next = (unsigned)member + 1;
-    unsigned word = next / 32;
-    uint32_t found = next % 32 == 0 ? 0 : set->bits[word] & (UINT32_MAX << (next % 32));
-    if (found == 0) {
-        uint32_t wanted = 0;
-        word += next % 32 == 0 ? 0 : 1;
-        wanted = UINT32_MAX << (word % 32);
-        for (unsigned part = word / 32; part < SET_PARTS; part++) {
-            if ((set->used[part] & wanted) != 0) {
-                word = 32 * part + (unsigned)lowest_bit(set->used[part] & wanted);
-                found = set->bits[word];
-                break;
-            }
-            wanted = UINT32_MAX;
-        }
+    const unsigned word = SET_WORDS == 1 ? 0 : (unsigned)member / 32;
+    const uint32_t bits = set->bits[word] & (UINT32_MAX << 1 << ((unsigned)member % 32));
+    if (bits != 0) {
+        return 32 * (int)word + lowest_bit(bits);
     }
-    return found == 0 ? -1 : (int)(32 * word) + lowest_bit(found);
+    return SET_WORDS == 1 ? -1 : first_from(set, word + 1);
 }
 
 #if !ROBOT_IS_LAYER
 #if ROBOT_REQUEST_COUNT > 0
 static bool is_in(const robot_set_t *set, int number)
 {
-    const unsigned place = (unsigned)number;
-    return (set->bits[place / 32] >> (place % 32) & 1U) != 0;
+    const unsigned place = SET_WORDS == 1 ? 0 : (unsigned)number / 32;
+    return (set->bits[place] >> ((unsigned)number % 32) & 1U) != 0;
 }
 
 static void empty(robot_set_t *set)
 {
+    if (SET_WORDS == 1) {
+        set->bits[0] = 0;
+    }
     for (int part = 0; part < SET_PARTS; part++) {
         for (; set->used[part] != 0; set->used[part] &= set->used[part] - 1) {
             set->bits[32 * part + lowest_bit(set->used[part])] = 0;

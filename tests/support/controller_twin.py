@@ -151,8 +151,10 @@ class World:
     def moves(self) -> Iterator[tuple[Move, bool]]:
         """Yield every move that may happen now, and True if it may under every setting."""
         model = self.system.supervisor.model
-        for number in self.executor._decisions._find_enabled():
-            yield ("request", self.executor._request_names[number]), True
+        for number in self.executor._system.enabled_requests():
+            name = self.executor._request_names[number]
+            if not self.executor._goals.is_open(name):
+                yield ("request", name), True
         topics: dict[str, list[Any]] = {}
         for item in model.communications:
             if item.kind is CommunicationKind.OUTGOING_MESSAGE:

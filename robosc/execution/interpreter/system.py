@@ -108,6 +108,7 @@ class InterpretedSystem:
         self._state = self._initial
         self.changes = 0
         self._request_events = tuple(info.name + ".request" for info in requesting(self.description.communications))
+        self._were_enabled: frozenset[int] = frozenset()
         self._batches = batches(self.description.communications)
         self._goals = None
         domains = place_domains(model)
@@ -119,6 +120,7 @@ class InterpretedSystem:
     def restart(self) -> None:
         """Return to the initial state."""
         self.changes += 1
+        self._were_enabled = frozenset()
         self._state = self._initial
         if self._goals is not None:
             self._goals.restart()
@@ -156,6 +158,11 @@ class InterpretedSystem:
     def enabled_requests(self) -> tuple[int, ...]:
         """Return the numbers, in source order of all requests, of those that are allowed now."""
         return tuple(number for number, event in enumerate(self._request_events) if self.enabled(event))
+
+    def changed_requests(self) -> tuple[int, ...]:
+        """Return the numbers of the requests that are allowed now and were not at the last call, or vice versa."""
+        before, self._were_enabled = self._were_enabled, frozenset(self.enabled_requests())
+        return tuple(sorted(before ^ self._were_enabled))
 
     def enabled_silent(self) -> str | None:
         """The first reset, then the first tau, that is allowed now; None if none is."""

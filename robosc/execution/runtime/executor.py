@@ -83,7 +83,7 @@ class Executor(Runner):
 
     def _begin(self) -> None:
         if isinstance(self._decisions, PolicyDecisions):
-            self._decisions.policy = self._new_policy()
+            self._decisions.begin(self._new_policy())
         super()._begin()
 
     def _end_batch(self) -> None:

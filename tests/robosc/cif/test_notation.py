@@ -1,4 +1,4 @@
-"""What is printed about CIF models is in CIF's notation: its reader takes it, and it means the same."""
+"""Texts about CIF models are in CIF's notation: its reader takes them, and they mean the same."""
 
 from itertools import product
 from pathlib import Path
@@ -29,6 +29,7 @@ from robosc.expressions import (
 from robosc.expressions.text import cif_text
 from robosc.pipeline.steps import event_text
 from robosc.pipeline.system_runs import state_parts
+from robosc.pipeline.systems import SystemSupervisor
 from robosc.source import Bundle, SourceFile
 
 MODEL = """group io: enum Mode = AUTO, HAND; input bool hit; input int[0..2] level; end
@@ -160,7 +161,7 @@ def test_a_supervisor_that_is_not_safe(tmp_path: Path, capsys: pytest.CaptureFix
 def test_simulation(tmp_path: Path) -> None:
     path = model(tmp_path, "requirement p.c_on needs not io.hit;", "plant not p.off disables p.c_on;")
     made = robosc.synthesize(path).supervisor
-    assert made is not None
+    assert isinstance(made, SystemSupervisor)
     begin = {"io.hit": True, "io.level": 0}
     stepped = robosc.simulate(made, initial=begin)
     assert stepped.reasons("p.c_on") == ("it needs not io.hit, which does not hold (io.hit is true)",)
@@ -192,7 +193,7 @@ def test_literals_go_by_both_names(tmp_path: Path, capsys: pytest.CaptureFixture
     printed = run(capsys, "explain-synthesis", path, "--state", "g.wish = io.FOOT")
     assert "'io.FOOT' is not a value of g.wish" in printed
     made = robosc.synthesize(path).supervisor
-    assert made is not None
+    assert isinstance(made, SystemSupervisor)
     stepped = robosc.simulate(made, initial={"g.wish": "AUTO", "io.hit": True, "io.level": 0})
     assert stepped.reasons("q.u") == ("q: g.wish = io.HAND does not hold (g.wish is AUTO)",)
     assert event_text(stepped.step("g.wish", "io.HAND")) == "g.wish (HAND)"

@@ -13,6 +13,7 @@ from robosc.automata.compile import NO_DATA, compile_expression
 from robosc.automata.state import subject_domain, subjects
 from robosc.cif import check_cif
 from robosc.cli.main import main
+from robosc.conditions.rendering import Formulas, Line
 from robosc.expressions import (
     ITSELF,
     Binary,
@@ -214,3 +215,26 @@ def test_comments_of_code(tmp_path: Path, target: str, capsys: pytest.CaptureFix
     assert "not (p.flag and not p.on)" in written
     for foreign in ("!holds", "!p.", "!io.hit "):
         assert foreign not in written, foreign
+
+
+def test_conditions_of_supervisors(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = """plant q:
+      uncontrollable u_x; disc io.Mode m in any; disc int[0..2] k in any; disc bool b in any;
+      location a: initial; marked; edge u_x when k > 0 goto c; edge p.c_on; edge p.c_off do k := 2 - k, b := not b;
+      location c: marked q.m = io.HAND; edge u_x; edge p.c_off goto a;
+    end
+    requirement invariant not (q.c and p.on) or q.m = io.HAND and q.b;
+    """
+    made = robosc.synthesize(robosc.load(text=MODEL + text, name="m.cif")).supervisor
+    assert isinstance(made, SystemSupervisor)
+    assert [str(item) for item in made.conditions.values()] == ["q.k = 0 or q.b", "q.m = io.HAND"]
+    monkeypatch.setattr(Formulas, "formula", lambda self, diagram, limit=0: None)
+    del made.__dict__["conditions"]
+    on, off = made.conditions.values()
+    assert str(on).splitlines()[1:] == ["[1] if q.b: true else [2] end", "[2] q.k = 0"]
+    assert str(off).splitlines()[1:] == ["[1] q.m = io.HAND"]
+    assert [line.json() for line in off.lines] == [
+        {"node": 1, "cases": [{"if": "q.m = io.HAND", "then": True}], "else": False}
+    ]
+    several = Line(3, tuple((item.cases[0][0], item.number) for item in on.lines), True, is_cif=True)
+    assert str(several) == "[3] if q.b: [1] elif q.k = 0: [2] else true end"

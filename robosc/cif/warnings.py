@@ -1,4 +1,4 @@
-"""What is mostly meant otherwise in a CIF model without errors, as CIF's own synthesis warns of it.
+"""Parts of a CIF model without errors that are mostly meant otherwise, as CIF's own synthesis warns of them.
 
 These are plants that read requirements, events that never happen, and states, initial states and marked states of which
 there are none. A condition is taken to be impossible if it is false for all values of what it reads. Where those are
@@ -116,7 +116,7 @@ class _Possible:
         return self._can(conditions, self._initial)
 
     def _can(self, conditions: Iterable[Expression], domains: Mapping[Subject, Sequence[Value]]) -> bool:
-        # What shares nothing with the rest is possible or not by itself.
+        # Conditions that share nothing with the rest are possible or not by themselves.
         groups: list[tuple[set[Subject], list[Expression]]] = []
         for condition in (part for item in conditions for part in conjuncts(item)):
             read, together = set(subjects_read(condition)), [condition]

@@ -163,7 +163,7 @@ class _Printer:
                     return "if {}: {} else {} end".format(*parts), _OPERAND
                 return "if {} then {} else {}".format(*parts), _CONDITIONAL
             case Unary(operator="holds", operand=operand) if self._is_cif:
-                # Of automata every condition is true or false.
+                # Every condition of automata is true or false.
                 return self.print(operand, depth)
             case Unary(operator="holds", operand=operand):
                 return f"holds({self.print(operand, depth)[0]})", _OPERAND

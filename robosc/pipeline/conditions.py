@@ -1,6 +1,6 @@
 """Conditions that a supervisor adds to events, in the model's words."""
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 
 from robosc.automata import System
@@ -9,6 +9,7 @@ from robosc.conditions.rendering import Line, diagram_lines
 from robosc.conditions.summary import ELSEWHERE, FROM_THE_FIRST, added_formulas, condition_line, short_diagrams
 from robosc.errors import UnknownNameError
 from robosc.expressions import TRUE, Expression
+from robosc.expressions.text import cif_text
 from robosc.model.findings import did_you_mean
 from robosc.supervisor import AddedCondition, DecisionDiagram
 from robosc.supervisor.diagram import diagram_domains
@@ -109,7 +110,8 @@ def conditions_of(
     added: Sequence[AddedCondition],
     system: System,
     components: frozenset[str],
-    text: Callable[[Expression], str] | None = None,
+    *,
+    is_cif: bool = False,
 ) -> Conditions:
     """Return the conditions that a supervisor adds to each controllable event.
 
@@ -117,13 +119,13 @@ def conditions_of(
         added: Conditions that the supervisor adds.
         system: Automata that it supervises.
         components: Names of the automata that go by their own names in conditions.
-        text: Function that writes a formula; None for that of models of robots.
+        is_cif: True if texts are in CIF's notation.
     """
     found = added_formulas(added, system)
-    vocabulary = Vocabulary(diagram_domains(system), components)
+    vocabulary = Vocabulary(diagram_domains(system), components, is_cif=is_cif)
     return Conditions(
         [
-            Condition(event, _line(diagram, formula, components, text), formula, diagram, vocabulary)
+            Condition(event, _line(diagram, formula, components, is_cif=is_cif), formula, diagram, vocabulary)
             for event, diagram, formula in found
         ]
     )
@@ -135,7 +137,8 @@ def condition_of(
     formula: Expression | None,
     system: System,
     components: frozenset[str],
-    text: Callable[[Expression], str] | None = None,
+    *,
+    is_cif: bool = False,
 ) -> Condition:
     """Return a condition in words.
 
@@ -145,18 +148,13 @@ def condition_of(
         formula: The same as an expression, or None where none reads well.
         system: Automata that it is about.
         components: Names of the automata that go by their own names in conditions.
-        text: Function that writes a formula; None for that of models of robots.
+        is_cif: True if texts are in CIF's notation.
     """
-    vocabulary = Vocabulary(diagram_domains(system), components)
-    return Condition(event, _line(diagram, formula, components, text), formula, diagram, vocabulary)
+    vocabulary = Vocabulary(diagram_domains(system), components, is_cif=is_cif)
+    return Condition(event, _line(diagram, formula, components, is_cif=is_cif), formula, diagram, vocabulary)
 
 
-def _line(
-    diagram: DecisionDiagram,
-    formula: Expression | None,
-    components: frozenset[str],
-    text: Callable[[Expression], str] | None,
-) -> str:
-    if formula is None or text is None:
+def _line(diagram: DecisionDiagram, formula: Expression | None, components: frozenset[str], *, is_cif: bool) -> str:
+    if formula is None or not is_cif:
         return condition_line(diagram, formula, components)
-    return text(formula)
+    return cif_text(formula)

@@ -86,7 +86,7 @@ class SystemSupervisor(SupervisorFile):
     @cached_property
     def conditions(self) -> Conditions:
         """Conditions that it adds to each controllable event, in words."""
-        return conditions_of(self.added, self.system, whole_names(self.system), cif_text)
+        return conditions_of(self.added, self.system, whole_names(self.system), is_cif=True)
 
     @property
     def initial_condition(self) -> Condition | None:
@@ -94,7 +94,7 @@ class SystemSupervisor(SupervisorFile):
         if self.initial is None:
             return None
         formula = Formulas(diagram_domains(self.system)).formula(self.initial)
-        return condition_of(INITIALLY, self.initial, formula, self.system, whole_names(self.system), cif_text)
+        return condition_of(INITIALLY, self.initial, formula, self.system, whole_names(self.system), is_cif=True)
 
     def may_begin(self, state: State) -> bool:
         """Return True if it allows an initial state, given by its values in the order of `subjects`."""

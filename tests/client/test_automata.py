@@ -326,8 +326,9 @@ class TestPython:
         assert decode_system(remote.supervisor) == local.supervisor
         assert local.supervisor.modules == decode_system(remote.supervisor).modules
         assert client.verify(model, is_strict=True).report == robosc.verify(model, is_strict=True).report
-        for asked in ({"controller": True}, {"as_is": True}, {"controller": True, "as_is": True}):
-            assert client.verify(model, **asked).report == robosc.verify(model, **asked).report
+        for controller, as_is in ((True, False), (False, True), (True, True)):
+            remotely = client.verify(model, controller=controller, as_is=as_is)
+            assert remotely.report == robosc.verify(model, controller=controller, as_is=as_is).report
         assert client.generate(model, "c99") == robosc.generate(model, "c99")
         assert client.explain(model) == robosc.explain(model)
         graph, explored = robosc.explore(model).graph, client.explore(model).graph

@@ -247,9 +247,8 @@ def test_values_that_mean_the_same_are_the_same() -> None:
 def test_parameters_have_the_same_names(name: str) -> None:
     local = list(inspect.signature(getattr(robosc, name)).parameters)
     remote = list(inspect.signature(getattr(Client, name)).parameters)[1:]
-    # Work here is stopped by a function, and there by a deadline; pages of findings, and checks of the controller that
-    # automata make, are here alone.
-    assert [item for item in local if item not in ("should_stop", "on_progress", "code", "controller")] == [
+    # Work here is stopped by a function, and there by a deadline; pages of findings are here alone.
+    assert [item for item in local if item not in ("should_stop", "on_progress", "code")] == [
         item for item in remote if item not in ("deadline_s", "on_progress")
     ]
 

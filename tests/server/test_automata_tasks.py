@@ -146,7 +146,8 @@ class TestAcceptance:
         message = pb.VerifyRequest(bundle=small_request(TaskKind.CHECK).bundle, strict=True)
         assert "apply only to a given supervisor" in refusal(TaskKind.VERIFY, message)
         for name in ("controller", "as_is"):
-            message = pb.VerifyRequest(bundle=small_request(TaskKind.CHECK).bundle, supervisor=b"x", **{name: True})
+            message = pb.VerifyRequest(bundle=small_request(TaskKind.CHECK).bundle, supervisor=b"x")
+            setattr(message, name, True)
             assert refusal(TaskKind.VERIFY, message) == "controller and as_is apply only to automata"
 
     def test_targets_that_cannot_be_are_refused(self) -> None:

@@ -1,4 +1,4 @@
-"""What is printed about CIF models is in CIF's notation: its reader takes it, and it means the same."""
+"""Texts about CIF models are in CIF's notation: its reader takes them, and they mean the same."""
 
 from itertools import product
 from pathlib import Path
@@ -13,6 +13,7 @@ from robosc.automata.compile import NO_DATA, compile_expression
 from robosc.automata.state import subject_domain, subjects
 from robosc.cif import check_cif
 from robosc.cli.main import main
+from robosc.conditions.rendering import Formulas, Line
 from robosc.expressions import (
     ITSELF,
     Binary,
@@ -29,6 +30,7 @@ from robosc.expressions import (
 from robosc.expressions.text import cif_text
 from robosc.pipeline.steps import event_text
 from robosc.pipeline.system_runs import state_parts
+from robosc.pipeline.systems import SystemSupervisor
 from robosc.source import Bundle, SourceFile
 
 MODEL = """group io: enum Mode = AUTO, HAND; input bool hit; input int[0..2] level; end
@@ -160,7 +162,7 @@ def test_a_supervisor_that_is_not_safe(tmp_path: Path, capsys: pytest.CaptureFix
 def test_simulation(tmp_path: Path) -> None:
     path = model(tmp_path, "requirement p.c_on needs not io.hit;", "plant not p.off disables p.c_on;")
     made = robosc.synthesize(path).supervisor
-    assert made is not None
+    assert isinstance(made, SystemSupervisor)
     begin = {"io.hit": True, "io.level": 0}
     stepped = robosc.simulate(made, initial=begin)
     assert stepped.reasons("p.c_on") == ("it needs not io.hit, which does not hold (io.hit is true)",)
@@ -192,7 +194,7 @@ def test_literals_go_by_both_names(tmp_path: Path, capsys: pytest.CaptureFixture
     printed = run(capsys, "explain-synthesis", path, "--state", "g.wish = io.FOOT")
     assert "'io.FOOT' is not a value of g.wish" in printed
     made = robosc.synthesize(path).supervisor
-    assert made is not None
+    assert isinstance(made, SystemSupervisor)
     stepped = robosc.simulate(made, initial={"g.wish": "AUTO", "io.hit": True, "io.level": 0})
     assert stepped.reasons("q.u") == ("q: g.wish = io.HAND does not hold (g.wish is AUTO)",)
     assert event_text(stepped.step("g.wish", "io.HAND")) == "g.wish (HAND)"
@@ -213,3 +215,26 @@ def test_comments_of_code(tmp_path: Path, target: str, capsys: pytest.CaptureFix
     assert "not (p.flag and not p.on)" in written
     for foreign in ("!holds", "!p.", "!io.hit "):
         assert foreign not in written, foreign
+
+
+def test_conditions_of_supervisors(monkeypatch: pytest.MonkeyPatch) -> None:
+    text = """plant q:
+      uncontrollable u_x; disc io.Mode m in any; disc int[0..2] k in any; disc bool b in any;
+      location a: initial; marked; edge u_x when k > 0 goto c; edge p.c_on; edge p.c_off do k := 2 - k, b := not b;
+      location c: marked q.m = io.HAND; edge u_x; edge p.c_off goto a;
+    end
+    requirement invariant not (q.c and p.on) or q.m = io.HAND and q.b;
+    """
+    made = robosc.synthesize(robosc.load(text=MODEL + text, name="m.cif")).supervisor
+    assert isinstance(made, SystemSupervisor)
+    assert [str(item) for item in made.conditions.values()] == ["q.k = 0 or q.b", "q.m = io.HAND"]
+    monkeypatch.setattr(Formulas, "formula", lambda self, diagram, limit=0: None)
+    del made.__dict__["conditions"]
+    on, off = made.conditions.values()
+    assert str(on).splitlines()[1:] == ["[1] if q.b: true else [2] end", "[2] q.k = 0"]
+    assert str(off).splitlines()[1:] == ["[1] q.m = io.HAND"]
+    assert [line.json() for line in off.lines] == [
+        {"node": 1, "cases": [{"if": "q.m = io.HAND", "then": True}], "else": False}
+    ]
+    several = Line(3, tuple((item.cases[0][0], item.number) for item in on.lines), True, is_cif=True)
+    assert str(several) == "[3] if q.b: [1] elif q.k = 0: [2] else true end"

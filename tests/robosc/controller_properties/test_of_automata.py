@@ -179,7 +179,7 @@ def test_automata_as_they_stand(tmp_path: Path, capsys: pytest.CaptureFixture[st
     made = robosc.synthesize(robosc.load(text="plant P: location x: initial; marked; end", name="m.cif")).supervisor
     assert made is not None
     with pytest.raises(TypeError, match="as_is= need a model"):
-        robosc.verify(made, as_is=True)  # type: ignore[call-overload]
+        robosc.verify(made, as_is=True)
     rsup = tmp_path / "m.rsup"
     made.write(rsup)
     assert main(["verify", str(rsup), str(path), "--as-is"]) == 2

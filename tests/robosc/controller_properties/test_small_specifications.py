@@ -86,7 +86,7 @@ LINES: list[tuple[int | None, int | None, bool, bool, str]] = [
     (1, 1, Y, Y, "S: a c1>b / b u1>a"),
     # Variables, which events change inside an automaton
     (0, 3, Y, Y, "P: int[0..3] n = 0; a c1[n < 3](n := n + 1)>a"),
-    # What would leave a range does not happen
+    # A step out of a range does not happen
     (0, 3, Y, Y, "P: int[0..3] n = 0; a c1(n := n + 1)>a"),
     (0, N, Y, F, "P: bool v = false; a c1(v := not v)>a"),
     (0, N, Y, F, "P: bool v = false; a c1[v](v := false)>a c2[not v](v := true)>a"),
@@ -133,14 +133,14 @@ LINES: list[tuple[int | None, int | None, bool, bool, str]] = [
     (0, 0, Y, Y, "input bool i | P: marked i; a"),
     (0, N, Y, F, "input bool i | P: marked i; a c1[i]>a"),
     (0, 1, Y, Y, "P: bool v in any; initial not v; a c1[v]>a c2[not v]>b / b"),
-    # There is no state at all
+    # No state at all
     (0, 0, Y, Y, "P: bool v = false; initial v; a c1>b / b open c1>a"),
     # Monitors neither block an event nor are changed by it where they have no edge
     (N, 0, Y, Y, "S: monitor u1; a u1>b / b"),
     (N, 1, Y, Y, "S: monitor u1; a c1>b / b u1>a"),
     (N, 1, Y, F, "S: monitor u1; a c1>b / b open u1>a"),
     (1, 1, Y, Y, "P: a u1>b / b c1>a | S: monitor u1; a u1>b / b c1>a"),
-    # What a supervisor leaves out
+    # Events that a supervisor leaves out
     (1, 1, Y, Y, "P: a u1>b / b c1>a c2>b | S: a | S: a c1>a | supervisor c2 needs false"),
     (0, 0, Y, Y, "P: a c1>a | supervisor c1 needs false"),
     (0, 1, Y, Y, "P: a c1>b / b c1>a | supervisor A0.b disables c1"),

@@ -168,7 +168,7 @@ def test_tools_of_cif_take_what_is_written_if_they_take_the_model(
     model = differences(Random(seed))
     found = check_cif(Bundle(SourceFile("m.cif", model)))
     if found.system is None:
-        # What never meets the range is an error.
+        # A value that never meets the range is an error.
         assert {item.code for item in found.diagnostics if item.severity == "error"} == {"cif-type"}
         return
     supervisor = supervisor_of(model)

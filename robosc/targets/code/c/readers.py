@@ -52,7 +52,7 @@ class Readers:
             words = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
             rows.append(f"    {', '.join(map(str, (len(found), *found)))}, /* {place}: {words} */")
         return [
-            "/* Readers of parts of the state: how many there are, and then the numbers of the silent steps and requests,",
+            "/* Readers of parts of the state: how many there are, then the numbers of the silent steps and requests,",
             "   in this order, that may be allowed now or no longer where such a part has changed. */",
             f"static const {width(self._count + 1)} READERS[] = {{",
             *rows,

@@ -27,18 +27,29 @@ from robosc.supervisor import Supervisor
 
 
 @dataclass(frozen=True, slots=True)
-class _Successor:
+class Successor:
     """State that an event leads to.
 
     Attributes:
-        state: The new state.
+        before: The state before.
+        written: New value of each place that is written.
         skipped: Variables whose update was skipped.
         leaves_range: True if a synthesis variable would leave its range.
     """
 
-    state: dict[Place, Value]
+    before: Mapping[Place, Value]
+    written: dict[Place, Value]
     skipped: tuple[str, ...]
     leaves_range: bool
+
+    @property
+    def state(self) -> dict[Place, Value]:
+        """The new state."""
+        return {**self.before, **self.written}
+
+    def changed(self) -> list[Place]:
+        """Return the places that have another value in it."""
+        return [place for place, value in self.written.items() if self.before[place] != value]
 
 
 @dataclass(frozen=True, slots=True)
@@ -136,7 +147,7 @@ class InterpretedSystem:
         successor = self._successor(rule, no_data)
         if successor is None or successor.leaves_range:
             return False
-        return not is_tau(event) or successor.state != state
+        return not is_tau(event) or bool(successor.changed())
 
     def is_possible(self, event: str) -> bool:
         """Return True if the plants allow an event now, for any data; an unknown event is a KeyError."""
@@ -191,9 +202,7 @@ class InterpretedSystem:
         successor = self._successor(rule, no_data if reading is None else reading.values.get)
         if successor is None or (rule.is_controllable and successor.leaves_range):
             return None
-        if successor.state != self._state:
-            self.changes += 1
-        self._state = successor.state
+        self._enter(successor)
         return successor.skipped
 
     def provide(self, communication: str) -> tuple[bool, Any]:
@@ -291,10 +300,18 @@ class InterpretedSystem:
         """Return a hashable value that differs between states."""
         return tuple(self._state.values())
 
-    def _successor(self, rule: EventRule, data: Data) -> _Successor | None:
+    def _enter(self, successor: Successor) -> None:
+        """Go over to the state that an event leads to."""
+        if successor.changed():
+            self.changes += 1
+        # Of equal numbers, too, the new one counts, such as -0.0 after 0.0.
+        if successor.written:
+            self._state = successor.state
+
+    def _successor(self, rule: EventRule, data: Data) -> Successor | None:
         """Return the successor that an event leads to by the plants alone; None if one of them blocks it."""
         old = self._state
-        new = dict(old)
+        new: dict[Place, Value] = {}
         skipped: list[str] = []
         leaves_range = False
         if rule.plant is not None:
@@ -319,7 +336,7 @@ class InterpretedSystem:
                     skipped.append(f"{participant.name}.{update.variable.name}")
                 else:
                     new[update.place] = assigned
-        return _Successor(new, tuple(skipped), leaves_range)
+        return Successor(old, new, tuple(skipped), leaves_range)
 
     def _chosen(self, participant: Participant) -> TransitionRule | None:
         """The transition that a component takes from its current state."""

@@ -29,14 +29,14 @@ class Readers:
         self._names: dict[int, list[str]] = {}
         self._length = 0
 
-    def of(self, place: str) -> int:
-        """The number of a place's entry in the table."""
+    def of(self, place: str) -> int | None:
+        """The number of a place's entry in the table; None if everything is to be asked."""
         found = tuple(self._readers.get(place, ()))
         if len(found) > max(_FEW, self._count // 8):
-            found = (-1,)
+            return None
         if found not in self._places:
             self._places[found] = self._length
-            self._length += 1 if found == (-1,) else 1 + len(found)
+            self._length += 1 + len(found)
         names = self._names.setdefault(self._places[found], [])
         if place not in names:
             names.append(place)
@@ -48,14 +48,13 @@ class Readers:
             return []
         rows = []
         for found, place in self._places.items():
-            numbers = [self._count + 1] if found == (-1,) else [len(found), *found]
             names = [name.removeprefix("s->") for name in self._names[place]]
             words = ", ".join(names[:3]) + (f" and {len(names) - 3} more" if len(names) > 3 else "")
-            rows.append(f"    {', '.join(map(str, numbers))}, /* {place}: {words} */")
+            rows.append(f"    {', '.join(map(str, (len(found), *found)))}, /* {place}: {words} */")
         return [
-            "/* Readers of parts of the state: how many there are, then the silent steps and requests, in this order,",
-            "   that may be allowed now or no longer where such a part has changed; a higher number: all of them. */",
-            f"static const {width(self._count + 2)} READERS[] = {{",
+            "/* Readers of parts of the state: how many there are, then the numbers of the silent steps and requests,",
+            "   in this order, that may be allowed now or no longer where such a part has changed. */",
+            f"static const {width(self._count + 1)} READERS[] = {{",
             *rows,
             "};",
         ]

@@ -103,7 +103,9 @@ class Stepper(StepWriter):
         return declared(f"const {self.unit.layout.raw(type_)} *" if is_array else c_type(code.sort), code.word)
 
     def _write(self, place: Code, value: Code, may_stay: bool) -> list[Statement]:
-        changed = Do(call("changed", variable("r"), integer(self.readers.of(place.word))))
+        readers = self.readers.of(place.word)
+        noted = [] if readers is None else [integer(readers)]
+        changed = Do(call("changed" if noted else "all_changed", variable("r"), *noted))
         if not may_stay:
             return [Assign(place, value), changed]
         # Of equal numbers, too, the new one counts, such as -0.0 after 0.0.

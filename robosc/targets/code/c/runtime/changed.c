@@ -3,10 +3,6 @@ static void changed(robot_t *r, int place)
 {
     r->is_stable = false;
 #if ROBOT_STALE_COUNT > 0
-    if (READERS[place] > ROBOT_STALE_COUNT) {
-        all_changed(r);
-        return;
-    }
     for (int k = 1; k <= (int)READERS[place]; k++) {
         add_to(&r->stale, (int)READERS[place + k]);
     }

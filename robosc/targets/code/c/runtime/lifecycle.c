@@ -28,10 +28,7 @@ static bool begin(robot_t *r)
 #if ROBOT_HAS_STRATEGY
     forget_progress(r);
 #endif
-    r->is_stable = false;
-#if ROBOT_STALE_COUNT > 0
     all_changed(r);
-#endif
     r->is_pending = false;
     if (!settle(r, -1, &has_changed)) {
         return false;

@@ -82,36 +82,27 @@ static int next_random(robot_t *r, int count)
     return (int)(((z >> 32) * (uint64_t)count) >> 32);
 }
 
-/* Number of bits that are set (H. S. Warren: Hacker's Delight, 2nd ed., 5-1). */
-static int count_bits(uint32_t bits)
-{
-    bits = bits - ((bits >> 1) & UINT32_C(0x55555555));
-    bits = (bits & UINT32_C(0x33333333)) + ((bits >> 2) & UINT32_C(0x33333333));
-    return (int)((((bits + (bits >> 4)) & UINT32_C(0x0F0F0F0F)) * UINT32_C(0x01010101)) >> 24);
-}
-
 /* Where chance decides, no request ever gets another turn: they are in source order. */
 static int choose_random(robot_t *r, const robot_set_t *among)
 {
-    int count = 0;
     int left = 0;
-    int word = 0;
-    uint32_t bits = 0;
-    for (int place = 0; place < SET_WORDS; place++) {
-        count += count_bits(among->bits[place]);
+    for (int word = 0; word < SET_WORDS; word++) {
+        for (uint32_t bits = among->bits[word]; bits != 0; bits &= bits - 1) {
+            left++;
+        }
     }
-    if (count == 0) {
-        return NOBODY;
+    if (left > 0) {
+        left = next_random(r, left);
+        for (int word = 0; word < SET_WORDS; word++) {
+            for (uint32_t bits = among->bits[word]; bits != 0; bits &= bits - 1) {
+                if (left == 0) {
+                    return 32 * word + lowest_bit(bits);
+                }
+                left--;
+            }
+        }
     }
-    left = next_random(r, count);
-    while (left >= count_bits(among->bits[word])) {
-        left -= count_bits(among->bits[word]);
-        word++;
-    }
-    for (bits = among->bits[word]; left > 0; left--) {
-        bits &= bits - 1;
-    }
-    return 32 * word + lowest_bit(bits);
+    return NOBODY;
 }
 
 /* The turn that comes first among some, or NOBODY. Newly enabled requests are preferred, each at most once in as many

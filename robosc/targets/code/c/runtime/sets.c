@@ -99,12 +99,13 @@ static void empty(robot_set_t *set)
 #endif
 #endif
 
-#if ROBOT_STALE_COUNT > 0
 /* Whatever is allowed or not may have changed. */
 static void all_changed(robot_t *r)
 {
+    r->is_stable = false;
+#if ROBOT_STALE_COUNT > 0
     for (int number = 0; number < ROBOT_STALE_COUNT; number++) {
         add_to(&r->stale, number);
     }
-}
 #endif
+}

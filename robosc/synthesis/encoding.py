@@ -22,7 +22,8 @@ from robosc.recursion import allow_depth
 from robosc.synthesis.blocks import Datum, blocks_of
 from robosc.synthesis.changes import computed_subjects
 from robosc.synthesis.engines import Manager
-from robosc.synthesis.order import Orders, block_orders, input_targets
+from robosc.synthesis.order import Blocks, block_order, input_targets
+from robosc.synthesis.result import Order
 
 _FRAMES_PER_LEVEL = 4
 """The plain engine and the walks of `nodes` and `diagrams` go down a level at a time."""
@@ -60,7 +61,7 @@ class Encoding:
         blocks: The places, topmost first; bits of places in one block stand among each other.
         state_names: Every current-state variable, in the manager's order.
         order: Every variable, in the order in which they were declared.
-        orders: Orders of the places, by name: that of this encoding, and others that may do as well.
+        order_name: Name of the order of the blocks.
         pause: Called again and again while expressions become predicates: it may end the work with an error.
     """
 
@@ -71,14 +72,13 @@ class Encoding:
         pause: Callable[[], None] = lambda: None,
         conditions: Iterable[Expression] = (),
         followed: Collection[Subject] = (),
-        orders: Orders = (),
+        order: tuple[Order, Blocks] | None = None,
     ) -> None:
         self.system = system
         self.manager = manager
         self.subjects: dict[Subject, Bits] = {}
         found = blocks_of(system)
-        self.orders = orders or block_orders(system, found.places, conditions)
-        _, self.blocks = self.orders[0]
+        self.order_name, self.blocks = order or block_order(system, found.places, conditions)
         for number, subject in enumerate(subject for block in self.blocks for subject in block):
             self.subjects[subject] = self._bits(f"s{number}", subject_domain(system, subject), self._type(subject))
         self.places = tuple(self.subjects[subject] for subject in subjects(system))

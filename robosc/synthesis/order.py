@@ -17,6 +17,7 @@ from collections import Counter, defaultdict, deque
 from collections.abc import Iterable, Sequence
 from functools import cache
 from itertools import permutations
+from operator import mul
 
 from robosc.automata.compile import subjects_read
 from robosc.automata.state import Subject
@@ -40,40 +41,83 @@ _HUB_EDGES = 16
 _HUB_FACTOR = 4
 """Edges that a thing is in so that it counts as a hub: so many, and so many times as many as others are in."""
 
+_PAIR = 12
+"""Weight of an edge between two, twice; longer ones weigh less, but at least one."""
+
 _SLIDES = 4
 """Times that the window slides at most."""
 
 
 Blocks = tuple[tuple[Subject, ...], ...]
-Orders = tuple[tuple[Order, Blocks], ...]
-"""Orders of blocks by name, the likeliest first."""
 
 
-def block_orders(
+def block_order(
     system: System, blocks: Sequence[tuple[Subject, ...]], conditions: Iterable[Expression] = ()
-) -> Orders:
+) -> tuple[Order, Blocks]:
     """The blocks of places of a state, so that those that an event touches together stand near each other.
-
-    There are several such orders, no two alike, the likeliest first.
 
     Args:
         system: The system.
         blocks: Each place of its state once; the places of one block have one place in the order.
         conditions: Conditions beside those of the system whose subjects are to stand near each other, too.
     """
-    index = {subject: place for place, block in enumerate(blocks) for subject in block}
-    of_conditions = tuple(map(subjects_read, conditions))
-    together = (*hyperedges(system), *of_conditions)
-    edges = [sorted({index[subject] for subject in edge}) for edge in together]
-    edges = [edge for edge in edges if len(edge) > 1]
-    # Places by which conditions of their own remember a hub have to stand near it, not below everything.
-    hubs = frozenset[int]() if of_conditions else hubs_of(edges)
-    # Through a hub everything is near everything: the order of the rest is found without.
-    rest = [item for item in ([place for place in edge if place not in hubs] for edge in edges) if len(item) > 1]
-    found: dict[Blocks, Order] = {}
-    for name, order in ranked_orders(len(blocks), rest):
-        found.setdefault(tuple(blocks[place] for place in sorted(order, key=lambda place: place in hubs)), name)
-    return tuple((name, order) for order, name in found.items())
+    graph = _Graph(system, blocks, tuple(map(subjects_read, conditions)))
+    name, order = best_order(len(blocks), graph.edges)
+    return name, graph.ordered(order)
+
+
+def other_order(
+    system: System, blocks: Sequence[tuple[Subject, ...]], best: tuple[Order, Blocks]
+) -> tuple[Order, Blocks]:
+    """Another order than the best one of `block_order`, for systems in which that is bad.
+
+    All members of a long edge, such as of a condition on everything, are hardly nearer to each other in one order than
+    in another. So edges count by how few they join: parts of one device stay together, and devices that are alike do
+    not mix. This is not better in general, but it is bad for other systems. So is another start.
+
+    Args:
+        system: The system.
+        blocks: As for `block_order`.
+        best: The best order.
+    """
+    graph = _Graph(system, blocks)
+    weights = [max(1, round(_PAIR / len(edge))) for edge in graph.edges]
+    is_depth_first = best[0] is Order.LEVELS
+    start = traversal(len(blocks), graph.edges, is_depth_first=is_depth_first)
+    found = graph.ordered(_improved(start, graph.edges, weights))
+    if found == best[1]:
+        return Order.REVERSED, found[::-1]
+    return Order.PAIRED_DEPTHS if is_depth_first else Order.PAIRED_LEVELS, found
+
+
+class _Graph:
+    """Blocks that belong together.
+
+    Args:
+        system: The system.
+        blocks: Each place of its state once; the places of one block have one place in the order.
+        more: Subjects that belong together beside those of the system.
+
+    Attributes:
+        edges: For what belongs together the numbers of the blocks. Through a hub everything is near everything: the
+            order of the rest is found without.
+    """
+
+    def __init__(
+        self, system: System, blocks: Sequence[tuple[Subject, ...]], more: tuple[frozenset[Subject], ...] = ()
+    ) -> None:
+        self._blocks = blocks
+        index = {subject: place for place, block in enumerate(blocks) for subject in block}
+        edges = [sorted({index[subject] for subject in edge}) for edge in (*hyperedges(system), *more)]
+        edges = [edge for edge in edges if len(edge) > 1]
+        # Places by which conditions of their own remember a hub have to stand near it, not below everything.
+        self._hubs = frozenset[int]() if more else hubs_of(edges)
+        rest = ([place for place in edge if place not in self._hubs] for edge in edges)
+        self.edges = [edge for edge in rest if len(edge) > 1]
+
+    def ordered(self, order: Sequence[int]) -> Blocks:
+        """Blocks in an order of their numbers, but that hubs come last."""
+        return tuple(self._blocks[place] for place in sorted(order, key=lambda place: place in self._hubs))
 
 
 def hubs_of(edges: Sequence[Sequence[int]]) -> frozenset[int]:
@@ -88,26 +132,26 @@ def hubs_of(edges: Sequence[Sequence[int]]) -> frozenset[int]:
     return frozenset(item for item, count in count_of.items() if count >= least)
 
 
-def ranked_orders(count: int, edges: Sequence[Sequence[int]]) -> list[tuple[Order, tuple[int, ...]]]:
-    """The orders of `count` things that FORCE and a window find from several starts, that with the least span first."""
-    starts = {
-        Order.DECLARED: range(count),
-        Order.LEVELS: traversal(count, edges, is_depth_first=False),
-        Order.DEPTHS: traversal(count, edges, is_depth_first=True),
-    }
-    found = [(name, _improved(start, edges)) for name, start in starts.items()]
-
-    def cost(item: tuple[Order, tuple[int, ...]]) -> float:
-        return span(item[1], edges) * (_CLEARLY if item[0] is Order.DECLARED else 1)
-
-    return sorted(found, key=cost)
+def best_order(count: int, edges: Sequence[Sequence[int]]) -> tuple[Order, tuple[int, ...]]:
+    """The order of `count` things with the least span that FORCE and a window find from several starts."""
+    name, best = Order.DECLARED, _improved(range(count), edges)
+    least = _CLEARLY * span(best, edges)
+    for other_name, is_depth_first in ((Order.LEVELS, False), (Order.DEPTHS, True)):
+        other = _improved(traversal(count, edges, is_depth_first=is_depth_first), edges)
+        found = span(other, edges)
+        if found < least:
+            name, best, least = other_name, other, found
+    return name, best
 
 
-def _improved(start: Sequence[int], edges: Sequence[Sequence[int]]) -> tuple[int, ...]:
-    """The order that FORCE and a window find from a start."""
+def _improved(
+    start: Sequence[int], edges: Sequence[Sequence[int]], weights: Sequence[int] | None = None
+) -> tuple[int, ...]:
+    """The order that FORCE and a window find from a start; weights say how often an edge counts."""
     position = {item: place for place, item in enumerate(start)}
     renamed = [sorted(position[item] for item in edge) for edge in edges]
-    return tuple(start[place] for place in slide(force(len(start), renamed), renamed))
+    found = slide(force(len(start), renamed, weights), renamed, weights)
+    return tuple(start[place] for place in found)
 
 
 def traversal(count: int, edges: Sequence[Sequence[int]], *, is_depth_first: bool) -> tuple[int, ...]:
@@ -193,22 +237,24 @@ def input_targets(system: System) -> dict[tuple[str, tuple[PathStep, ...]], set[
     return dict(found)
 
 
-def force(count: int, edges: Sequence[Sequence[int]]) -> tuple[int, ...]:
-    """An order of `count` things with a small total span of `edges`; never worse than the order given."""
+def force(count: int, edges: Sequence[Sequence[int]], weights: Sequence[int] | None = None) -> tuple[int, ...]:
+    """An order of `count` things with a small total span of `edges`, weighted; never worse than the order given."""
+    weights = weights or [1] * len(edges)
     best = order = list(range(count))
-    best_span = span(order, edges)
+    best_span = span(order, edges, weights)
     known = {tuple(order)}
     # Aloul et al. find convergence within a small multiple of log2 of the size.
     for _ in range(20 + 5 * count.bit_length()):
         position = {item: place for place, item in enumerate(order)}
         centres = [sum(position[item] for item in edge) / len(edge) for edge in edges]
-        pulls: list[list[float]] = [[] for _ in range(count)]
-        for edge, centre in zip(edges, centres, strict=True):
+        pulls, forces = [0.0] * count, [0] * count
+        for edge, centre, weight in zip(edges, centres, weights, strict=True):
             for item in edge:
-                pulls[item].append(centre)
-        wanted = {item: sum(pull) / len(pull) if pull else float(position[item]) for item, pull in enumerate(pulls)}
+                pulls[item] += weight * centre
+                forces[item] += weight
+        wanted = [pulls[item] / forces[item] if forces[item] else float(position[item]) for item in range(count)]
         order = sorted(order, key=lambda item: (wanted[item], position[item]))
-        now = span(order, edges)
+        now = span(order, edges, weights)
         if now < best_span:
             best, best_span = order, now
         if tuple(order) in known:
@@ -218,12 +264,18 @@ def force(count: int, edges: Sequence[Sequence[int]]) -> tuple[int, ...]:
 
 
 def slide(
-    order: Sequence[int], edges: Sequence[Sequence[int]], *, width: int = _WINDOW, times: int = _SLIDES
+    order: Sequence[int],
+    edges: Sequence[Sequence[int]],
+    weights: Sequence[int] | None = None,
+    *,
+    width: int = _WINDOW,
+    times: int = _SLIDES,
 ) -> tuple[int, ...]:
     """The order after a window of `width` neighbours has slid over it and has taken its best permutation everywhere.
 
     It slides again as long as that helps, at most `times`; the span never grows.
     """
+    weights = weights or [1] * len(edges)
     best = list(order)
     of_item = defaultdict[int, list[int]](list)
     for number, edge in enumerate(edges):
@@ -234,7 +286,8 @@ def slide(
         has_changed = False
         for start in range(len(best) - width + 1):
             window = best[start : start + width]
-            touched = [edges[number] for number in sorted({number for item in window for number in of_item[item]})]
+            numbers = sorted({number for item in window for number in of_item[item]})
+            touched = [(edges[number], weights[number]) for number in numbers]
             chosen = _best_permutation(window, start, touched, position)
             if chosen != window:
                 best[start : start + width] = chosen
@@ -245,14 +298,14 @@ def slide(
 
 
 def _best_permutation(
-    window: list[int], start: int, edges: Sequence[Sequence[int]], position: dict[int, int]
+    window: list[int], start: int, edges: Sequence[tuple[Sequence[int], int]], position: dict[int, int]
 ) -> list[int]:
     """The permutation of a window with the least span of the edges that touch it; leaves `position` at it."""
     members = {item: 1 << number for number, item in enumerate(window)}
     # An edge reaches as far outside of the window as it does, however the window is ordered: of what is inside, by the
     # set of its members, the last place counts where nothing is beyond it, and the first one where nothing is before.
     firsts, lasts = defaultdict[int, int](int), defaultdict[int, int](int)
-    for edge in edges:
+    for edge, weight in edges:
         inside = 0
         is_beyond = is_before = False
         for item in edge:
@@ -264,9 +317,9 @@ def _best_permutation(
             else:
                 is_beyond = True
         if not is_beyond:
-            lasts[inside] += 1
+            lasts[inside] += weight
         if not is_before:
-            firsts[inside] += 1
+            firsts[inside] += weight
     best, least = tuple(range(len(window))), None
     for candidate, first, last in _permutations(len(window)):
         total = 0
@@ -299,7 +352,8 @@ def _permutations(width: int) -> tuple[tuple[tuple[int, ...], tuple[int, ...], t
     return tuple(found)
 
 
-def span(order: Iterable[int], edges: Sequence[Sequence[int]]) -> int:
-    """The sum over all edges of the distance between their outermost members."""
+def span(order: Iterable[int], edges: Sequence[Sequence[int]], weights: Sequence[int] | None = None) -> int:
+    """The sum over all edges of the distance between their outermost members, times its weight."""
     position = {item: place for place, item in enumerate(order)}
-    return sum(max(position[item] for item in edge) - min(position[item] for item in edge) for edge in edges)
+    spans = (max(position[item] for item in edge) - min(position[item] for item in edge) for edge in edges)
+    return sum(map(mul, weights, spans)) if weights else sum(spans)

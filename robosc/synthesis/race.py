@@ -21,8 +21,8 @@ from robosc.errors import NodeLimitError
 from robosc.synthesis.monitor import ProgressMonitor
 from robosc.synthesis.result import SynthesisProgress
 
-HEAD_START = 3_000_000
-"""Nodes that the first way may work on alone: some hundredths of a second with the fastest engine."""
+HEAD_START = 10_000_000
+"""Nodes that the first way may work on alone: a tenth of a second or a few with the fastest engine."""
 
 SHARE = 100_000
 """Nodes of one turn: a millisecond with the fastest engine, and a tenth of a second with the slowest one."""
@@ -32,7 +32,15 @@ _STACK_BYTES = 64 * 2**20
 
 
 class _OvertakenError(Exception):
-    """Another way has come to its end before."""
+    """Another way has come to its end before.
+
+    Args:
+        race: The race, of which there may be one within another.
+    """
+
+    def __init__(self, race: "Race") -> None:
+        super().__init__("another way was quicker")
+        self.race = race
 
 
 class _DismissedError(Exception):
@@ -129,7 +137,9 @@ class Race(ProgressMonitor):
         self._rivals, self._running = list(rivals), first
         try:
             first.result = first.work()
-        except _OvertakenError:
+        except _OvertakenError as error:
+            if error.race is not self:
+                raise
             return next(rival for rival in rivals if rival.has_won)
         else:
             return first
@@ -143,7 +153,8 @@ class Race(ProgressMonitor):
             first.target += SHARE
             for rival in tuple(self._rivals):
                 rival.target += SHARE
-                if rival.nodes < rival.target:
+                # All are dismissed where there have come to be too many nodes.
+                if rival.nodes < rival.target and not rival.is_dismissed:
                     self._let_run(rival, first)
 
     def _let_run(self, rival: Runner[Any], first: Runner[Any]) -> None:
@@ -169,7 +180,7 @@ class Race(ProgressMonitor):
             # Its frames are in the error, and would be in a cycle with it.
             del error
         if rival.has_won:
-            raise _OvertakenError
+            raise _OvertakenError(self)
         self._monitor.spend(rival.nodes - before)
         steps, rival.steps = rival.steps, 0
         self._check(steps)

@@ -47,11 +47,14 @@ class Search(StrEnum):
 
 
 class Order(StrEnum):
-    """Static variable order, by what the heuristic FORCE began with; `block_orders` finds them."""
+    """Static variable order, by what the heuristic FORCE began with; `block_order` and `other_order` choose."""
 
     DECLARED = "as declared"
     LEVELS = "level by level"
     DEPTHS = "depth first"
+    PAIRED_LEVELS = "level by level, pairs close"
+    PAIRED_DEPTHS = "depth first, pairs close"
+    REVERSED = "upside down"
 
 
 class Closure(StrEnum):

@@ -14,6 +14,7 @@ satisfy is followed downwards together with them); on binary diagrams T. van Dij
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from operator import itemgetter
 from typing import Any
 
 from robosc.recursion import allow_depth
@@ -50,13 +51,17 @@ def work_of(steps: int, nodes: int) -> int:
 
 
 def _grouped(levels: Mapping[str, int], steps: Sequence[Step]) -> list[tuple[int, list[Step]]]:
-    """Return the steps that begin at each level, topmost first."""
-    groups: defaultdict[int, list[Step]] = defaultdict(list)
+    """Return the steps that begin at each level, topmost first; of these, those that reach down the farthest come first.
+
+    Then less depends on the order in which events are declared: those that join distant parts find these closed.
+    """
+    groups: defaultdict[int, list[tuple[int, Step]]] = defaultdict(list)
     for step in steps:
         # One that neither reads nor changes anything leads nowhere.
         if step.names:
-            groups[min(levels[name] for name in step.names)].append(step)
-    return sorted(groups.items())
+            touched = [levels[name] for name in step.names]
+            groups[min(touched)].append((-max(touched), step))
+    return [(top, [step for _, step in sorted(group, key=itemgetter(0))]) for top, group in sorted(groups.items())]
 
 
 class Saturation:
@@ -65,7 +70,7 @@ class Saturation:
     Args:
         manager: The manager.
         levels: The level of each current-state variable.
-        steps: The steps; of those that begin at one level the first is taken first.
+        steps: The steps.
         within: Predicate that added states have to satisfy.
         monitor: Monitor of the waiting caller.
     """

@@ -7,12 +7,13 @@ from typing import Any, NamedTuple
 
 from robosc.automata.structure import System
 from robosc.supervisor import AddedCondition, DecisionDiagram
+from robosc.synthesis.blocks import blocks_of
 from robosc.synthesis.closure import closure_in
 from robosc.synthesis.controlled import ControlledSystem
 from robosc.synthesis.engines import EngineOptions
 from robosc.synthesis.fixed_point import FixedPoint, GoodStates, Problem, safe_states
 from robosc.synthesis.nodes import count_models
-from robosc.synthesis.order import Orders
+from robosc.synthesis.order import other_order
 from robosc.synthesis.questions import Questions
 from robosc.synthesis.race import Race, Runner
 from robosc.synthesis.result import (
@@ -127,53 +128,62 @@ class _Portfolio:
         self._places = places
         self._race = Race(places.monitor)
         self._first: Workspace | None = places.opened(system, self._race)
-        self._orders = self._first.encoding.orders
-        self._attempts: dict[Order, _Attempt] = {}
+        self._best = self._first.encoding.order_name, self._first.encoding.blocks
+        self._attempts: dict[bool, _Attempt] = {}
+        self._names: dict[bool, Order] = {}
 
     def solved(self) -> tuple[_Solved, tuple[Strategy, ...]]:
         """The solution that is found first, and all strategies that have begun."""
-        is_reordering = self._places.options.is_reordering
-        ways = [(self._orders, Search.BACKWARDS)]
-        if not self._system.is_controlled:
-            ways.append((self._orders, Search.REACHABLE_FIRST))
-        # An engine that changes the order needs no other one to begin with.
-        if not self._system.is_controlled and not is_reordering and len(self._orders) > 1:
-            ways.append((self._orders[1:], Search.BACKWARDS))
+        ways = self._ways()
         runners = [Runner(partial(self._solved, *way)) for way in ways]
-        context = self._attempt(self._orders).place.reordering() if is_reordering else nullcontext()
-        with context:
+        is_reordering = self._places.options.is_reordering
+        with self._attempt(is_other=False).place.reordering() if is_reordering else nullcontext():
             found = self._race.first_of(runners)
         self._places.keep(found.attempt.place)
         race = tuple(
-            Strategy(orders[0][0], search, runner.nodes, int(runner.has_won), int(runner.is_given_up))
-            for (orders, search), runner in zip(ways, runners, strict=True)
-            if runner.nodes
+            Strategy(self._names[is_other], search, runner.nodes, int(runner.has_won), int(runner.is_given_up))
+            for (is_other, search), runner in zip(ways, runners, strict=True)
+            if is_other in self._names and runner.has_begun
         )
         return found, race
 
-    def _solved(self, orders: Orders, search: Search) -> _Solved:
-        attempt = self._attempt(orders)
+    def _ways(self) -> list[tuple[bool, Search]]:
+        """The strategies, the likeliest first: whether the order is the other one, and the direction."""
+        ways = [(False, Search.BACKWARDS)]
+        if not self._system.is_controlled:
+            ways.append((False, Search.REACHABLE_FIRST))
+            # An engine that changes the order needs no other one to begin with.
+            if len(self._best[1]) > 1 and not self._places.options.is_reordering:
+                ways.append((True, Search.BACKWARDS))
+        return ways
+
+    def _solved(self, is_other: bool, search: Search) -> _Solved:
+        attempt = self._attempt(is_other=is_other)
         try:
             return self._places.limited(attempt.place, lambda: attempt.solved(search))
         except BaseException:
-            # Two strategies share the first order, and one of them may go on.
-            if orders is not self._orders:
-                self._places.close(self._attempts.pop(orders[0][0]).place)
+            # Two strategies share the best order, and one of them may go on.
+            if is_other:
+                del self._attempts[is_other]
+                self._places.close(attempt.place)
             raise
 
-    def _attempt(self, orders: Orders) -> _Attempt:
-        """The system in the first of some orders, encoded once."""
-        name, _ = orders[0]
-        if name not in self._attempts:
+    def _attempt(self, *, is_other: bool) -> _Attempt:
+        """The system in the best order or the other one, encoded once."""
+        if is_other not in self._attempts:
             place, self._first = self._first, None
             if place is None:
-                place = self._places.opened(self._system, self._race, orders=orders)
+                order = None
+                if is_other:
+                    order = other_order(self._system, blocks_of(self._system).places, self._best)
+                place = self._places.opened(self._system, self._race, order=order)
+            self._names[is_other] = place.encoding.order_name
             try:
-                self._attempts[name] = self._places.limited(place, lambda: _Attempt(place))
+                self._attempts[is_other] = self._places.limited(place, lambda: _Attempt(place))
             except BaseException:
                 self._places.close(place)
                 raise
-        return self._attempts[name]
+        return self._attempts[is_other]
 
 
 class _Synthesis:
@@ -225,7 +235,7 @@ class _Synthesis:
             peak_nodes=self._monitor.peak_nodes,
             states=states,
             search=Search.REACHABLE_FIRST if self._good.is_of_reached else Search.BACKWARDS,
-            order=self._encoding.orders[0][0],
+            order=self._encoding.order_name,
             race=self._race,
             closure=closure_in(self._encoding.manager, is_reordering=self._place.is_reordering),
         )

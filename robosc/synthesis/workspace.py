@@ -21,8 +21,8 @@ from robosc.synthesis.engines import (
     within_limit,
 )
 from robosc.synthesis.monitor import ProgressMonitor
-from robosc.synthesis.order import Orders
-from robosc.synthesis.result import SynthesisProgress
+from robosc.synthesis.order import Blocks
+from robosc.synthesis.result import Order, SynthesisProgress
 
 
 class Workspace(msgspec.Struct, frozen=True):
@@ -80,7 +80,7 @@ class Workspaces:
         monitor: ProgressMonitor,
         conditions: Iterable[Expression] = (),
         followed: Collection[Subject] = (),
-        orders: Orders = (),
+        order: tuple[Order, Blocks] | None = None,
     ) -> Workspace:
         """A workspace for a system, whose nodes count until it is closed.
 
@@ -89,10 +89,10 @@ class Workspaces:
             monitor: Monitor of the work there.
             conditions: Conditions on the system's states that the work is about, besides its own.
             followed: Places that get next-state variables, besides those that images need.
-            orders: Orders of its places, of which it gets the first; none to find some.
+            order: Order of its places; None for the best.
         """
         manager = make_manager(self._engine)
-        encoding = Encoding(system, manager, monitor.check_stop, conditions, followed, orders)
+        encoding = Encoding(system, manager, monitor.check_stop, conditions, followed, order)
         self._managers.append(manager)
         return Workspace(self._engine, encoding, monitor, self.options.is_reordering, self.options.condition_seconds)
 

@@ -24,7 +24,7 @@ from robosc.synthesis import (
     race,
     synthesize,
 )
-from robosc.synthesis.result import Search
+from robosc.synthesis.result import Closure, Search
 from robosc.verification import CheckOutcome, verify_explicitly
 from robosc.verification.symbolic import verify_symbolically
 from support.effort import seeds
@@ -48,7 +48,8 @@ def agree(system: System, engines: tuple[str, ...] = ENGINES) -> str:
     results = [synthesize(system, engine=engine) for engine in engines]
     first = results[0]
     assert all(result.added == first.added and result.status == first.status for result in results)
-    assert all(result.statistics.states == first.statistics.states for result in results)
+    # The same strategies race for every engine, as far, and the same one wins.
+    assert len({replace(result.statistics, engine="", closure=Closure.SATURATION) for result in results}) == 1
     assert (first.status is SynthesisStatus.EMPTY) == explicit.is_empty
     if explicit.is_empty:
         assert first.reason

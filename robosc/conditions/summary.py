@@ -22,6 +22,9 @@ _WIDTH = 100
 _NODES = 150
 """Nodes that the diagrams in a text for people may have together; a larger one is replaced by its size."""
 
+_RANGES = 600
+"""Ranges of values that the nodes of these diagrams may distinguish together: each is a test in the text."""
+
 FROM_THE_FIRST = ", to be read from [1] on:"
 """Words between a diagram's size and its nodes."""
 
@@ -305,11 +308,13 @@ def _table(rows: Sequence[tuple[str, Sequence[str]]]) -> list[str]:
 
 
 def short_diagrams(diagrams: Iterable[DecisionDiagram]) -> set[DecisionDiagram]:
-    """Return those of some diagrams that a text writes node by node: the first ones that have few nodes together."""
-    found, left = set(), _NODES
+    """Return those of some diagrams that a text writes node by node: the first ones that are short together."""
+    found, nodes, ranges = set(), _NODES, _RANGES
     for diagram in diagrams:
-        if len(diagram.nodes) <= left:
-            left -= len(diagram.nodes)
+        tested = sum(len(node.starts) for node in diagram.nodes)
+        if len(diagram.nodes) <= nodes and tested <= ranges:
+            nodes -= len(diagram.nodes)
+            ranges -= tested
             found.add(diagram)
     return found
 

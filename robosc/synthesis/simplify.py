@@ -110,7 +110,7 @@ class Simplifier:
         is_large = care.dag_size > MAXIMUM_NODES
         simple = self._plain(wanted) if is_large and self._vain == MAXIMUM_VAIN else self._restricted(wanted, care)
         places = self._places(simple)
-        first = extract(self._encoding, simple) if is_large or len(places) == 1 else None
+        first = self._extracted(simple, wanted, care) if is_large or len(places) == 1 else None
         if first is not None and (is_large or self._length(first) < _SHORT):
             return first
         found: dict[DecisionDiagram, _Length] = {}
@@ -125,7 +125,7 @@ class Simplifier:
                 limit = min(limit, found[diagram][1][0])
         if all(length[0] for length in found.values()) or len(places) <= limit:
             # The restricted form needs a test of each of its places, and is mostly the longest: soon given up.
-            first = extract(self._encoding, simple)
+            first = self._extracted(simple, wanted, care)
             found = {first: self._length(first, limit), **found}
         best = min(found, key=lambda diagram: found[diagram])
         if found[best] <= _READABLE:
@@ -157,6 +157,19 @@ class Simplifier:
     def _restraining(self) -> set[str]:
         """The variables that decide about which codes stand for values."""
         return self._manager.support(self._encoding.valid_states())
+
+    def _extracted(self, simple: Any, wanted: Any, care: Any) -> DecisionDiagram:
+        """Return the diagram of a restricted condition, or of what is wanted over the places that decide about it.
+
+        Restricting keeps relations to places of which others tell all that matters. Of several places of a thousand
+        values each these are too many for a diagram.
+        """
+        try:
+            return extract(self._encoding, simple)
+        except UnsupportedModelError:
+            tested = self._places(simple)
+            positive, _ = self._needed(tested, *self._over(tested, care & wanted, care & ~wanted))
+            return extract(self._encoding, positive)
 
     def _is_over(self) -> bool:
         return self._end is not None and monotonic() >= self._end

@@ -22,9 +22,9 @@ from robosc.automata import (
 from robosc.automata.environment import environment_variable
 from robosc.automata.structure import InputVariable
 from robosc.cif import syntax
-from robosc.cif.scopes import Entity, Scope, Scopes
-from robosc.cif.terms import Term, flat, logic, negation, truth, widened
-from robosc.cif.types import CifType, fits
+from robosc.cif.scopes import Alias, Entity, Scope, Scopes, allows
+from robosc.cif.terms import Term, flat, logic, negation, retyped, truth
+from robosc.cif.types import CifType, fits, is_equal
 from robosc.cif.typing import NAMELESS, Typing
 from robosc.cif.updates import Updates
 from robosc.expressions import (
@@ -107,7 +107,8 @@ class Lowering(msgspec.Struct):
 
     def used(self, term: Term, scope: Scope, at: Location) -> Expression:
         """The expression of a term that is used; `true` after an error."""
-        if not scope.is_real or not self.typing.usable(term, at):
+        # What an edge does with a value that it receives is refused where the channel is declared.
+        if not scope.is_real or self.typing.received is not None or not self.typing.usable(term, at):
             return TRUE
         return term.core
 
@@ -123,10 +124,11 @@ class Lowering(msgspec.Struct):
     def lowered(self, name: str) -> tuple[System, SystemPlaces]:
         """The system, with the places of its parts; of use only if no error is found."""
         for scope in self.scopes.scopes():
-            self.scopes.check_arguments(scope)
             for entry in list(scope.entries.values()):
                 if isinstance(entry, Entity):
                     self.typing.check(entry)
+                elif isinstance(entry, Alias):
+                    self._argument(entry)
             for item in scope.body:
                 self._declaration(item, scope)
             if scope.is_automaton:
@@ -214,13 +216,48 @@ class Lowering(msgspec.Struct):
 
     # Declarations
 
+    def _argument(self, alias: Alias) -> None:
+        """Check what is given for a parameter, used or not: an event must be as the parameter says."""
+        found, parameter, argument = self.scopes.target(alias), alias.parameter, alias.argument
+        is_event = isinstance(found, Entity) and isinstance(found.declaration, syntax.Event)
+        if not is_event or not isinstance(found, Entity) or not isinstance(argument, syntax.Name):
+            return
+        assert isinstance(found.declaration, syntax.Event)  # noqa: S101 - asked above
+        # What is itself a parameter is known by its declaration alone.
+        given, _ = self.scopes.parameter(argument, alias.argument_scope)
+        is_controllable = found.declaration.is_controllable if given is None else given.is_controllable
+        if parameter.is_controllable not in (None, is_controllable):
+            word = "controllable" if parameter.is_controllable else "uncontrollable"
+            self.error("cif-arguments", f"'{argument}' is not {word}, as '{parameter.name.text}' must be", argument.at,
+                       f"Give a {word} event, or leave the word out of the parameter.")  # fmt: skip
+        for use in "!?~" if given is not None else "":
+            if given is not None and allows(parameter, use) and not allows(given, use):
+                self.error("cif-arguments", f"'{argument}' does not allow the use '{use}', as '{parameter.name.text}' "
+                           "does", argument.at, "Give both the same flags.")  # fmt: skip
+        wanted = None if parameter.type is None else self.typing.type(parameter.type, alias.scope.parent or alias.scope)
+        type_ = self.data_type(argument, found, alias.argument_scope)
+        if wanted is not None and (type_ is None or not is_equal(type_, wanted)):
+            has = f"data of type {type_}" if type_ else "no data"
+            message = f"'{argument}' has {has}, and '{parameter.name.text}' takes {wanted}"
+            self.error("cif-arguments", message, argument.at, "Give an event with data of that type.")
+
+    def data_type(self, name: syntax.Name, event: Entity, scope: Scope) -> CifType | None:
+        """The type of an event's data; None if it has none."""
+        parameter, around = self.scopes.parameter(name, scope)
+        assert isinstance(event.declaration, syntax.Event)  # noqa: S101 - the entity of an event
+        data = event.declaration.data if parameter is None else parameter.type
+        return None if data is None else self.typing.type(data, around or event.scope)
+
     def _declaration(self, item: syntax.Declaration, scope: Scope) -> None:
         match item:
             case syntax.Event(name=name):
                 self._event(item, scope.absolute(name.text), scope)
             case syntax.Input(name=name):
                 self._input(item, scope.absolute(name.text), scope)
-            case syntax.Continuous(name=name):
+            case syntax.Continuous(name=name, value=value, derivative=derivative):
+                for part in (value, derivative):
+                    if part is not None:
+                        self.typing.real(part, scope)
                 self.unsupported(scope, f"'{scope.absolute(name.text)}' is a continuous variable", name.at,
                                  "Use a discrete variable.")  # fmt: skip
             case syntax.Predicates(word=word, predicates=predicates, at=at):
@@ -274,13 +311,14 @@ class Lowering(msgspec.Struct):
         return True
 
     def _equation(self, item: syntax.Equation, scope: Scope) -> None:
-        entry = scope.entries.get(item.name.text)
-        is_there = isinstance(entry, Entity) and isinstance(entry.declaration, syntax.Algebraic | syntax.Continuous)
-        if not is_there or item.name.text in scope.parameters:
-            message = f"'{item.name.text}' is not an algebraic variable of this component"
-            self.error("cif-structure", message, item.name.at,
-                       "Declare it here, with 'alg'.")  # fmt: skip
-        self.typing.term(item.value, scope)
+        entry = None if item.name.text in scope.parameters else scope.entries.get(item.name.text)
+        wanted = syntax.Continuous if item.is_derivative else syntax.Algebraic
+        if not isinstance(entry, Entity) or not isinstance(entry.declaration, wanted):
+            what = "a continuous" if item.is_derivative else "an algebraic"
+            message = f"'{item.name.text}' is not {what} variable of this component"
+            self.error("cif-structure", message, item.name.at, "Declare it here, with 'alg'.")
+        if item.is_derivative:
+            self.typing.real(item.value, scope)
 
     # Invariants
 
@@ -373,6 +411,11 @@ class Lowering(msgspec.Struct):
                 self.error("cif-structure", f"there are two of '{item.word}' in '{scope.path}'", item.at,
                            "Join them.")  # fmt: skip
             entities = [(name, self._event_of(name, scope)) for name in item.events]
+            for name in item.events if item.word == "alphabet" else ():
+                parameter, _ = self.scopes.parameter(name, scope)
+                if parameter is not None and not allows(parameter, "~"):
+                    self.error("cif-arguments", f"the flags of the parameter '{name}' do not allow this use", name.at,
+                               "Add the flag '~' to it.")  # fmt: skip
             names = frozenset(entity.name for _, entity in entities if entity is not None)
             whole = used if found["alphabet"] is None else found["alphabet"]
             if item.word == "monitor":
@@ -410,7 +453,9 @@ class Lowering(msgspec.Struct):
         """The variables of a declaration: one, or one for each field of a tuple."""
         wanted = self.typing.type(item.type, scope)
         is_variable = self._is_variable(item.name, wanted, scope)
-        terms = [(self.typing.term(value, scope), value.at) for value in item.values]
+        self.typing.has_distributions = True
+        terms = [(self.typing.term(value, scope, wanted), value.at) for value in item.values]
+        self.typing.has_distributions = False
         if "unknown" in (wanted.kind, *(term.type.kind for term, _ in terms)):
             return []
         for term, at in terms:
@@ -423,7 +468,7 @@ class Lowering(msgspec.Struct):
         own = self.typing.entity(entry)
         if own.type.kind == "unknown":
             return []
-        terms = [(widened(term, wanted), at) for term, at in terms]
+        terms = [(retyped(term, wanted), at) for term, at in terms]
         found = [(old.expression, old.type) for old in flat(own)]
         parts = [(read.variable, type_) for read, type_ in found if isinstance(read, VariableRead)]
         is_static = all(term.is_static for term, _ in terms)
@@ -481,42 +526,60 @@ class Lowering(msgspec.Struct):
     def _edges(self, item: syntax.Edge, place: syntax.LocationDeclaration, scope: Scope) -> list[Edge]:
         at = item.guards[0].at if item.guards else item.at
         guard = self.used_by(scope.role, self.typing.conjunction(item.guards, scope), scope, at)
-        self.typing.is_receiving = bool(item.events) and all(event.use == "?" for event in item.events)
+        uses = [self._use(event, scope) for event in item.events]
+        self.typing.received = self._received(item.events, uses)
         assigned = Updates(self.typing).assigned(item.updates, scope)
-        self.typing.is_receiving = False
         updates = tuple(
             Assignment(name, self.used_by(scope.role, new.term, scope, new.at)) for name, new in assigned.items()
         )
+        self.typing.received = None
         target = self._target(item, place, scope)
         if not item.events:
             self.unsupported(scope, "this edge has no event, which means 'tau'", item.at, "Give it an event.")
         found = []
-        for event in item.events:
+        for event, (entity, _) in zip(item.events, uses, strict=True):
             if event.name is None:
                 self.unsupported(scope, "this edge has the event 'tau'", event.at, "Give it an event of its own.")
-                continue
-            entity = self._event_of(event.name, scope)
-            self._check_use(event, entity, scope)
-            if entity is not None and not event.use:
+            elif entity is not None and not event.use:
                 found.append(Edge(_name(place), entity.name, target, guard, updates))
         return found
 
-    def _check_use(self, event: syntax.EdgeEvent, entity: Entity | None, scope: Scope) -> None:
-        """Check what an edge sends or receives; that synthesis takes no channels is reported where one is declared."""
-        sent = self.typing.term(event.value, scope) if event.value is not None else None
-        if entity is None or not event.use:
-            return
-        assert isinstance(entity.declaration, syntax.Event)  # noqa: S101 - the entity of an event
-        data = entity.declaration.data
-        if data is None:
+    def _use(self, event: syntax.EdgeEvent, scope: Scope) -> tuple[Entity | None, CifType | None]:
+        """The event of an edge, and the type of its data; what is sent or received is checked.
+
+        That synthesis takes no channels is reported where one is declared.
+        """
+        entity = None if event.name is None else self._event_of(event.name, scope)
+        if event.name is None or entity is None:
+            return None, None
+        parameter, _ = self.scopes.parameter(event.name, scope)
+        type_ = self.data_type(event.name, entity, scope)
+        if parameter is not None and not allows(parameter, event.use or "~"):
+            self.error("cif-arguments", f"the flags of the parameter '{event.name}' do not allow this use", event.at,
+                       f"Add the flag '{event.use or '~'}' to it.")  # fmt: skip
+        if event.use and type_ is None:
             self.typing.mismatch(f"'{event.name}' is no channel", event.at, "Write the event without '!' or '?'.")
-            return
-        type_ = None if data.kind == "void" else self.typing.type(data, entity.scope)
-        if event.use == "!" and (sent is None) != (type_ is None):
+        sent = None if event.value is None else self.typing.term(event.value, scope, type_)
+        if event.use == "!" and type_ is not None and (sent is None) != (type_.kind == "void"):
             count = "no value" if sent is None else "a value"
-            self.typing.mismatch(f"'{event.name}' is a channel of {type_ or 'void'}, and is sent {count}", event.at)
+            self.typing.mismatch(f"'{event.name}' is a channel of {type_}, and is sent {count}", event.at)
         elif sent is not None and type_ is not None and event.value is not None and not fits(sent.type, type_):
             self.typing.mismatch(f"{sent.type} does not fit {type_}", event.value.at)
+        return entity, type_
+
+    def _received(
+        self, events: tuple[syntax.EdgeEvent, ...], uses: list[tuple[Entity | None, CifType | None]]
+    ) -> CifType | None:
+        """The type of the value that an edge receives; None if it receives nothing."""
+        types = [type_ for event, (_, type_) in zip(events, uses, strict=True) if event.use == "?"]
+        for event in events:
+            if types and event.use != "?":
+                self.error("cif-structure", "this edge receives a value, and has an event that does not", event.at,
+                           "Give that event an edge of its own.")  # fmt: skip
+        for type_ in types[1:]:
+            if type_ is not None and types[0] is not None and not is_equal(type_, types[0]):
+                self.typing.mismatch(f"this edge receives values of the types {types[0]} and {type_}", events[0].at)
+        return types[0] if types else None
 
     def _target(self, item: syntax.Edge, place: syntax.LocationDeclaration, scope: Scope) -> str:
         if item.target is None:

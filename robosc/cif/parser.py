@@ -340,9 +340,7 @@ class Parser(ExpressionParser):
         def one() -> syntax.Declaration:
             name = self.identifier()
             value = self.expression() if self.takes("=") else None
-            if self.takes("der"):
-                self.expression()
-            return syntax.Continuous(name, value)
+            return syntax.Continuous(name, value, self.expression() if self.takes("der") else None)
 
         return self._listed(one)
 

@@ -218,10 +218,11 @@ class Discrete(msgspec.Struct, frozen=True, gc=False):
 
 
 class Continuous(msgspec.Struct, frozen=True, gc=False):
-    """`cont name;`; its derivative is not kept."""
+    """`cont name = value der derivative;`."""
 
     name: Identifier
     value: Expression | None
+    derivative: Expression | None
 
 
 class Equation(msgspec.Struct, frozen=True, gc=False):

@@ -124,11 +124,11 @@ def counter(declarations: str, edge: str, location: str = "") -> str:
         (counter("const real r = 2; const int n = size(<string>r);", "when x < n do x := x + 1"), 4),
         (counter("const real r = 1.0; const bool b = r = 1;", "when b do x := 1"), 2),
         (counter("const list real l = if true: [1] else [2.5] end; const bool b = l = [1];", "when b do x := 1"), 2),
-        (counter("const set real s = {3, 4}; const bool b = 3 in s;", "when b do x := 1"), 2),
+        (counter("const set real s = {3, 4}; const bool b = 3.0 in s;", "when b do x := 1"), 2),
         (counter("const dict(int: real) d = {}; const bool b = empty(d) and d + {1: 2} = {1: 2.0};", "when b do x := 1"), 2),
         (counter("const dict(int: int) d = {1: 2, 3: 4} - [1]; const bool b = d = {3: 4};", "when b do x := 1"), 2),
-        (counter('const string s = fmt("%03d|%.2f|%s|%b|%x|%2$-4d|", 7, 2, [1.0], true, 255);'
-                 ' const bool b = s = "007|2.00|[1.0]|true|ff|2   |";', "when b do x := 1"), 2),
+        (counter('const string s = fmt("%03d|%.2f|%s|%b|%x|%1$-4d|", 7, 2.0, [1.0], true, 255);'
+                 ' const bool b = s = "007|2.00|[1.0]|true|ff|7   |";', "when b do x := 1"), 2),
         (counter('const bool b = <string>1e7 = "1.0e7" and <string>0.00025 = "2.5e-4" and <string>(-12.5) = "-12.5";',
                  "when b do x := 1"), 2),
         (counter("const int n = pop([2, 3])[0] + del([1, 2], 0)[0] - floor(scale(1, 0, 2, 0, 4));", "do x := n"), 2),

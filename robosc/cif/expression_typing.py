@@ -49,6 +49,7 @@ class ExpressionTyping(ABC):
         scopes: The scopes.
 
     Attributes:
+        reads: What the expressions of now read, with places.
         received: Type of the value that an edge receives, in its updates.
         has_distributions: True in initial values of variables, which alone may be distributions.
     """
@@ -57,6 +58,7 @@ class ExpressionTyping(ABC):
         self.scopes = scopes
         self.findings = scopes.findings
         self._operators = Operators(scopes.findings)
+        self.reads: dict[Entity | Scope, Location] = {}
         self.received: CifType | None = None
         self.has_distributions = False
 
@@ -199,6 +201,7 @@ class ExpressionTyping(ABC):
         if found is None:
             return ERROR
         if isinstance(found, Scope) and found.is_automaton:
+            self.reads.setdefault(found, name.at)
             return self._must_be_known(name.at) if self._operators.is_evaluating else Term(AUTOMATON, value=found)
         is_value = isinstance(found, Entity) and not (
             isinstance(found.declaration, syntax.TypeDeclaration | syntax.Event | syntax.Invariant)
@@ -209,6 +212,7 @@ class ExpressionTyping(ABC):
             return ERROR
         if self._operators.is_evaluating and not isinstance(found.declaration, _KNOWN):
             return self._must_be_known(name.at)
+        self.reads.setdefault(found, name.at)
         return self.entity(found)
 
     def _elements(self, node: syntax.Group, scope: Scope, hint: CifType | None) -> list[Term]:
@@ -393,6 +397,7 @@ class ExpressionTyping(ABC):
             case "self":
                 if not scope.is_automaton:
                     return self.mismatch("'self' is the enclosing automaton, and there is none", node.at)
+                self.reads.setdefault(scope, node.at)
                 return Term(AUTOMATON, value=scope)
             case "?":
                 if self.received is None or self.received.kind == "void":

@@ -4,6 +4,7 @@ If-updates and assignments of several variables become conditional expressions. 
 implication. Algebraic variables and constants are replaced by their expressions where they are used.
 """
 
+from contextlib import nullcontext
 from dataclasses import replace
 
 import msgspec
@@ -22,6 +23,7 @@ from robosc.automata import (
 from robosc.automata.environment import environment_variable
 from robosc.automata.structure import InputVariable
 from robosc.cif import syntax
+from robosc.cif.circles import report_circles
 from robosc.cif.scopes import Alias, Entity, Scope, Scopes, allows
 from robosc.cif.terms import Term, flat, logic, negation, retyped, truth
 from robosc.cif.types import CifType, fits, is_equal
@@ -75,7 +77,6 @@ class Lowering(msgspec.Struct):
         roles: Roles of automata and invariants, with their places.
         event_places: Place of the declaration of each event.
         plant_reads: Expressions of plants, with the places where they do.
-        depends: Variables that the initial value of a variable reads, with the places where it does.
     """
 
     scopes: Scopes
@@ -92,7 +93,6 @@ class Lowering(msgspec.Struct):
     event_places: dict[str, Location] = msgspec.field(default_factory=dict)
     plant_reads: list[tuple[Expression, Location]] = msgspec.field(default_factory=list)
     roles: list[tuple[str, Location]] = msgspec.field(default_factory=list)
-    depends: dict[tuple[str, str], dict[tuple[str, str], Location]] = msgspec.field(default_factory=dict)
 
     # Findings
 
@@ -133,7 +133,7 @@ class Lowering(msgspec.Struct):
                 self._declaration(item, scope)
             if scope.is_automaton:
                 self._automaton(scope)
-        self._check_initial_values()
+        report_circles(self.typing)
         if not self.typing.findings.has_errors:
             self._warn()
         return self._system(name)
@@ -437,7 +437,13 @@ class Lowering(msgspec.Struct):
         found = [item for item in place.predicates if item.word == word]
         if not found:
             return False
-        terms = [self.typing.conjunction(item.predicates, scope) for item in found]
+        entry = scope.entries.get(place.name.text) if place.name is not None and word == "initial" else None
+        node = entry if isinstance(entry, Entity) else scope
+        with self.typing.depending(node) if word == "initial" else nullcontext():
+            terms = [self.typing.conjunction(item.predicates, scope) for item in found]
+        if node is not scope:
+            # How an automaton begins depends on which locations are initial.
+            self.typing.depends.setdefault(scope, {})[node] = found[0].at
         term = terms[0]
         for other in terms[1:]:
             term = logic("and", term, other)
@@ -453,8 +459,10 @@ class Lowering(msgspec.Struct):
         """The variables of a declaration: one, or one for each field of a tuple."""
         wanted = self.typing.type(item.type, scope)
         is_variable = self._is_variable(item.name, wanted, scope)
+        entry = scope.entries.get(item.name.text)
         self.typing.has_distributions = True
-        terms = [(self.typing.term(value, scope, wanted), value.at) for value in item.values]
+        with self.typing.depending(entry if isinstance(entry, Entity) else scope):
+            terms = [(self.typing.term(value, scope, wanted), value.at) for value in item.values]
         self.typing.has_distributions = False
         if "unknown" in (wanted.kind, *(term.type.kind for term, _ in terms)):
             return []
@@ -462,7 +470,6 @@ class Lowering(msgspec.Struct):
             if not fits(term.type, wanted):
                 self.typing.mismatch(f"{term.type} does not fit {wanted}", at)
                 return []
-        entry = scope.entries.get(item.name.text)
         if not is_variable or not scope.is_real or not isinstance(entry, Entity):
             return []
         own = self.typing.entity(entry)
@@ -495,31 +502,6 @@ class Lowering(msgspec.Struct):
         for term, at in terms:
             whole = logic("or", whole, self.typing.equality(own, term, at))
         self.initial.append(self.used_by(scope.role, whole, scope, item.name.at))
-        names = [old.expression.variable for old in flat(own) if isinstance(old.expression, VariableRead)]
-        for term, at in terms:
-            for part in flat(term):
-                for leaf in leaves(part.core):
-                    if isinstance(leaf, VariableRead):
-                        for name in names:
-                            self.depends.setdefault((scope.path, name), {})[leaf.component, leaf.variable] = at
-
-    def _check_initial_values(self) -> None:
-        """Report initial values that go round in a circle."""
-        finished = set[tuple[str, str]]()
-        for start in self.depends:
-            path: list[tuple[str, str]] = [start]
-            iterators = [iter(self.depends[start].items())]
-            while path:
-                following = next(iterators[-1], None)
-                if following is None:
-                    finished.add(path.pop())
-                    iterators.pop()
-                elif following[0] in path:
-                    self.error("cif-cycle", f"the initial value of '{'.'.join(following[0])}' is defined by itself",
-                               following[1], "Break the circle.")  # fmt: skip
-                elif following[0] not in finished and following[0] in self.depends:
-                    path.append(following[0])
-                    iterators.append(iter(self.depends[following[0]].items()))
 
     # Edges
 

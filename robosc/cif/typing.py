@@ -1,5 +1,8 @@
 """Types of CIF's names: the type of each declaration, with its static value or the expression that it becomes."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+
 from robosc.cif import syntax
 from robosc.cif.expression_typing import NAMELESS, ExpressionTyping
 from robosc.cif.scopes import Entity, Scope, Scopes
@@ -14,6 +17,10 @@ class Typing(ExpressionTyping):
 
     Args:
         scopes: The scopes.
+
+    Attributes:
+        depends: What the value of an algebraic variable reads, and what decides how a variable or an automaton begins
+            or whether a location is initial, with the places where that is read.
     """
 
     def __init__(self, scopes: Scopes) -> None:
@@ -22,6 +29,7 @@ class Typing(ExpressionTyping):
         self._types: dict[Entity, CifType | None] = {}
         self._fields: dict[Scope, set[str]] = {}
         self._enums: dict[tuple[str, ...], str] = {}
+        self.depends: dict[Entity | Scope, dict[Entity | Scope, Location]] = {}
 
     # Types
 
@@ -106,13 +114,23 @@ class Typing(ExpressionTyping):
         """The term of something declared."""
         if entity not in self._terms:
             self._terms[entity] = None
-            self._terms[entity] = self._declared(entity)
+            with self.depending(entity):
+                self._terms[entity] = self._declared(entity)
         found = self._terms[entity]
         if found is None:
-            self._cycle("the value of", entity)
+            # Without an instance, a circle of algebraic variables is none yet.
+            if entity.scope.is_real or not isinstance(entity.declaration, syntax.Algebraic):
+                self._cycle("the value of", entity)
             self._terms[entity] = ERROR
             return ERROR
         return found
+
+    @contextmanager
+    def depending(self, node: Entity | Scope) -> Iterator[None]:
+        """Remember what expressions read as what a node depends on."""
+        outer, self.reads = self.reads, self.depends.setdefault(node, {})
+        yield
+        self.reads = outer
 
     def _declared(self, entity: Entity) -> Term:
         declaration, scope = entity.declaration, entity.scope
@@ -189,6 +207,7 @@ class Typing(ExpressionTyping):
             return ERROR
         if values:
             return self._fitted(self.term(values[0][1], scope, type_), type_, values[0][1].at)
+        self.reads.setdefault(scope, entity.at)
         terms = [self._fitted(self.term(value, scope, type_), type_, value.at) for _, value in located]
         return self._chosen([self.location(scope, place) for place, _ in located[:-1]], terms, entity.at)
 

@@ -81,26 +81,39 @@ def _one(
         raise ValueError(f"'{whole}' does not take {term.type}")
     if not term.is_static:
         return ""
-    fill = "<" if "-" in flags else "0>" if "0" in flags and kind in "xX" else "0=" if "0" in flags else ">"
+    return _padded(_digits(term, flags, precision, kind, text), flags, int(width or "0"))
+
+
+def _digits(term: Term, flags: str, precision: str | None, kind: str, text: Callable[[Any, CifType], str]) -> str:
+    """A value without what its width adds."""
     if kind in "bBsS":
         found = text(term.value, term.type)
-        return format(found.upper() if kind.isupper() else found, f"{'<' if '-' in flags else '>'}{width}")
+        return found.upper() if kind.isupper() else found
     if kind in "xX":
-        return format(format(term.value & 0xFFFFFFFF, kind), f"{fill}{width}")
+        return format(term.value & 0xFFFFFFFF, kind)
     sign = "+" if "+" in flags else " " if " " in flags else ""
     comma = "," if "," in flags else ""
     if kind == "d":
-        return format(term.value, f"{fill}{sign}{width}{comma}d")
+        return format(term.value, f"{sign}{comma}d")
     if kind in "gG":
-        return _general(term.value, f"{fill}{sign}{width}", comma, int(precision or "6") or 1, kind)
-    return format(term.value, f"{fill}{sign}{width}{comma}.{precision or '6'}{kind}")
+        return _general(term.value, sign, comma, int(precision or "6") or 1, "e" if kind == "g" else "E")
+    return format(term.value, f"{sign}{comma}.{precision or '6'}{kind}")
 
 
-def _general(value: float, before: str, comma: str, figures: int, kind: str) -> str:
+def _padded(digits: str, flags: str, width: int) -> str:
+    if "-" in flags:
+        return digits.ljust(width)
+    if "0" not in flags:
+        return digits.rjust(width)
+    # Zeros that fill a width stand behind the sign, without commas.
+    sign = digits[: digits[:1] in ("+", "-", " ")]
+    return sign + digits[len(sign) :].rjust(width - len(sign), "0")
+
+
+def _general(value: float, sign: str, comma: str, figures: int, kind: str) -> str:
     """A number with as many figures, in powers of ten where it is below 1e-4 or has more; zeros are kept."""
-    scientific = format(value, f".{figures - 1}{'e' if kind == 'g' else 'E'}")
-    power = int(scientific.lower().partition("e")[2])
-    if value == 0 or -4 <= power < figures:
-        decimals = max(0, figures - 1 - (power if value else 0))
-        return format(value, f"{before}{comma}.{decimals}f")
-    return format(value, f"{before}.{figures - 1}{'e' if kind == 'g' else 'E'}")
+    scientific = format(value, f"{sign}.{figures - 1}{kind}")
+    power = int(scientific.lower().partition("e")[2]) if value else 0
+    if not -4 <= power < figures:
+        return scientific
+    return format(value, f"{sign}{comma}.{max(0, figures - 1 - power)}f")

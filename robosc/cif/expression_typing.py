@@ -50,7 +50,7 @@ class ExpressionTyping(ABC):
 
     Attributes:
         reads: What the expressions of now read, with places.
-        received: Type of the value that an edge receives, in its updates.
+        received: The value that an edge receives, in its updates.
         has_distributions: True in initial values of variables, which alone may be distributions.
     """
 
@@ -59,7 +59,7 @@ class ExpressionTyping(ABC):
         self.findings = scopes.findings
         self._operators = Operators(scopes.findings)
         self.reads: dict[Entity | Scope, Location] = {}
-        self.received: CifType | None = None
+        self.received: Term | None = None
         self.has_distributions = False
 
     @abstractmethod
@@ -232,6 +232,20 @@ class ExpressionTyping(ABC):
         values.append(self.term(node.otherwise, scope, hint))
         return self._chosen(guards, values, node.at)
 
+    def sent(self, node: syntax.Expression, scope: Scope, type_: CifType) -> Term:
+        """The term of a value that is sent, of the channel's type; outside of what receives it."""
+        outer, self.received = self.received, None
+        term = self.term(node, scope, type_)
+        self.received = outer
+        return retyped(term, type_) if fits(term.type, type_) else ERROR
+
+    def first(self, conditions: list[Term], values: list[Term], type_: CifType) -> Term:
+        """The term of the value of the first condition that holds, or of the last; all are of one type."""
+        found = values[-1]
+        for condition, value in zip(reversed(conditions), reversed(values[:-1]), strict=True):
+            found = self._operators.choice(condition, value, found, type_)
+        return found
+
     def _chosen(self, conditions: list[Term], values: list[Term], at: Location) -> Term:
         """The term of the value of the first condition that holds, or of the last."""
         if any(term.type.kind == "unknown" for term in (*conditions, *values)):
@@ -239,10 +253,7 @@ class ExpressionTyping(ABC):
         type_ = self._operators.common(values, at, "the branches")
         if type_ is None:
             return ERROR
-        found = values[-1]
-        for condition, value in zip(reversed(conditions), reversed(values[:-1]), strict=True):
-            found = self._operators.choice(condition, value, found, type_)
-        return found if conditions else retyped(found, type_)
+        return self.first(conditions, values, type_) if conditions else retyped(values[0], type_)
 
     def _switch(self, node: syntax.Switch, scope: Scope, hint: CifType | None) -> Term:
         subject = self.term(node.subject, scope)
@@ -400,9 +411,9 @@ class ExpressionTyping(ABC):
                 self.reads.setdefault(scope, node.at)
                 return Term(AUTOMATON, value=scope)
             case "?":
-                if self.received is None or self.received.kind == "void":
+                if self.received is None or self.received.type.kind == "void":
                     return self.mismatch("this edge receives no value", node.at, "Receive one, as in 'edge e?'.")
-                return broken(self.received)
+                return self.received
         assert node.name is not None  # noqa: S101 - a derivative is one of something
         found = self.scopes.resolve(node.name, scope)
         if found is not None and not (isinstance(found, Entity) and isinstance(found.declaration, syntax.Continuous)):

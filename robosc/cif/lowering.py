@@ -10,10 +10,8 @@ from dataclasses import replace
 import msgspec
 
 from robosc.automata import (
-    Assignment,
     Automaton,
     DiscreteVariable,
-    Edge,
     Event,
     EventCondition,
     Role,
@@ -24,11 +22,11 @@ from robosc.automata.environment import environment_variable
 from robosc.automata.structure import InputVariable
 from robosc.cif import syntax
 from robosc.cif.circles import report_circles
-from robosc.cif.scopes import Alias, Entity, Scope, Scopes, allows
+from robosc.cif.edges import Channels, Edges, data_type, event_of, place_name
+from robosc.cif.scopes import Alias, Entity, Scope, allows
 from robosc.cif.terms import Term, flat, logic, negation, retyped, truth
 from robosc.cif.types import CifType, fits, is_equal
-from robosc.cif.typing import NAMELESS, Typing
-from robosc.cif.updates import Updates
+from robosc.cif.usage import Usage
 from robosc.expressions import (
     FALSE,
     TRUE,
@@ -59,12 +57,11 @@ class Exclusion(msgspec.Struct, frozen=True):
     at: Location
 
 
-class Lowering(msgspec.Struct):
+class Lowering(Usage):
     """Parts of a system, gathered component by component.
 
     Attributes:
-        scopes: Components of the specification.
-        typing: Meaning of their expressions.
+        channels: What sends over channels and receives from them.
         events: Events with their names.
         automata: Automata.
         places: Places of the automata, by their names.
@@ -75,12 +72,11 @@ class Lowering(msgspec.Struct):
         initial: Predicates on the initial states.
         marker: Predicates on the marked states.
         roles: Roles of automata and invariants, with their places.
+        never: Channels that have nobody at one of their ends.
         event_places: Place of the declaration of each event.
-        plant_reads: Expressions of plants, with the places where they do.
     """
 
-    scopes: Scopes
-    typing: Typing
+    channels: Channels = msgspec.field(default_factory=Channels)
     events: list[Event] = msgspec.field(default_factory=list)
     automata: list[Automaton] = msgspec.field(default_factory=list)
     places: dict[str, Location] = msgspec.field(default_factory=dict)
@@ -90,39 +86,15 @@ class Lowering(msgspec.Struct):
     plant_invariants: list[Expression] = msgspec.field(default_factory=list)
     initial: list[Expression] = msgspec.field(default_factory=list)
     marker: list[Expression] = msgspec.field(default_factory=list)
+    never: list[Entity] = msgspec.field(default_factory=list)
     event_places: dict[str, Location] = msgspec.field(default_factory=dict)
-    plant_reads: list[tuple[Expression, Location]] = msgspec.field(default_factory=list)
     roles: list[tuple[str, Location]] = msgspec.field(default_factory=list)
-
-    # Findings
-
-    def error(self, code: str, message: str, location: Location, fix: str) -> None:
-        """Report an error."""
-        self.typing.error(code, message, location, fix)
-
-    def unsupported(self, scope: Scope, message: str, location: Location, fix: str) -> None:
-        """Report what synthesis does not take, unless it stands in a definition without an instance."""
-        if scope.is_real:
-            self.error("cif-unsupported", message, location, fix)
-
-    def used(self, term: Term, scope: Scope, at: Location) -> Expression:
-        """The expression of a term that is used; `true` after an error."""
-        # What an edge does with a value that it receives is refused where the channel is declared.
-        if not scope.is_real or self.typing.received is not None or not self.typing.usable(term, at):
-            return TRUE
-        return term.core
-
-    def used_by(self, role: str | None, term: Term, scope: Scope, at: Location) -> Expression:
-        """The expression of a term that a plant or a requirement uses."""
-        found = self.used(term, scope, at)
-        if role == "plant":
-            self.plant_reads.append((found, at))
-        return found
 
     # The whole
 
     def lowered(self, name: str) -> tuple[System, SystemPlaces]:
         """The system, with the places of its parts; of use only if no error is found."""
+        self.channels.gather(self)
         for scope in self.scopes.scopes():
             for entry in list(scope.entries.values()):
                 if isinstance(entry, Entity):
@@ -134,6 +106,7 @@ class Lowering(msgspec.Struct):
             if scope.is_automaton:
                 self._automaton(scope)
         report_circles(self.typing)
+        self.never += self.channels.settle(self, self.automata)
         if not self.typing.findings.has_errors:
             self._warn()
         return self._system(name)
@@ -161,6 +134,9 @@ class Lowering(msgspec.Struct):
                     message = f"'{event}' never happens: '{item.name}' {why}"
                     fix = "Add an edge, or take the event out of the alphabet."
                     warn("cif-event-never-happens", message, self.places[item.name], fix)
+        for entity in self.never:
+            message = f"'{entity.name}' never happens: nobody sends over it, or nobody receives from it"
+            warn("cif-event-never-happens", message, entity.at, "Add an automaton that does.")
         for at, events in unused.items():
             more = f" and {len(events) - 1} more" if len(events) > 1 else ""
             message = f"no automaton has '{events[0]}'{more} in its alphabet"
@@ -170,12 +146,9 @@ class Lowering(msgspec.Struct):
         alphabet = frozenset[str]().union(*(item.alphabet for item in self.automata))
         is_controlled = self._is_controlled()
         conditions: dict[bool, list[tuple[EventCondition, Location]]] = {True: [], False: []}
+        conditions[True] += [(EventCondition(item.name, FALSE), item.at) for item in self.never]
         for item in self.exclusions:
             event = item.event.name
-            declaration = item.event.declaration
-            if isinstance(declaration, syntax.Event) and declaration.data is not None:
-                # It is refused where it is declared.
-                continue
             if event not in alphabet:
                 message = f"no automaton has '{event}' in its alphabet, so this excludes nothing"
                 self.typing.findings.warning("cif-no-effect", message, item.at, "Remove it, or use the event.")
@@ -235,18 +208,11 @@ class Lowering(msgspec.Struct):
                 self.error("cif-arguments", f"'{argument}' does not allow the use '{use}', as '{parameter.name.text}' "
                            "does", argument.at, "Give both the same flags.")  # fmt: skip
         wanted = None if parameter.type is None else self.typing.type(parameter.type, alias.scope.parent or alias.scope)
-        type_ = self.data_type(argument, found, alias.argument_scope)
+        type_ = data_type(self.typing, argument, found, alias.argument_scope)
         if wanted is not None and (type_ is None or not is_equal(type_, wanted)):
             has = f"data of type {type_}" if type_ else "no data"
             message = f"'{argument}' has {has}, and '{parameter.name.text}' takes {wanted}"
             self.error("cif-arguments", message, argument.at, "Give an event with data of that type.")
-
-    def data_type(self, name: syntax.Name, event: Entity, scope: Scope) -> CifType | None:
-        """The type of an event's data; None if it has none."""
-        parameter, around = self.scopes.parameter(name, scope)
-        assert isinstance(event.declaration, syntax.Event)  # noqa: S101 - the entity of an event
-        data = event.declaration.data if parameter is None else parameter.type
-        return None if data is None else self.typing.type(data, around or event.scope)
 
     def _declaration(self, item: syntax.Declaration, scope: Scope) -> None:
         match item:
@@ -272,8 +238,6 @@ class Lowering(msgspec.Struct):
                 self.typing.findings.warning("cif-no-effect", "input from pictures is left aside", at, "Remove it.")
 
     def _event(self, item: syntax.Event, name: str, scope: Scope) -> None:
-        if item.data is not None:
-            self.unsupported(scope, f"'{name}' is a channel", item.name.at, "Use events without data.")
         if item.is_controllable is None:
             self.unsupported(scope, f"'{name}' is neither controllable nor uncontrollable", item.name.at,
                              "Write 'controllable' or 'uncontrollable' before it.")  # fmt: skip
@@ -325,7 +289,7 @@ class Lowering(msgspec.Struct):
     def _invariant(self, item: syntax.Invariant, scope: Scope, place: Term | None) -> None:
         """Take an invariant; `place` is the location that it stands in."""
         predicate = self.typing.predicate(item.predicate, scope)
-        events = [self._event_of(name, scope) for name in item.events]
+        events = [event_of(self.scopes, name, scope) for name in item.events]
         if item.role is None:
             self.unsupported(scope, "this invariant has no role", item.at,
                              "Write 'plant', 'requirement' or 'supervisor' before it.")  # fmt: skip
@@ -349,15 +313,6 @@ class Lowering(msgspec.Struct):
             if event is not None:
                 self.exclusions.append(Exclusion(event, condition, item.role, item.at))
 
-    def _event_of(self, name: syntax.Name, scope: Scope) -> Entity | None:
-        found = self.scopes.resolve(name, scope)
-        if found is None:
-            return None
-        if isinstance(found, Entity) and isinstance(found.declaration, syntax.Event):
-            return found
-        self.scopes.wrong_kind(name, found, "an event")
-        return None
-
     # Automata
 
     def _automaton(self, scope: Scope) -> None:
@@ -374,22 +329,27 @@ class Lowering(msgspec.Struct):
             self.roles.append((scope.role, scope.at))
         discrete = [item for item in scope.body if isinstance(item, syntax.Discrete)]
         variables = [variable for item in discrete for variable in self._variables(item, scope)]
-        edges = [edge for place in places for item in place.edges for edge in self._edges(item, place, scope)]
-        initial = [_name(place) for place in places if self._holds(place, "initial", scope, self.initial)]
-        marked = [_name(place) for place in places if self._holds(place, "marked", scope, self.marker)]
+        reader = Edges(self, scope, self.channels)
+        edges = [edge for place in places for item in place.edges for edge in reader.read(item, place)]
+        initial = [place_name(place) for place in places if self._holds(place, "initial", scope, self.initial)]
+        marked = [place_name(place) for place in places if self._holds(place, "marked", scope, self.marker)]
         for place in places:
             for invariant in place.invariants:
                 self._invariant(invariant, scope, self.typing.location(scope, place))
             for equation in place.equations:
                 self._equation(equation, scope)
-        alphabet, monitors = self._alphabets(scope, edges)
+        alphabet, monitors = self._alphabets(scope, frozenset(reader.events))
+        for name in sorted(alphabet & reader.channels):
+            self.error("cif-structure", f"'{scope.path}' is an end of the channel '{name}', and has it in its alphabet",
+                       scope.at, "Let another automaton do either.")  # fmt: skip
+        alphabet |= reader.channels
         if not scope.is_real:
             return
         self.places[scope.path] = scope.at
         self.automata.append(
             Automaton(
                 name=scope.path,
-                locations=tuple(_name(place) for place in places),
+                locations=tuple(place_name(place) for place in places),
                 initial=tuple(initial),
                 marked=frozenset(marked),
                 alphabet=alphabet,
@@ -400,17 +360,16 @@ class Lowering(msgspec.Struct):
             )
         )
 
-    def _alphabets(self, scope: Scope, edges: list[Edge]) -> tuple[frozenset[str], frozenset[str]]:
+    def _alphabets(self, scope: Scope, used: frozenset[str]) -> tuple[frozenset[str], frozenset[str]]:
         """The alphabet of an automaton, and the events that it monitors."""
         found: dict[str, frozenset[str] | None] = {"alphabet": None, "monitor": None}
-        used = frozenset(edge.event for edge in edges)
         lists = [item for item in scope.body if isinstance(item, syntax.Alphabet)]
         # A monitored event is in the alphabet, wherever that stands.
         for item in sorted(lists, key=lambda item: item.word):
             if found[item.word] is not None:
                 self.error("cif-structure", f"there are two of '{item.word}' in '{scope.path}'", item.at,
                            "Join them.")  # fmt: skip
-            entities = [(name, self._event_of(name, scope)) for name in item.events]
+            entities = [(name, event_of(self.scopes, name, scope)) for name in item.events]
             for name in item.events if item.word == "alphabet" else ():
                 parameter, _ = self.scopes.parameter(name, scope)
                 if parameter is not None and not allows(parameter, "~"):
@@ -503,75 +462,6 @@ class Lowering(msgspec.Struct):
             whole = logic("or", whole, self.typing.equality(own, term, at))
         self.initial.append(self.used_by(scope.role, whole, scope, item.name.at))
 
-    # Edges
-
-    def _edges(self, item: syntax.Edge, place: syntax.LocationDeclaration, scope: Scope) -> list[Edge]:
-        at = item.guards[0].at if item.guards else item.at
-        guard = self.used_by(scope.role, self.typing.conjunction(item.guards, scope), scope, at)
-        uses = [self._use(event, scope) for event in item.events]
-        self.typing.received = self._received(item.events, uses)
-        assigned = Updates(self.typing).assigned(item.updates, scope)
-        updates = tuple(
-            Assignment(name, self.used_by(scope.role, new.term, scope, new.at)) for name, new in assigned.items()
-        )
-        self.typing.received = None
-        target = self._target(item, place, scope)
-        if not item.events:
-            self.unsupported(scope, "this edge has no event, which means 'tau'", item.at, "Give it an event.")
-        found = []
-        for event, (entity, _) in zip(item.events, uses, strict=True):
-            if event.name is None:
-                self.unsupported(scope, "this edge has the event 'tau'", event.at, "Give it an event of its own.")
-            elif entity is not None and not event.use:
-                found.append(Edge(_name(place), entity.name, target, guard, updates))
-        return found
-
-    def _use(self, event: syntax.EdgeEvent, scope: Scope) -> tuple[Entity | None, CifType | None]:
-        """The event of an edge, and the type of its data; what is sent or received is checked.
-
-        That synthesis takes no channels is reported where one is declared.
-        """
-        entity = None if event.name is None else self._event_of(event.name, scope)
-        if event.name is None or entity is None:
-            return None, None
-        parameter, _ = self.scopes.parameter(event.name, scope)
-        type_ = self.data_type(event.name, entity, scope)
-        if parameter is not None and not allows(parameter, event.use or "~"):
-            self.error("cif-arguments", f"the flags of the parameter '{event.name}' do not allow this use", event.at,
-                       f"Add the flag '{event.use or '~'}' to it.")  # fmt: skip
-        if event.use and type_ is None:
-            self.typing.mismatch(f"'{event.name}' is no channel", event.at, "Write the event without '!' or '?'.")
-        sent = None if event.value is None else self.typing.term(event.value, scope, type_)
-        if event.use == "!" and type_ is not None and (sent is None) != (type_.kind == "void"):
-            count = "no value" if sent is None else "a value"
-            self.typing.mismatch(f"'{event.name}' is a channel of {type_}, and is sent {count}", event.at)
-        elif sent is not None and type_ is not None and event.value is not None and not fits(sent.type, type_):
-            self.typing.mismatch(f"{sent.type} does not fit {type_}", event.value.at)
-        return entity, type_
-
-    def _received(
-        self, events: tuple[syntax.EdgeEvent, ...], uses: list[tuple[Entity | None, CifType | None]]
-    ) -> CifType | None:
-        """The type of the value that an edge receives; None if it receives nothing."""
-        types = [type_ for event, (_, type_) in zip(events, uses, strict=True) if event.use == "?"]
-        for event in events:
-            if types and event.use != "?":
-                self.error("cif-structure", "this edge receives a value, and has an event that does not", event.at,
-                           "Give that event an edge of its own.")  # fmt: skip
-        for type_ in types[1:]:
-            if type_ is not None and types[0] is not None and not is_equal(type_, types[0]):
-                self.typing.mismatch(f"this edge receives values of the types {types[0]} and {type_}", events[0].at)
-        return types[0] if types else None
-
-    def _target(self, item: syntax.Edge, place: syntax.LocationDeclaration, scope: Scope) -> str:
-        if item.target is None:
-            return _name(place)
-        entry = None if item.target.text in scope.parameters else scope.entries.get(item.target.text)
-        if not isinstance(entry, Entity) or not isinstance(entry.declaration, syntax.LocationDeclaration):
-            message = f"'{item.target.text}' is not a location of this automaton"
-            self.error("cif-unknown-name", message, item.target.at, "Write the name of one of its locations.")
-        return item.target.text
-
 
 def core_type(type_: CifType) -> Type:
     """The type of the automata for a finite one."""
@@ -582,7 +472,3 @@ def core_type(type_: CifType) -> Type:
             return EnumType(type_.name, type_.names)
         case _:
             return IntegerType(*type_.range)
-
-
-def _name(place: syntax.LocationDeclaration) -> str:
-    return NAMELESS if place.name is None else place.name.text

@@ -419,6 +419,8 @@ class Lowering(Usage):
         wanted = self.typing.type(item.type, scope)
         is_variable = self._is_variable(item.name, wanted, scope)
         entry = scope.entries.get(item.name.text)
+        # Another thing of this name has been reported.
+        is_own = isinstance(entry, Entity) and entry.declaration is item
         self.typing.has_distributions = True
         with self.typing.depending(entry if isinstance(entry, Entity) else scope):
             terms = [(self.typing.term(value, scope, wanted), value.at) for value in item.values]
@@ -429,7 +431,7 @@ class Lowering(Usage):
             if not fits(term.type, wanted):
                 self.typing.mismatch(f"{term.type} does not fit {wanted}", at)
                 return []
-        if not is_variable or not scope.is_real or not isinstance(entry, Entity):
+        if not is_variable or not scope.is_real or not isinstance(entry, Entity) or not is_own:
             return []
         own = self.typing.entity(entry)
         if own.type.kind == "unknown":

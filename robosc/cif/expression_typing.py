@@ -200,6 +200,10 @@ class ExpressionTyping(ABC):
         found = self.scopes.resolve(name, scope)
         if found is None:
             return ERROR
+        if scope.is_function and not (isinstance(found, Entity) and (
+            found.scope is scope or isinstance(found.declaration, _KNOWN)
+        )):  # fmt: skip
+            return self.mismatch(f"a function does not use '{name}'", name.at, "Give it the value as an argument.")
         if isinstance(found, Scope) and found.is_automaton:
             self.reads.setdefault(found, name.at)
             return self._must_be_known(name.at) if self._operators.is_evaluating else Term(AUTOMATON, value=found)
@@ -403,6 +407,8 @@ class ExpressionTyping(ABC):
         if self._operators.is_evaluating:
             return self._must_be_known(node.at)
         match node.word:
+            case "time" if scope.is_function:
+                return self.mismatch("a function does not use 'time'", node.at, "Give it the value as an argument.")
             case "time":
                 return broken(REAL, problem=Problem("'time' is a real number", node.at))
             case "self":

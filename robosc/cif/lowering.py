@@ -23,6 +23,7 @@ from robosc.automata.structure import InputVariable
 from robosc.cif import syntax
 from robosc.cif.circles import report_circles
 from robosc.cif.edges import Channels, Edges, data_type, event_of, place_name
+from robosc.cif.function_bodies import check_function
 from robosc.cif.scopes import Alias, Entity, Scope, allows
 from robosc.cif.terms import Term, flat, logic, negation, retyped, truth
 from robosc.cif.types import CifType, fits, is_equal
@@ -234,6 +235,8 @@ class Lowering(Usage):
                 self._invariant(item, scope, None)
             case syntax.Equation():
                 self._equation(item, scope)
+            case syntax.Function():
+                check_function(self.typing, item, scope)
             case syntax.InputOutput(word="svgin", at=at):
                 self.typing.findings.warning("cif-no-effect", "input from pictures is left aside", at, "Remove it.")
 

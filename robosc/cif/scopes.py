@@ -157,6 +157,7 @@ class Scope:
         parameters: Names of its parameters.
         body: Declarations in order, those of merged groups one after the other.
         is_real: False in a definition that is checked without an instance.
+        is_function: True for a function, which uses its own variables, constants, types and functions alone.
         files: Files that have a part of a group.
     """
 
@@ -171,6 +172,7 @@ class Scope:
     parameters: set[str] = field(default_factory=set)
     body: list[syntax.Declaration] = field(default_factory=list)
     is_real: bool = True
+    is_function: bool = False
     files: set[str] = field(default_factory=set)
 
     @property
@@ -531,6 +533,13 @@ class Scopes:
                         argument.at, f"Give the name of {wanted}.")  # fmt: skip
             return None
         return found
+
+    def function(self, item: syntax.Function, scope: Scope) -> Scope:
+        """The scope of a function's parameters and variables."""
+        made = Scope(scope.absolute(item.name.text), scope, item.name.at, is_real=False, is_function=True)
+        for name, type_ in (*item.parameters, *((name, type_) for name, type_, _ in item.variables)):
+            self._add(made, name, Entity(syntax.Discrete(name, type_, (), is_any=False), made, name))
+        return made
 
     def target(self, entry: "Item | Alias | PendingInstance") -> "Item | None":
         """The thing that an entry of a scope stands for."""

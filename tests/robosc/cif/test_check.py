@@ -269,6 +269,20 @@ def test_files_are_read_from_their_folders(tmp_path: Path) -> None:
         (counter("alphabet; monitor e;", ""), "cif-structure", 44),
         ("plant p: location: initial; location a; end", "cif-structure", 10),
         ("event e;", "cif-unsupported", 7),
+        (counter("disc int[0..3] e;", ""), "cif-duplicate-name", 59),
+        ("func int f(int a): return true; end", "cif-type", 27),
+        ("func int f(int a): a := true; return a; end", "cif-type", 20),
+        ("func int f(int a): a := 1; end", "cif-structure", 20),
+        ("func int f(int a): if a = 1: return 1; elif a = 2: a := 1; else return 2; end end", "cif-structure", 52),
+        ("func int f(int a): while true: return 1; end end", "cif-structure", 20),
+        ("func int f(int a): break; return a; end", "cif-structure", 20),
+        ("func int f(int a): int a; return a; end", "cif-duplicate-name", 24),
+        ("func int f(int a): int b = true; return b; end", "cif-type", 28),
+        ("func int, bool f(): return 1; end", "cif-type", 28),
+        ("func real f(): return time; end", "cif-type", 23),
+        ("alg int n = 1; func int f(): return n; end", "cif-type", 37),
+        ("func int f(): n := 1; return 1; end const int n = 1;", "cif-wrong-kind", 15),
+        ("group def D(): func int f(): return b; end end", "cif-unknown-name", 37),
         ("const int k = 2; const real r = k;", "cif-type", 33),
         ("const bool b = 1 = 1.0;", "cif-type", 18),
         ("const bool b = (if true: 1 else 2.0 end) = 1.0;", "cif-type", 17),
@@ -338,6 +352,17 @@ end
     assert {item.code for item in found} == {"cif-unsupported"}
     assert [item.location.line for item in found if item.location] == [1, 1, 2, 4, 4, 6, 6, 6]
     assert all(item.fix for item in found)
+
+
+def test_functions_that_nobody_calls_are_taken() -> None:
+    text = """const int n = 3;
+func int f(int a, b; list int l): int c = n, d; while a > 0: if a = 2: continue; elif b = 1: break; end a, l[0] := b, c;
+  end if size(l) = 0: return f(a, b, [1]); else (c, d) := (d, 1); return c; end end
+func real, bool g(tuple(int x; bool y) t): t[x] := 1; return 1, t[y]; end
+func bool h(): "java:x.y";
+"""
+    _, found = checked(text + TANK)
+    assert found == ()
 
 
 def test_a_definition_that_nobody_instantiates_is_checked_for_types_alone() -> None:

@@ -48,6 +48,21 @@ class Instance:
                 if isinstance(item, syntax.Discrete | syntax.LocationDeclaration) and item.name}  # fmt: skip
 
 
+@dataclass(frozen=True)
+class Step:
+    """What an event does in a state.
+
+    Attributes:
+        is_allowed: Every requirement automaton allows it.
+        targets: The states that plants and requirements lead to.
+        leaves: A variable may leave its range.
+    """
+
+    is_allowed: bool
+    targets: list[dict[str, Any]]
+    leaves: bool
+
+
 ROOT = Instance("")
 
 OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
@@ -102,6 +117,11 @@ class Meaning:
 
     def targets(self, state: State, event: str, *, is_controllable: bool) -> tuple[bool, list[dict[str, Any]]]:
         """Return whether every requirement allows an event, and the states that plants and requirements lead to."""
+        step = self.step(state, event)
+        return step.is_allowed, [] if is_controllable and step.leaves else step.targets
+
+    def step(self, state: State, event: str) -> Step:
+        """Return what an event does in a state."""
         allowed, choices = True, []
         takes_part = False
         ends: dict[str, list[tuple[Instance, syntax.Edge, syntax.EdgeEvent]]] = {"!": [], "?": []}
@@ -118,13 +138,13 @@ class Meaning:
             if mine:
                 choices.append([(automaton, edge, item) for edge, item in mine])
             elif automaton.component.role == "plant" and not is_monitored:  # type: ignore[union-attr]
-                return allowed, []
+                return Step(allowed, [], leaves=False)
             elif not is_monitored:
                 allowed = False
         if self._is_channel(event):
             takes_part = True
             choices = [ends["!"], ends["?"], *choices]
-        found, leaves = [], not takes_part
+        found, leaves = [], False
         for choice in product(*choices):
             target = dict(state)
             sent = [(automaton, item) for automaton, _, item in choice if item.use == "!"]
@@ -136,7 +156,7 @@ class Meaning:
             leaves = leaves or not is_inside
             if is_inside:
                 found.append(target)
-        return allowed, [] if not takes_part or (is_controllable and leaves) else found
+        return Step(allowed, found if takes_part else [], leaves)
 
     def _is_channel(self, event: str) -> bool:
         return any(item.use and self._event(item.name, automaton) == event for automaton in self.automata.values()
@@ -214,7 +234,7 @@ class Meaning:
                     return self._read(state, here, single)
                 if single in here.arguments:
                     return self.value(here.arguments[single], state, ROOT)
-                return self._constants[single]
+                return state[single] if single in state else self._constants[single]
             case syntax.Name(parts=(*path, last)):
                 return self._read(state, self._automaton(tuple(path), here), last)
             case syntax.Unary(operator="not", operand=operand):

@@ -6,32 +6,43 @@ EVENTS = {"c": True, "u": False}
 """Their events, and which are controllable."""
 
 
-def random_predicates(random: Random) -> str:
-    """A model of two plants and a requirement, in which what begins later may depend on what begins earlier."""
-    before: list[str] = []
-    text = "controllable c; uncontrollable u;\n"
+INPUTS: dict[str, tuple[str, list[bool] | list[int]]] = {"s": ("bool", [False, True]), "n": ("int[0..2]", [0, 1, 2])}
+"""The input variables that they may have: type and values."""
+
+
+def random_predicates(random: Random, *, is_open: bool = False) -> str:
+    """A model of two plants and a requirement, in which what begins later may depend on what begins earlier.
+
+    Args:
+        random: Where its choices come from.
+        is_open: It may have input variables, and its requirement has no variables.
+    """
+    names = [f"{name}.{part}" for name in "pqr" for part in ("l", "k")]
+    names += [f"{name}.{part}" for name in ("pq" if is_open else "pqr") for part in ("x", "b", "t[a]", "t[b]")]
+    inputs = [name for name in INPUTS if is_open and random.random() < 0.5]
+    text = "controllable c; uncontrollable u;\n" + "".join(f"input {INPUTS[name][0]} {name};\n" for name in inputs)
+    before, everything = inputs.copy(), _Reads(random, [*names, *inputs])
     for role, name in (("plant", "p"), ("plant", "q"), ("requirement", "r")):
-        text += _automaton(random, role, name, before)
-    lines = [_predicate_line(random, _Reads(random, None)) for _ in range(random.randint(0, 3))]
-    return f"{text}{' '.join(lines)}\ngroup g: {_predicate_line(random, _Reads(random, None))} end\n"
+        text += _automaton(random, role, name, before, everything, has_variables=f"{name}.x" in names)
+    lines = [_predicate_line(random, everything) for _ in range(random.randint(0, 3))]
+    return f"{text}{' '.join(lines)}\ngroup g: {_predicate_line(random, everything)} end\n"
 
 
 class _Reads:
-    """Random expressions over what may be read: all variables, or those that begin before."""
+    """Random expressions over what may be read."""
 
-    def __init__(self, random: Random, before: list[str] | None) -> None:
-        names = [f"{name}.{part}" for name in "pqr" for part in ("x", "t[a]", "b", "t[b]", "l", "k")]
+    def __init__(self, random: Random, names: list[str]) -> None:
         self._random = random
-        self.names = names if before is None else before
+        self._numbers = [name for name in names if name.endswith((".x", "[a]")) or name == "n"]
+        self._truths = [name for name in names if name not in self._numbers]
 
     def number(self) -> str:
-        numbers = [name for name in self.names if name.endswith((".x", "[a]"))]
-        return self._random.choice(["0", "1", "2", *numbers, *numbers])
+        return self._random.choice(["0", "1", "2", *self._numbers, *self._numbers])
 
     def truth(self, depth: int = 2) -> str:
         random = self._random
         if depth == 0 or random.random() < 0.3:
-            return random.choice(["true", *(name for name in self.names if not name.endswith((".x", "[a]")))])
+            return random.choice(["true", *self._truths])
         match random.randrange(4):
             case 0:
                 return f"{self.number()} {random.choice(['=', '!=', '<', '<='])} {self.number()}"
@@ -45,15 +56,17 @@ class _Reads:
                 return f"not ({self.truth(depth - 1)})"
 
 
-def _automaton(random: Random, role: str, name: str, before: list[str]) -> str:
+def _automaton(
+    random: Random, role: str, name: str, before: list[str], everything: _Reads, *, has_variables: bool
+) -> str:
     earlier = _Reads(random, list(before))
-    everything = _Reads(random, None)
     lines = [f"{role} {name}:"]
-    for variable, type_, value in (("x", "int[0..2]", earlier.number), ("b", "bool", earlier.truth)):
-        lines.append(f"disc {type_} {variable}{_initial(random, [value() for _ in range(2)])};")
-    tuples = [f"({earlier.number()}, {earlier.truth(1)})" for _ in range(2)]
-    lines.append(f"disc tuple(int[0..2] a; bool b) t{_initial(random, tuples)};")
-    before += [f"{name}.{part}" for part in ("x", "b", "t[a]", "t[b]")]
+    if has_variables:
+        for variable, type_, value in (("x", "int[0..2]", earlier.number), ("b", "bool", earlier.truth)):
+            lines.append(f"disc {type_} {variable}{_initial(random, [value() for _ in range(2)])};")
+        tuples = [f"({earlier.number()}, {earlier.truth(1)})" for _ in range(2)]
+        lines.append(f"disc tuple(int[0..2] a; bool b) t{_initial(random, tuples)};")
+        before += [f"{name}.{part}" for part in ("x", "b", "t[a]", "t[b]")]
     now = _Reads(random, list(before))
     if random.random() < 0.3:
         lines.append(_predicate_line(random, everything))
@@ -63,13 +76,24 @@ def _automaton(random: Random, role: str, name: str, before: list[str]) -> str:
             ["marked;", f"marked {everything.truth()};", f"marked; marked {everything.truth()};", ""]
         )
         lines.append(f"location {place}: {begins or ('initial;' if place == 'l' else '')} {marked or 'marked true;'}")
-        if random.random() < 0.5:
+        if random.random() < 0.2:
             lines.append(_invariant(random, everything))
         lines += [
-            f"edge {event}{random.choice(['', ' goto l', ' goto k'])};" for event in EVENTS if random.random() < 0.8
+            f"edge {event}{_action(random, everything, has_variables)}{random.choice(['', ' goto l', ' goto k'])};"
+            for event in EVENTS
+            if random.random() < 0.8
         ]
     before += [f"{name}.l", f"{name}.k"]
     return "\n".join([*lines, "end\n"])
+
+
+def _action(random: Random, reads: _Reads, has_variables: bool) -> str:
+    """What stands between an event and where it leads."""
+    guard = random.choice(["", "", f" when {reads.truth()}"])
+    updates = ["", f" do x := {reads.number()}", f" do x := x + {random.randint(1, 2)}", " do x := x - 1",
+               f" do b := {reads.truth()}, t[a] := {reads.number()}",
+               f" do t := ({reads.number()}, {reads.truth()}), b := not b"]  # fmt: skip
+    return guard + (random.choice(updates) if has_variables else "")
 
 
 def _initial(random: Random, values: list[str]) -> str:

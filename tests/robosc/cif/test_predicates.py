@@ -1,4 +1,4 @@
-"""Random predicates: what the front end says of states is what the syntax tree says."""
+"""Random predicates: what the front end and synthesis say of states is what the syntax tree says."""
 
 from collections.abc import Mapping
 from random import Random
@@ -12,9 +12,11 @@ from robosc.cif import check_cif
 from robosc.expressions import Expression, Value
 from robosc.expressions.evaluate import evaluate
 from robosc.source import Bundle, SourceFile
+from robosc.synthesis import SynthesisStatus, synthesize
 from support.cif_predicates_twin import Predicates
+from support.cif_synthesis_twin import Synthesis
 from support.effort import examples
-from support.random_cif_predicates import EVENTS, random_predicates
+from support.random_cif_predicates import EVENTS, INPUTS, random_predicates
 
 
 @pytest.mark.random
@@ -50,6 +52,26 @@ def test_states_are_as_the_syntax_tree_says(seed: int) -> None:
                 assert semantics.condition(state, event) is (allowed and twin.allows("requirement", event, values)), (
                     text, values, event,
                 )  # fmt: skip
+
+
+@pytest.mark.random
+@pytest.mark.parametrize("seed", range(examples(60)))
+def test_synthesis_is_as_the_syntax_tree_says(seed: int) -> None:
+    text = random_predicates(Random(seed), is_open=True)
+    found = check_cif(Bundle(SourceFile("m.cif", text)))
+    assert found.system is not None, [str(item) for item in found.diagnostics]
+    check_system(found.system)
+    names = list(map(str, subjects(found.system)))
+    initial = Semantics(found.system).initial_states
+    if len(initial) > 200:
+        return
+    inputs = {name: values for name, (_, values) in INPUTS.items() if name in names}
+    twin = Synthesis(Predicates(text), EVENTS, inputs)
+    states = twin.controlled((dict(zip(names, state, strict=True)) for state in initial), limit=600)
+    if states is not None:
+        result = synthesize(found.system)
+        is_empty = result.status is SynthesisStatus.EMPTY
+        assert (0 if is_empty else result.statistics.states) == states, text
 
 
 def _is_true(expression: Expression, values: Mapping[tuple[str, str | None], Value]) -> bool:

@@ -61,6 +61,7 @@ class Reading(msgspec.Struct, frozen=True):
         plant_places: Places of the state invariants of plants.
         event_places: Place of the declaration of each event.
         scopes: Components, with all that they declare.
+        open_channels: Channels that have nobody at one of their ends.
     """
 
     system: System
@@ -70,6 +71,7 @@ class Reading(msgspec.Struct, frozen=True):
     plant_places: Sequence[Location]
     event_places: Mapping[str, Location]
     scopes: Scopes
+    open_channels: Sequence[Entity]
 
     @property
     def automata(self) -> tuple[Automaton, ...]:
@@ -165,6 +167,9 @@ def _warn_of_events(reading: Reading, possible: _Possible, findings: Findings) -
             _warn_of_event(event, at, having, reading, possible, findings)
         elif event not in excluded:
             unused.setdefault(at, []).append(event)
+    for channel in reading.open_channels:
+        message = f"'{channel.name}' never happens: nobody sends over it, or nobody receives from it"
+        findings.warning("cif-event-never-happens", message, channel.at, "Add an automaton that does.")
     for at, events in unused.items():
         more = f" and {len(events) - 1} more" if len(events) > 1 else ""
         message = f"no automaton has '{events[0]}'{more} in its alphabet"

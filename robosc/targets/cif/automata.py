@@ -5,13 +5,13 @@ the group or automaton `hall.door`. An automaton with one event of its own name 
 """
 
 import re
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import groupby
 
 from robosc._version import __version__
 from robosc.automata.state import Subject, subject_type
-from robosc.automata.structure import Automaton, DiscreteVariable, Edge, Role, System
+from robosc.automata.structure import Assignment, Automaton, DiscreteVariable, Edge, Role, System
 from robosc.cif.terms import result_range
 from robosc.cif.typing import NAMELESS
 from robosc.conditions.formula import to_expression
@@ -221,7 +221,10 @@ class _Writer:
             case Unary(operand=operand):
                 low, high = self._bounds(operand)
                 return -high, -low
-            case Conditional(then=then, otherwise=otherwise):
+            case Conditional(condition=condition, then=then, otherwise=otherwise):
+                # What is never chosen is not written.
+                if (found := self._text(condition, ())) in (text.TRUE, text.FALSE):
+                    return self._bounds(then if found == text.TRUE else otherwise)
                 (a, b), (c, d) = self._bounds(then), self._bounds(otherwise)
                 return min(a, c), max(b, d)
             case Call(function=function, arguments=arguments):
@@ -283,7 +286,8 @@ class _Writer:
             name = "location" if location == NAMELESS else f"location {escaped(location)}"
             inside = ["initial;"] if location in automaton.initial else []
             inside += ["marked;"] if location in automaton.marked else []
-            inside += self._edges([edge for edge in automaton.edges if edge.source == location], path)
+            edges = [edge for edge in automaton.edges if edge.source == location]
+            inside += self._edges(edges, {item.name: item.type for item in automaton.variables}, path)
             yield f"{name}{':' if inside else ';'}"
             yield from (f"  {line}" for line in inside)
 
@@ -298,7 +302,7 @@ class _Writer:
             begins = "in any" if len(values) == len(domain(item.type)) else f"in {{{', '.join(values)}}}"
         return f"disc {self._type(item.type, scope)} {escaped(_checked(item.name))} {begins};"
 
-    def _edges(self, edges: Iterable[Edge], scope: _Path) -> Iterator[str]:
+    def _edges(self, edges: Iterable[Edge], types: Mapping[str, Type], scope: _Path) -> Iterator[str]:
         def what(edge: Edge) -> tuple[object, ...]:
             return edge.guard, edge.updates, edge.target
 
@@ -310,9 +314,20 @@ class _Writer:
                 line += f" when {self._text(edge.guard, scope)}"
             if edge.updates:
                 line += " do " + ", ".join(
-                    f"{escaped(item.variable)} := {self._text(item.expression, scope)}" for item in edge.updates
+                    f"{escaped(item.variable)} := {self._assigned(item, types[item.variable], scope)}"
+                    for item in edge.updates
                 )
             yield line + (f" goto {escaped(edge.target)};" if edge.target != edge.source else ";")
+
+    def _assigned(self, update: Assignment, type_: Type, scope: _Path) -> Text:
+        """The new value of a variable; CIF takes none of which it knows that it is always out of range."""
+        value = self._text(update.expression, scope)
+        if isinstance(type_, IntegerType):
+            least, greatest = self._bounds(update.expression)
+            low, high = int(type_.low or 0), int(type_.high or 0)
+            if greatest < low or least > high:
+                return Text(f"if true: {value} else {low} end")
+        return value
 
     # The supervisor
 

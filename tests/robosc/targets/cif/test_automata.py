@@ -222,12 +222,20 @@ group a:
 end
 """
 
+NEVER = """controllable go; uncontrollable u;
+plant p:
+  alg int[0..2] m = 2; disc int[0..2] x;
+  location: initial; marked; edge go when x < 1 do x := x + 1; edge u when x = 2 do x := m + m;
+end
+"""
+
 
 @pytest.mark.parametrize(
     ("model", "line"),
     [
         pytest.param(CHOICE, "  initial p.x != 1;", id="initial-states-are-those-of-the-supervisor"),
         pytest.param(HIDDEN, "      edge ^go when not a do a := go;", id="hidden-name-is-written-from-the-root"),
+        pytest.param(NEVER, "    edge u when x = 2 do x := if true: 4 else 0 end;", id="value-is-never-in-range"),
     ],
 )
 def test_a_supervisor_is_written_so_that_it_is_read_as_the_same(model: str, line: str) -> None:

@@ -34,7 +34,7 @@ from robosc.model.places import Places
 from robosc.model.structure import Deployment, Model
 from robosc.source import Bundle
 from robosc.strategies.findings import layer_goal_findings
-from robosc.supervisor import CheckResult, SupervisedModule, Supervisor
+from robosc.supervisor import CheckResult, Strategy, SupervisedModule, Supervisor
 from robosc.synthesis import (
     EngineOptions,
     Statistics,
@@ -49,6 +49,7 @@ from robosc.verification import DEFAULT_STATES, CheckOutcome, Limits
 if TYPE_CHECKING:
     from robosc.certification.goals import GoalExplanation
     from robosc.explanation import EmptyExplanation
+    from robosc.modular.robots import RobotSynthesis
 
 CANCEL_REASON = "no supervisor is made, because it would have to forbid a cancel that must be possible"
 """Reason why there is no supervisor where it forbids what its executor asks for."""
@@ -90,7 +91,8 @@ class SynthesisOutcome(msgspec.Struct, frozen=True):
     accepted: tuple[Diagnostic, ...] = ()
 
 
-class _Result(msgspec.Struct, frozen=True):
+@dataclasses.dataclass(frozen=True)
+class _Result:
     """The outcome of synthesis.
 
     Attributes:
@@ -98,6 +100,7 @@ class _Result(msgspec.Struct, frozen=True):
         words: The automata with the words for them; without a supervisor perhaps only those of a module that has none.
         expected_states: States that the system has at most, where they were not counted.
         modules: The modules of a modular synthesis.
+        robot: The robot in modules, for a modular synthesis with a supervisor.
         effort: Most nodes of diagrams that the whole system can be expected to need.
     """
 
@@ -106,6 +109,7 @@ class _Result(msgspec.Struct, frozen=True):
     expected_states: int
     effort: int
     modules: tuple[SupervisedModule, ...] = ()
+    robot: "RobotSynthesis | None" = None
 
 
 class SynthesisProblem(msgspec.Struct, frozen=True):
@@ -281,7 +285,7 @@ def _supervised(
     if model.has_goals and deployment is Deployment.CONTROLLER:
         # Models without goals do not wait for what goals need.
         from robosc.certification.goals import goal_explanation
-        from robosc.certification.strategies import verify_strategy
+        from robosc.certification.strategies import GoalCheck, verify_strategy
         from robosc.strategies import (
             blame_goals,
             goal_findings,
@@ -290,9 +294,32 @@ def _supervised(
             synthesize_strategy,
         )
 
+        def check_goals(strategy: Strategy) -> GoalCheck:
+            return verify_strategy(
+                problem.system,
+                result.added,
+                strategy,
+                Limits.of(verify_limit),
+                engine=result.statistics.engine,
+                controller=controller,
+                should_stop=should_stop,
+                on_progress=lambda message: on_progress(Progress("strategy", message)),
+            )
+
         on_progress(Progress("strategy", counted(problem.system.obligations.aims)))
-        found = synthesize_strategy(
-            problem.system, result.added, engine=engine, should_stop=should_stop, on_progress=report
+        of_modules = None
+        if made.robot is not None:
+            from robosc.certification.modular_strategies import strategy_in_modules
+
+            of_modules = strategy_in_modules(
+                made.robot, problem.system, check_goals, engine=engine, should_stop=should_stop, on_progress=report
+            )
+        found = (
+            of_modules.found
+            if of_modules is not None
+            else synthesize_strategy(
+                problem.system, result.added, engine=engine, should_stop=should_stop, on_progress=report
+            )
         )
         blame = None
         if found.unreached:
@@ -311,22 +338,13 @@ def _supervised(
                 goals = goal_explanation(without, places, found, blame)
             reason = f"no strategy is made for the {goals_and_missions(model)}"
             return SynthesisOutcome(OutcomeStatus.MODEL_ERRORS, None, diagnostics, result.statistics, reason, goals)
-        checked = verify_strategy(
-            problem.system,
-            result.added,
-            strategy,
-            Limits.of(verify_limit),
-            engine=result.statistics.engine,
-            controller=controller,
-            should_stop=should_stop,
-            on_progress=lambda message: on_progress(Progress("strategy", message)),
-        )
+        checked = check_goals(strategy) if of_modules is None else of_modules.checked
         if checked.missed is not None:
             raise InternalError(f"the strategy misses a goal after {', '.join(checked.missed.trace)}")
         late = put_off_findings(problem.system.obligations.aims, places, found, checked.put_off)
         diagnostics = sorted_diagnostics((*diagnostics, *late))
         outcome: CheckResult = "passed" if checked.outcome is CheckOutcome.PASSED else "not checked"
-        method = f"{certificate.method}; {checked.method}"
+        method = f"{certificate.method}; {checked.method if of_modules is None else of_modules.method}"
         certificate = msgspec.structs.replace(certificate, goals=outcome, method=method)
     supervisor = Supervisor.supervising(problem.system, result.added, certificate, strategy, made.modules)
     return SynthesisOutcome(OutcomeStatus.SUPERVISOR, supervisor, diagnostics, result.statistics)
@@ -382,4 +400,4 @@ def _in_modules(
         for place, part in enumerate(found.parts)
     )
     most = prod(item.states for item in figures)
-    return _Result(found.result, words, found.result.statistics.states or most, effort, modules)
+    return _Result(found.result, words, found.result.statistics.states or most, effort, modules, found)

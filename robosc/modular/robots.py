@@ -133,11 +133,13 @@ class RobotSynthesis:
         result: The outcome for the whole robot.
         modular: The modules.
         parts: The modules as models, in the same order; without a supervisor only the first one that has none.
+        robot: Maker of further modules.
     """
 
     result: SynthesisResult
     modular: ModularResult
     parts: tuple[RobotPart, ...]
+    robot: RobotParts
 
 
 def synthesize_robot(
@@ -183,7 +185,7 @@ def synthesize_robot(
     )
     shown = tuple(made[item.module] for item in found.modules)
     if found.unsolved is not None:
-        return RobotSynthesis(found.unsolved.result, found, shown)
+        return RobotSynthesis(found.unsolved.result, found, shown, parts)
     answers = _Answers(parts, system, found, shown).merged()
     independent = found.modules if found.states is not None and len(found.modules) > 1 else ()
     result = SynthesisResult(
@@ -193,7 +195,7 @@ def synthesize_robot(
         answers=answers,
         parts=tuple((item.system, item.result) for item in independent),
     )
-    return RobotSynthesis(result, found, shown)
+    return RobotSynthesis(result, found, shown, parts)
 
 
 class _Answers:

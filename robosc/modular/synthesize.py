@@ -149,13 +149,11 @@ class _Synthesis:
         self._controlled: dict[Module, ControlledModule | None] = {}
         # Modules of which it is known that they do not block each other.
         self._fine: set[frozenset[Module]] = set()
-        self._part_of = {
-            event: place
-            for place, names in enumerate(parts.parts)
-            for item in parts.system.automata
-            if item.name in names
-            for event in item.alphabet
-        }
+        self._parts_of: dict[str, set[int]] = {}
+        place_of = {name: place for place, names in enumerate(parts.parts) for name in names}
+        for item in parts.system.automata:
+            for event in item.alphabet if item.name in place_of else ():
+                self._parts_of.setdefault(event, set()).add(place_of[item.name])
 
     def result(self, first: Sequence[Module]) -> ModularResult:
         """The supervisors of all modules, or the first module without one, from given initial modules."""
@@ -229,7 +227,7 @@ class _Synthesis:
         if len(known) < len(controlled):
             return None
         try:
-            graphs = graphs_of(known, self._part_of)
+            graphs = graphs_of(known, self._parts_of)
             return is_nonconflicting(graphs, limit=self._limit, should_stop=self._should_stop)
         except TooLargeError:
             return None

@@ -9,6 +9,7 @@ from robosc.automata import Semantics
 from robosc.automata.controlled import ControlledGraph, controlled_graph
 from robosc.certification import SynthesisOutcome, SynthesisProblem, prepare
 from robosc.errors import UnsupportedModelError
+from robosc.language import load_bundle
 from robosc.model.structure import Deployment
 from robosc.modular.clusters import MAXIMUM_BITS
 from robosc.modular.robots import RobotSynthesis, synthesize_robot
@@ -16,6 +17,7 @@ from robosc.source import Bundle
 from robosc.supervisor.predicates import state_predicates
 from robosc.synthesis import SynthesisResult, SynthesisStatus, questions_about, synthesize
 from support.effort import seeds
+from support.models import EXAMPLES as EXAMPLE_ROBOTS
 from support.models import bundle_of
 from support.random_crews import random_crew
 from support.random_models import models
@@ -115,6 +117,20 @@ def _is_supported(bundle: Bundle, deployment: Deployment) -> bool:
     return True
 
 
+@pytest.mark.parametrize(
+    "name", sorted(str(path.relative_to(EXAMPLE_ROBOTS)) for path in EXAMPLE_ROBOTS.rglob("*.rscd"))
+)
+@pytest.mark.parametrize("deployment", Deployment)
+def test_the_examples_can_be_taken_apart(name: str, deployment: Deployment) -> None:
+    found = prepare(load_bundle(EXAMPLE_ROBOTS / name), deployment)
+    # A library is no robot, and some are for one deployment alone.
+    if isinstance(found, SynthesisProblem):
+        made, _ = in_modules(found, deployment, bits=0.0)
+        expected = whole(found, deployment)
+        assert check(found, made, expected)
+        check_answers(found, made, expected)
+
+
 COMPONENT = """
 component C{0} {{
   incoming message go{0} with identifier: "{1}", type: none
@@ -180,3 +196,52 @@ def test_rivals_are_told_of_if_the_robot_can_get_there() -> None:
     assert check(problem, made, whole(problem))
     assert len(made.parts) > 1
     assert made.result.answers.together == ()
+
+
+HEARING = """
+component C{0} {{
+  incoming message go{0} with identifier: "/go{0}", type: none
+  incoming message back{0} with identifier: "/back{0}", type: none
+  behaviour {{
+    initial marked state idle {{ on request to go{0} goto out }}
+    state out {{ on request to back{0} goto idle on response from {1} goto idle }}
+  }}
+}}
+"""
+STOP = 'component Stop { outgoing message stop with identifier: "/stop", type: none }'
+ASKING = """
+interface i use Thing from own_msgs
+component Ask {
+  service ask with identifier: "/ask", request: none, response: none links i
+  behaviour {
+    initial marked state quiet { on request to ask goto asking }
+    state asking { on response from ask goto quiet on error from ask goto quiet }
+  }
+}
+"""
+
+
+@pytest.mark.parametrize(("heard", "speaker"), [("stop", STOP), ("ask", ASKING)])
+def test_those_that_hear_the_same_are_parts_of_their_own(heard: str, speaker: str) -> None:
+    """A message binds nobody together; of a service each module has its plant, which says when it answers."""
+    count = 6
+    components = "".join(HEARING.format(number, heard) for number in range(count))
+    rules = "".join(f"requirement go{number} needs C{(number + 1) % count}.idle\n" for number in range(count))
+    problem = problem_of(bundle_of(f"robot Crew {{ {speaker} {components} {rules} }}"))
+    made, _ = in_modules(problem, bits=0.0)
+    assert len(made.parts) >= count
+    plant = "message stop" if heard == "stop" else "service ask"
+    assert all(plant in {item.name for item in part.system.automata} for part in made.parts)
+    assert check(problem, made, whole(problem))
+
+
+def test_those_that_read_the_same_data_are_one_part() -> None:
+    reading = HEARING.replace("initial marked", "variable n: integer(0..1) = 0 initial marked")
+    reading = reading.replace("response from {1} goto", "response from {1} do n := if value then 1 else 0 goto")
+    speaker = STOP.replace("none", "boolean")
+    rules = "requirement never C0.out and C1.out requirement never C0.n = 1 and C1.n = 0 and C0.out"
+    components = "".join(reading.format(number, "stop") for number in range(3))
+    problem = problem_of(bundle_of(f"robot Crew {{ {speaker} {components} {rules} }}"))
+    made, _ = in_modules(problem, bits=0.0)
+    assert [part.components for part in made.parts] == [("Stop", "C0", "C1", "C2")]
+    assert check(problem, made, whole(problem))

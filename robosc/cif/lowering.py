@@ -31,6 +31,7 @@ from robosc.cif.types import CifType, fits, is_equal
 from robosc.cif.usage import Usage
 from robosc.cif.warnings import Exclusion, Reading, warn
 from robosc.expressions import (
+    FALSE,
     TRUE,
     BooleanType,
     EnumType,

@@ -133,7 +133,7 @@ def _are_better_apart(
             of_place[item].append(edge)
     crossing: dict[tuple[int, ...], list[int]] = {}
     most = 0
-    for item in best_order(len(places), edges):
+    for item in best_order(len(places), edges)[1]:
         for edge in of_place[item]:
             left[edge] -= 1
             crossing.setdefault(edge, []).append(item)

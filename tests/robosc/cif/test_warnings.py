@@ -125,16 +125,11 @@ def test_instances_of_a_definition_have_one_note() -> None:
 def random_text(random: Random) -> str:
     """Return a model of two plants and a requirement whose conditions often exclude each other."""
 
-    def condition() -> str:
-        simple = [
-            f"p.n {random.choice(['<', '=', '>'])} {random.randrange(3)}",
-            "p.b",
-            "q.x",
-            "q.y",
-            "i",
-            "not p.b",
-            "not i",
-        ]
+    def condition(*, is_of_location: bool = False) -> str:
+        simple = [f"p.n {random.choice(['<', '=', '>'])} {random.randrange(3)}", "p.b", "i", "not p.b", "not i"]
+        if not is_of_location:
+            # The predicate of an initial location may not need the location.
+            simple += ["q.x", "q.y"]
         return f" {random.choice(['and', 'or', 'and'])} ".join(random.sample(simple, random.randint(1, 3)))
 
     def maybe(text: str, likely: float = 0.5) -> str:
@@ -149,7 +144,7 @@ def random_text(random: Random) -> str:
         f"plant p: alphabet a, u; disc int[0..2] n = {random.randrange(3)}; disc bool b in any; location: initial; marked; "
         f"{edges('a', 'u')} end",
         f"plant q: alphabet a; location x: {maybe('initial; ', 0.7)}marked {condition()}; {edges('a')} "
-        f"location y: {maybe(f'initial {condition()};')}{maybe(' marked;')} edge a when {condition()} goto x; end",
+        f"location y: {maybe(f'initial {condition(is_of_location=True)};')}{maybe(' marked;')} edge a when {condition()} goto x; end",
         maybe(f"{role} r: alphabet u; {maybe('monitor;', 0.2)} location: initial; marked; {edges('u')} end"),
         *(maybe(f"{kind} {form};") for kind in ("plant", role) for form in
           (f"invariant {condition()}", f"a needs {condition()}", f"{condition()} disables u")),

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import grpc
 import pytest
@@ -179,7 +179,8 @@ class TestWork:
         assert (finding.code, finding.message) == ("cif-import", f"there is no file '{name}' that can be read")
 
     def test_a_supervisor_is_that_of_the_library(self) -> None:
-        local = robosc.synthesize(robosc.load(text=TWO_TANKS, name="tank.cif"), is_modular=True)
+        model = robosc.load(text=TWO_TANKS, name="tank.cif")
+        local = cast(robosc.SystemSynthesis, robosc.synthesize(model, is_modular=True))
         assert local.supervisor is not None
         message = request(TaskKind.SYNTHESIZE, cif(TWO_TANKS), modular=True)
         (answer,) = answers(TaskKind.SYNTHESIZE, message)

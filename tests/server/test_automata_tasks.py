@@ -79,6 +79,7 @@ class TestAcceptance:
         for kind, more in (
             (TaskKind.SYNTHESIZE, {"modular": True}),
             (TaskKind.GENERATE, {"initial": "tank.level = 1"}),
+            (TaskKind.GENERATE, {"modular": True}),
             (TaskKind.VERIFY, {"strict": True}),
         ):
             assert key(kind) != key(kind, **more)
@@ -141,6 +142,11 @@ class TestAcceptance:
         message.initial = "A = a"
         problem = "initial applies to automata, and the request has a RoboSC model"
         assert refusal(TaskKind.GENERATE, message) == problem
+        message = request(TaskKind.EXPLAIN, cif(), modular=True)
+        assert refusal(TaskKind.EXPLAIN, message).startswith("modular applies to RoboSC models")
+        message = small_request(TaskKind.EXPLAIN)
+        message.modular, message.state = True, "A.a"
+        assert refusal(TaskKind.EXPLAIN, message).startswith("modular explains events")
         message = pb.VerifyRequest(bundle=small_request(TaskKind.CHECK).bundle, strict=True)
         assert "apply only to a given supervisor" in refusal(TaskKind.VERIFY, message)
 

@@ -198,6 +198,18 @@ def test_rivals_are_told_of_if_the_robot_can_get_there() -> None:
     assert made.result.answers.together == ()
 
 
+def test_rivals_of_different_modules_are_told_of() -> None:
+    problem = crew(4, "requirement go0 needs C1.out", "requirement go2 needs C3.out", identifier="/go")
+    made, _ = in_modules(problem, bits=0.0)
+    assert len(made.parts) == 2
+    expected = whole(problem).answers.together
+    assert {(item.first, item.second) for item in made.result.answers.together} == {
+        (item.first, item.second) for item in expected
+    }
+    runs = {(item.first, item.second): item.trace for item in made.result.answers.together}
+    assert runs["go0.request", "go2.request"] == ("go1.request", "done1.response", "go3.request", "done3.response")
+
+
 HEARING = """
 component C{0} {{
   incoming message go{0} with identifier: "/go{0}", type: none

@@ -118,7 +118,7 @@ def with_modules(
         return report
     shown = verify_modules(system, added, modules, limit=limits.recomputed, should_stop=should_stop)
     free = {event.name for event in system.events if not event.is_controllable}
-    # Of a supervisor that adds nothing to uncontrollable events.
+    # A supervisor that adds nothing to uncontrollable events disables none.
     controllable = open_ if free.intersection(added) else CheckOutcome.PASSED
     verification = replace(
         found,

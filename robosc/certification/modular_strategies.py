@@ -73,7 +73,7 @@ def strategy_in_modules(
         return None
     part = robot.robot.part(partition, union, partition.system_of(union))
     smaller = ExecutableSystem(_about_itself(part.model), whole.deployment)
-    # What is remembered of requirements must be what the whole robot remembers.
+    # The memory must be one of the whole robot.
     if any(place not in whole.obligations.places for place in smaller.obligations.places):
         return None
     made = synthesize(smaller.automata, engine=engine, should_stop=should_stop, on_progress=on_progress)

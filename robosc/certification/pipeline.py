@@ -205,6 +205,8 @@ def make_supervisor(
         is_modular=is_modular,
     )
     is_judged = outcome.status is OutcomeStatus.SUPERVISOR and deployment is Deployment.CONTROLLER
+    # Several modules do not find all that the whole would.
+    is_judged = is_judged and (outcome.supervisor is None or len(outcome.supervisor.modules) < 2)
     diagnostics, accepted = accept(bundle, outcome.diagnostics, lambda code: is_judged and code in AFTER_SYNTHESIS)
     return replace(outcome, diagnostics=diagnostics, accepted=sorted_diagnostics((*problem.accepted, *accepted)))
 

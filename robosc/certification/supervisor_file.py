@@ -200,7 +200,7 @@ def verify_supervisor_file(
     if stated > limits.states and not report.is_complete:
         report = verified_with(0)
     if len(supervisor.modules) > 1:
-        # What modules the file names decides only what can be shown of them.
+        # The modules that the file names decide only what can be shown.
         modules = [item.automata for item in supervisor.modules]
         report = with_modules(report, system, added, modules, limits, should_stop=should_stop)
     found = report.verification
@@ -276,7 +276,7 @@ def _notes(certificate: Certificate, bundle: Bundle | None) -> list[str]:
 def _false_claims(certificate: Certificate, found: Verification, *, has_modules: bool) -> list[str]:
     """Return the false claims of a certificate."""
     claims = []
-    # Of modules that share something it may say that nobody counted.
+    # The states of modules that share something may not have been counted.
     states = None if has_modules and certificate.states == "0" else certificate.states
     for what, stated, counted in (
         ("states", states, found.states),

@@ -325,7 +325,7 @@ class _Plants:
             deciding = [item for item in automata if not _accepts(item, event)]
             reading = [item for item in automata if _reads_data(item, event)]
             if len(deciding) < 2 and len(reading) < 2:
-                # Of equals the one that does nothing else, as that of a message.
+                # The one that does least else, as the plant of a message.
                 found[event] = min(deciding or automata, key=lambda item: len(item.alphabet)).name
         return found
 

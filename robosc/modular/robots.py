@@ -9,11 +9,13 @@ with others.
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import islice
 
 import msgspec
 from msgspec.structs import replace
 
 from robosc.automata.compile import State
+from robosc.automata.controlled import ControlledGraph, controlled_graph
 from robosc.automata.decision import Decision
 from robosc.automata.plants import communication_plant_name
 from robosc.automata.semantics import Semantics, TooManyChoicesError
@@ -204,7 +206,14 @@ class _Answers:
     def __init__(self, parts: RobotParts, system: System, found: ModularResult, shown: tuple[RobotPart, ...]) -> None:
         self._model = parts.model
         self._questions = parts.questions
+        self._found = found
         self._run = _Run(system, found.added)
+        self._graphs: dict[int, ControlledGraph | None] = {}
+        places: dict[str, set[int]] = {}
+        for place, item in enumerate(found.modules):
+            for event in item.system.events:
+                places.setdefault(event.name, set()).add(place)
+        self._places = {event: frozenset(item) for event, item in places.items()}
         alone = {group[0] for group in found.groups if len(group) == 1}
         self._modules = [
             (part, item.result.answers, place in alone)
@@ -246,16 +255,41 @@ class _Answers:
             for _, answers, is_alone in self._modules
             for item in answers.together
         }
-        count = 0
-        for group in self._questions.rivals:
-            for number, second in enumerate(group):
-                for first in group[:number]:
-                    item, is_alone = found.get((first, second), (None, False))
-                    if item is None or count == MAXIMUM_TOGETHER:
-                        continue
-                    if is_alone or self._run.leads_to(item.trace, (first, second)):
-                        count += 1
-                        yield item
+        pairs = (
+            (first, second)
+            for group in self._questions.rivals
+            for number, second in enumerate(group)
+            for first in group[:number]
+        )
+        told = (self._told(*pair, *found.get(pair, (None, False))) for pair in pairs)
+        yield from islice(filter(None, told), MAXIMUM_TOGETHER)
+
+    def _told(self, first: str, second: str, item: EnabledTogether | None, is_alone: bool) -> EnabledTogether | None:
+        """Two rivals with a run of the robot after which both are possible; None if none is known."""
+        if item is not None and is_alone:
+            return item
+        runs = self._runs(first, second) if item is None else (item.trace,)
+        run = next((run for run in runs if self._run.leads_to(run, (first, second))), None)
+        return None if run is None else EnabledTogether(first, second, run)
+
+    def _runs(self, first: str, second: str) -> Iterator[tuple[str, ...]]:
+        """Runs that could lead to where two events of different modules are possible; none if one module has both."""
+        if not self._places[first].isdisjoint(self._places[second]):
+            return
+        one, other = (self._local_run(event, min(self._places[event])) for event in (first, second))
+        if one is not None and other is not None:
+            yield from ((*one, *other), (*other, *one))
+
+    def _local_run(self, event: str, place: int) -> tuple[str, ...] | None:
+        """A shortest run of a module to where an event is possible; None if there is none, or too many states."""
+        if place not in self._graphs:
+            made = self._found.modules[place]
+            predicates = state_predicates(made.system, made.result.added)
+            self._graphs[place] = controlled_graph(Semantics(made.system), predicates, limit=MAXIMUM_STATES)
+        graph = self._graphs[place]
+        steps = () if graph is None else graph.steps
+        number = next((number for number, found in enumerate(steps) if event in dict(found)), None)
+        return None if graph is None or number is None else graph.trace(number)
 
 
 class _Run:

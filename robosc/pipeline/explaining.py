@@ -282,6 +282,6 @@ def _in_modules(
             continue
         made = explain_synthesis(mine, engine=engine, event=event, should_stop=should_stop, on_progress=report)
         events += [replace_struct(item, module=part.components) for item in made.events]
-        # What a module never reaches, the robot does not reach.
+        # The robot does not reach what a module never reaches.
         remarks |= {item.message: item for item in made.remarks if item.kind == "unreachable-state"}
     return Explanation(events=tuple(events), remarks=() if event is not None else tuple(remarks.values()))

@@ -92,8 +92,10 @@ def test_check(client: Client, model: robosc.LoadedModel) -> None:
     assert isinstance(remote, robosc.Findings)
 
 
-def test_synthesize(client: Client, model: robosc.LoadedModel) -> None:
-    local, remote = robosc.synthesize(model), client.synthesize(model)
+@pytest.mark.parametrize("is_modular", [False, True])
+def test_synthesize(client: Client, model: robosc.LoadedModel, is_modular: bool) -> None:
+    local = robosc.synthesize(model, is_modular=is_modular)
+    remote = client.synthesize(model, is_modular=is_modular)
     is_made = local.supervisor is not None
     if local.status is robosc.SynthesisStatus.UNSUPPORTED_MODEL:
         # The server stops before it has anything to say of the text.

@@ -2,7 +2,7 @@
 
 import json
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, cast
 
 import grpc
 import pytest
@@ -79,6 +79,7 @@ class TestAcceptance:
         for kind, more in (
             (TaskKind.SYNTHESIZE, {"modular": True}),
             (TaskKind.GENERATE, {"initial": "tank.level = 1"}),
+            (TaskKind.GENERATE, {"modular": True}),
             (TaskKind.VERIFY, {"strict": True}),
             (TaskKind.VERIFY, {"controller": True}),
             (TaskKind.VERIFY, {"as_is": True}),
@@ -143,6 +144,11 @@ class TestAcceptance:
         message.initial = "A = a"
         problem = "initial applies to automata, and the request has a RoboSC model"
         assert refusal(TaskKind.GENERATE, message) == problem
+        message = request(TaskKind.EXPLAIN, cif(), modular=True)
+        assert refusal(TaskKind.EXPLAIN, message).startswith("modular applies to RoboSC models")
+        message = small_request(TaskKind.EXPLAIN)
+        message.modular, message.state = True, "A.a"
+        assert refusal(TaskKind.EXPLAIN, message).startswith("modular explains events")
         message = pb.VerifyRequest(bundle=small_request(TaskKind.CHECK).bundle, strict=True)
         assert "apply only to a given supervisor" in refusal(TaskKind.VERIFY, message)
         for name in ("controller", "as_is"):
@@ -185,7 +191,8 @@ class TestWork:
         assert (finding.code, finding.message) == ("cif-import", f"there is no file '{name}' that can be read")
 
     def test_a_supervisor_is_that_of_the_library(self) -> None:
-        local = robosc.synthesize(robosc.load(text=TWO_TANKS, name="tank.cif"), is_modular=True)
+        model = robosc.load(text=TWO_TANKS, name="tank.cif")
+        local = cast(robosc.SystemSynthesis, robosc.synthesize(model, is_modular=True))
         assert local.supervisor is not None
         message = request(TaskKind.SYNTHESIZE, cif(TWO_TANKS), modular=True)
         (answer,) = answers(TaskKind.SYNTHESIZE, message)

@@ -71,7 +71,7 @@ class _Author:
     def robot(self) -> str:
         is_ring = self._chance(0.25)
         if is_ring:
-            # Nothing else leads back.
+            # No other way leads back.
             self._kinds, self._share = ["counter", "message"], 0.0
         components = [self._component(f"C{number}") for number in range(self._dice.randint(3, 5))]
         names = list(self._states)

@@ -67,7 +67,7 @@ def test_modules_are_told(model: str, capsys: pytest.CaptureFixture[str]) -> Non
 
 
 def test_a_file_of_modules_is_verified(model: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    """Where the whole is too large for the limits, its modules still show that nothing more is forbidden."""
+    """Modules show that nothing more is forbidden, where the whole is too large for the limits."""
     Path(model).write_text(robot(8))
     output = tmp_path / "row.rsup"
     assert run(capsys, "synth", model, "--modular", "-o", str(output))[0] == 0

@@ -76,7 +76,7 @@ def check_answers(problem: SynthesisProblem, made: RobotSynthesis, expected: Syn
     assert {item.event for item in found.unprompted} <= {item.event for item in all_of.unprompted}
     rivals = {(item.first, item.second) for item in found.together}
     assert rivals <= {(item.first, item.second) for item in all_of.together}
-    # Of two requirements of which one could stand in for the other, either may be named.
+    # Either of two requirements may be named of which one could stand in for the other.
     assert len(found.unused) <= len(all_of.unused)
     if len(made.parts) == 1 and len(made.parts[0].system.events) == len(problem.system.automata.events):
         assert found == all_of
@@ -175,7 +175,7 @@ def test_modules_that_would_block_each_other_become_one() -> None:
 
 
 def test_a_requirement_in_two_modules_is_unused_if_both_say_so() -> None:
-    """What C2 never does is known in one module only: in the other one the same requirement restricts."""
+    """One module alone knows what C2 never does: in the other one the same requirement restricts."""
     for restricted, expected in (("go1", (0,)), ("{go1, go3}", ())):
         problem = crew(4, f"requirement {restricted} needs !C2.out", "requirement never C2.out")
         made, _ = in_modules(problem, bits=0.0)
@@ -185,7 +185,7 @@ def test_a_requirement_in_two_modules_is_unused_if_both_say_so() -> None:
 
 
 def test_rivals_are_told_of_if_the_robot_can_get_there() -> None:
-    """In the module of the first two both can go; the third one never lets the second one."""
+    """Both can go in the module of the first two; the third one never lets the second one."""
     both = "requirement go1 needs C0.idle or C0.busy or C0.out"
     problem = crew(3, both, identifier="/go")
     made, _ = in_modules(problem, bits=0.0)
@@ -196,6 +196,18 @@ def test_rivals_are_told_of_if_the_robot_can_get_there() -> None:
     assert check(problem, made, whole(problem))
     assert len(made.parts) > 1
     assert made.result.answers.together == ()
+
+
+def test_rivals_of_different_modules_are_told_of() -> None:
+    problem = crew(4, "requirement go0 needs C1.out", "requirement go2 needs C3.out", identifier="/go")
+    made, _ = in_modules(problem, bits=0.0)
+    assert len(made.parts) == 2
+    expected = whole(problem).answers.together
+    assert {(item.first, item.second) for item in made.result.answers.together} == {
+        (item.first, item.second) for item in expected
+    }
+    runs = {(item.first, item.second): item.trace for item in made.result.answers.together}
+    assert runs["go0.request", "go2.request"] == ("go1.request", "done1.response", "go3.request", "done3.response")
 
 
 HEARING = """

@@ -46,7 +46,7 @@ def test_what_is_shown_of_modules_holds_of_the_whole() -> None:
         added = state_predicates(system, found.result.added)
         modules = [[item.name for item in part.system.automata] for part in found.parts]
         if seed % 3 == 0:
-            # Whatever the modules are, what is shown of them must be true.
+            # All that is shown of any modules must be true.
             names = [item.name for item in system.automata]
             modules = [dice.sample(names, dice.randint(1, len(names))) for _ in range(3)]
         is_changed = seed % 2 == 0

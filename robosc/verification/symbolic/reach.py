@@ -217,14 +217,12 @@ class _Saturation:
                 self._variables.manager.var(states.var), self.of(high, number), self.of(low, number)
             )
         states = self.of(states, number + 1)
-        # Once each event has been asked in vain since the last growth, there is no more.
-        vain = place = 0
-        while vain < len(relations):
-            relation, lowest = relations[place]
-            led = self._variables.work.count_near(self._step(relation, self._variables, states), lowest)
-            grown = states | led
-            vain, place = vain + 1, (place + 1) % len(relations)
-            if grown != states:
-                states = self.of(self._variables.work.count_near(grown, lowest), number + 1)
-                vain = 0
-        return states
+        while True:
+            # What comes of all of them is passed down at once: a part with many events is gone through a few times.
+            grown = states
+            for relation, lowest in relations:
+                led = self._variables.work.count_near(self._step(relation, self._variables, grown), lowest)
+                grown = grown | led
+            if grown == states:
+                return states
+            states = self.of(grown, number + 1)

@@ -11,6 +11,9 @@ PROGRESS_INTERVAL = 64
 _FEW = 100
 """Nodes that are few."""
 
+_MADE = 4
+"""Nodes that the engine makes in a step, in the time in which a part with one node is looked at."""
+
 
 class TooMuchWorkError(RoboscError):
     """The check would take more work than it may."""
@@ -61,7 +64,8 @@ class Work:
     def count_near(self, node: Any, deepest: int) -> Any:
         """Count a diagram that was made by a step which works on the levels down to one; returns it.
 
-        If few of its nodes are so high, these alone count: what is below them was there before, or counts later.
+        If few of its nodes are so high, these alone count: what is below them was there before, or counts later. Else
+        all nodes do, as made by the engine.
         """
         seen: set[int] = set()
         stack = [node]
@@ -70,5 +74,5 @@ class Work:
             if item.level <= deepest and int(item) not in seen:
                 seen.add(int(item))
                 stack += (item.low, item.high)
-        self.spend(int(node.dag_size) if stack else 1 + len(seen))
+        self.spend(int(node.dag_size) // _MADE if stack else 1 + len(seen))
         return node

@@ -120,3 +120,51 @@ def test_any_expression_means_the_same(expression: str, statement: str) -> None:
     assert ast.dump(ast.parse(found)) == ast.dump(ast.parse(text))
     assert all(len(line) <= WIDTH or line.endswith(MARK) for line in found.splitlines())
     assert folded(found) == found
+
+
+PIECES = """
+@first
+class Described:
+    '''Words
+class of no class:
+    x = 1
+    '''
+
+    value = {
+        "one": 1,
+    }  # a comment
+    if value:
+        other = (
+            2
+        )
+    else:
+        other = 3
+
+    @property
+    def name(self):
+        return "a"
+
+
+class Empty: pass
+try:
+    x = 1
+except ValueError:
+    x = 2
+"""
+
+
+@pytest.mark.parametrize("size", [1, 60, 150, 400])
+def test_a_large_module_is_folded_as_a_small_one(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """In pieces of any size, and with whatever looks like the beginning of a statement and is none."""
+    methods = [
+        f"    def name_{name.replace(' ', '_')}(self):\n        {line.format(n='n')}\n"
+        + "\n".join(BODY[line[-1] == ":"])
+        for name, line in LONG.items()
+    ]
+    text = PIECES + "class Long:\n" + "\n".join(methods) + "\n" + PIECES
+    whole = folded(text)
+    assert whole != text
+    monkeypatch.setattr("robosc.targets.code.python.folding._LARGE", 0)
+    monkeypatch.setattr("robosc.targets.code.python.folding._PIECE", size)
+    assert folded(text) == whole
+    assert folded(whole) == whole

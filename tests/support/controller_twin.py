@@ -63,14 +63,23 @@ class _Wanted:
 
     def __init__(self, number: int) -> None:
         self._number = number
+        self.enabled = frozenset({number})
 
-    def choose(self, candidates: Any) -> int:
-        assert self._number in candidates
+    def enable(self, request: int) -> None: ...
+
+    def disable(self, request: int) -> None:
+        assert request != self._number
+
+    def choose(self, among: Any = None) -> int:
+        assert among is None or self._number in among
         return self._number
+
+    def withhold(self, request: int) -> None:
+        raise AssertionError(request)
 
     def issued(self, request: int) -> None: ...
 
-    def close(self, enabled: Any) -> None: ...
+    def close(self) -> None: ...
 
 
 def _nothing(*names: str) -> str:

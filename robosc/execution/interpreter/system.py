@@ -304,7 +304,7 @@ class InterpretedSystem:
         """Go over to the state that an event leads to."""
         if successor.changed():
             self.changes += 1
-        # Of equal numbers, too, the new one counts, such as -0.0 after 0.0.
+        # The new one of equal numbers counts, too, such as -0.0 after 0.0.
         if successor.written:
             self._state = successor.state
 

@@ -61,8 +61,9 @@ class WatchingSystem(InterpretedSystem):
     def changed_requests(self) -> tuple[int, ...]:
         """Return the numbers of the requests that are allowed now and were not at the last call, or vice versa."""
         self._look_at_requests()
-        turned, self._turned = self._turned, set()
-        return tuple(sorted(turned))
+        turned = tuple(sorted(self._turned))
+        self._turned.clear()
+        return turned
 
     def enabled_silent(self) -> str | None:
         """The first reset, then the first tau, that is allowed now; None if none is."""

@@ -187,15 +187,13 @@ class RandomPolicy:
 
     def enable(self, request: int) -> None:
         """Note that a request has become enabled, unless it was so before."""
-        place = bisect_left(self.enabled, request)
-        if self.enabled[place : place + 1] != [request]:
-            self.enabled.insert(place, request)
+        if not self._has(request):
+            insort(self.enabled, request)
 
     def disable(self, request: int) -> None:
         """Note that a request is not enabled any longer, if it was."""
-        place = bisect_left(self.enabled, request)
-        if self.enabled[place : place + 1] == [request]:
-            del self.enabled[place]
+        if self._has(request):
+            del self.enabled[bisect_left(self.enabled, request)]
 
     def choose(self, among: Optional[Sequence[int]] = None) -> Optional[int]:
         """Return a random one."""
@@ -215,6 +213,10 @@ class RandomPolicy:
         for request in self._withheld:
             insort(self.enabled, request)
         self._withheld = []
+
+    def _has(self, request: int) -> bool:
+        place = bisect_left(self.enabled, request)
+        return place < len(self.enabled) and self.enabled[place] == request
 
 
 def make_policy(policy: str, names: Sequence[str], priority: Sequence[str], seed: int) -> Policy:

@@ -42,7 +42,7 @@ class Stepper(StepWriter):
     Args:
         unit: The file.
         event: The event.
-        readers: What reads each place of the state.
+        readers: Table of the events that read each place of the state.
     """
 
     refused = literal("REFUSED", Sort.INTEGER)
@@ -108,7 +108,7 @@ class Stepper(StepWriter):
         changed = Do(call("changed" if noted else "all_changed", variable("r"), *noted))
         if not may_stay:
             return [Assign(place, value), changed]
-        # Of equal numbers, too, the new one counts, such as -0.0 after 0.0.
+        # The new one of equal numbers counts, too, such as -0.0 after 0.0.
         return [when(_differs(place, value), changed), Assign(place, value)]
 
     def _choice(self, branches: Sequence[tuple[Code, Block]], is_whole: bool) -> Block:

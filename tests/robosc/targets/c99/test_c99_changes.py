@@ -126,7 +126,7 @@ _SPEAKER = """
 
 
 def test_turns_go_round_as_the_words_say(tmp_path: Path) -> None:
-    """As many requests are issued as number the turns anew several times, while others come and go."""
+    """The turns are numbered anew several times, while requests come and go."""
     parts, decisions = 40, 400
     supervisor = unsupervised(f"robot Many {{{''.join(_SPEAKER.format(number) for number in range(parts))}}}")
     prefix = make_layout(supervisor).prefix
@@ -206,7 +206,7 @@ int main(void)
 
 @pytest.mark.parametrize("parts", [1, 8, 40, 600])
 def test_sets_are_as_flags(parts: int, tmp_path: Path) -> None:
-    """Of a word, of several words, and of several words of words."""
+    """Sets of one word, of several words, and of several words of words."""
     supervisor = unsupervised(f"robot Many {{{''.join(_SPEAKER.format(number) for number in range(parts))}}}")
     prefix = make_layout(supervisor).prefix
     for path, text in generate(supervisor, "c99").items():

@@ -9,6 +9,7 @@ the order of the events.
 from collections.abc import Callable, Iterable, Iterator
 from copy import copy
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 from robosc.expressions import Expression
@@ -150,7 +151,7 @@ class FixedPoint:
         while True:
             for is_begun_with in (self._begins_with_good, not self._begins_with_good):
                 known = good if is_begun_with else self._encoding.manager.false
-                found = self._bounded(self._steps_of_less, lambda solver, known=known: solver.solution(problem, known))
+                found = self._bounded(self._steps_of_less, partial(FixedPoint.solution, problem=problem, known=known))
                 if found is not None:
                     self._begins_with_good = is_begun_with
                     return found

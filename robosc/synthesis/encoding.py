@@ -5,7 +5,7 @@ state. Next to it in the order, it has one for the next state if forward images 
 other values than one constant. Bits of received data are interleaved with those of the first variable, in the order,
 that the data is written to: if they were separate, a relation that copies several data would have to represent all of
 them at once. Bits of wide integers that are compared or computed with each other are interleaved, those of equal weight
-side by side: see `blocks`.
+side by side, unless these are long chains: see `blocks`.
 """
 
 from collections import defaultdict

@@ -22,6 +22,10 @@ from robosc.synthesis.expression_encoder import ExpressionEncoder
 from robosc.synthesis.image import Image
 from robosc.synthesis.nodes import assigned
 
+MAXIMUM_SUBSTITUTED = 300
+"""Nodes of what an event writes up to which it is substituted in a set of states to find those before it. Substituting
+much more takes many times as long as the relation between both, as where many edges of one event write few bits."""
+
 
 class Transition(msgspec.Struct, frozen=True):
     """Effect of one event; predicates are over current-state variables and `hidden` ones.
@@ -329,13 +333,17 @@ class Steps:
         Args:
             source: States that count as such; None if all do.
         """
+        functions, relation, hidden = self._composed, self._in_range, self._transition.hidden
+        if sum(function.dag_size for function in functions.values()) > MAXIMUM_SUBSTITUTED:
+            functions = {name: self._manager.var(next_name(name)) for name in functions}
+            relation, hidden = self._relation, tuple(map(next_name, functions))
         return Image(
             manager=self._manager,
             needed=self.arrival,
             constants=self._constants,
-            functions=self._composed,
-            relation=self._in_range,
-            hidden=self._transition.hidden,
+            functions=functions,
+            relation=relation,
+            hidden=hidden,
             outside=source,
         )
 

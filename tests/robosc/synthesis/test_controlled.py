@@ -6,6 +6,7 @@ from dataclasses import replace
 from functools import lru_cache, reduce
 from itertools import combinations
 from random import Random
+from typing import Any
 
 import pytest
 from msgspec import structs
@@ -27,8 +28,10 @@ from robosc.synthesis import (
     Questions,
     Restriction,
     SynthesisProgress,
+    fixed_point,
     synthesize,
 )
+from robosc.synthesis.fixed_point import FixedPoint, GoodStates, Problem
 from robosc.verification import ExplicitSupervisor
 from support.effort import seeds
 from support.engines import needs_cudd
@@ -403,6 +406,23 @@ def test_of_two_alike_the_later_one_can_go(engine: str) -> None:
     each, both = (Restriction((0,)), Restriction((1,))), Restriction((0, 1))
     assert synthesize(system, engine=engine, questions=Questions(restrictions=each)).answers.unused == (1,)
     assert synthesize(system, engine=engine, questions=Questions(restrictions=(both,))).answers.unused == ()
+
+
+def test_whichever_way_less_is_solved_the_answers_are_the_same(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """With one step at first, from marked states alone and from the good ones are both given up, and begun again."""
+    begun: list[bool] = []
+    solution = FixedPoint.solution
+
+    def counted(solver: FixedPoint, problem: Problem, known: Any) -> GoodStates:
+        begun.append(known != known.bdd.false)
+        return solution(solver, problem, known)
+
+    monkeypatch.setattr(fixed_point, "_FIRST_STEPS_OF_LESS", 1)
+    monkeypatch.setattr(FixedPoint, "solution", counted)
+    test_of_two_alike_the_later_one_can_go(engine)
+    test_a_condition_that_synthesis_looks_ahead_to_is_used(engine)
+    test_causes_of_what_is_cut_by_invariants_and_by_synthesis(engine)
+    assert set(begun) == {False, True}
 
 
 def test_what_is_watched_counts(engine: str) -> None:

@@ -237,6 +237,8 @@ def test_files_are_read_from_their_folders(tmp_path: Path) -> None:
         ("type t = list t;", "cif-cycle", 6),
         (counter("disc int[0..3] y = z; disc int[0..3] z = y;", ""), "cif-cycle", 85),
         ("group def D(): d: D(); end d: D();", "cif-cycle", 19),
+        ("q: q();", "cif-cycle", 4),
+        ("q: r.D(); r: q.D();", "cif-cycle", 4),
         ("group def D(): end d: D(3);", "cif-arguments", 20),
         ("group def D(event e): end d: D(3); event f;", "cif-arguments", 32),
         ("const int n = 3; type n = int;", "cif-duplicate-name", 23),

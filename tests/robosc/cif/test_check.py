@@ -266,6 +266,7 @@ def test_files_are_read_from_their_folders(tmp_path: Path) -> None:
         (counter("disc tuple(int[0..3] a; bool b) t;", "do t[a] := true"), "cif-type", 117),
         (counter("", "do x := 1, x := 2"), "cif-assignment", 91),
         (counter("", "do (x, x) := (1, 2)"), "cif-assignment", 87),
+        ("func real f(): real a; a, a := 1, 2; return a; end", "cif-assignment", 27),
         (counter("", "do if x = 1: x := 2 end, if x = 2: x := 1 end"), "cif-assignment", 115),
         (counter("alg int y;", ""), "cif-structure", 52),
         (counter("alphabet; monitor e;", ""), "cif-structure", 44),

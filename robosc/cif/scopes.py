@@ -115,6 +115,7 @@ class PendingInstance:
     container: "Scope"
     made: "Scope | None" = None
     has_failed: bool = False
+    is_being_made: bool = False
     kind = "a component"
 
     @property
@@ -333,10 +334,14 @@ class Scopes:
 
     def _made(self, item: PendingInstance) -> Scope | None:
         """The scope of an instance; None if there is none, which has been reported."""
-        if item.made is None and not item.has_failed:
-            item.has_failed = True
+        if item.is_being_made:
+            name = item.instance.definition
+            self._error("cif-cycle", f"what '{name}' means depends on '{item.instance.name.text}' itself", name.at,
+                        "Name a definition.")  # fmt: skip
+        elif item.made is None and not item.has_failed:
+            item.is_being_made = True
             item.made = self._instantiated(item)
-            item.has_failed = item.made is None
+            item.is_being_made, item.has_failed = False, item.made is None
         return item.made
 
     def _instantiated(self, item: PendingInstance) -> Scope | None:
@@ -548,7 +553,7 @@ class Scopes:
     def _unknown(self, part: str, name: syntax.Name, scope: Scope | None) -> None:
         known: set[str] = set()
         while scope is not None:
-            known.update(key for key in scope.entries if " " not in key)
+            known.update(key for key in scope.entries if " " not in key and key != part)
             scope = scope.parent if len(name.parts) == 1 or part == name.parts[0] else None
         near = did_you_mean(part, known)
         whole = f" of '{name}'" if len(name.parts) > 1 else ""

@@ -59,8 +59,11 @@ class Updates:
         """Add assignments to others, unless they assign the same."""
         both = [made[name] for name in made if name in found]
         for text, at in dict.fromkeys((new.text, new.at) for new in both):
-            self.typing.error("cif-assignment", f"'{text}' is assigned twice", at, "Assign it once.")
+            self._assigned_twice(text, at)
         found.update(made)
+
+    def _assigned_twice(self, text: str, at: Location) -> None:
+        self.typing.error("cif-assignment", f"'{text}' is assigned twice", at, "Assign it once.")
 
     def _if_update(self, item: syntax.IfUpdate, scope: Scope) -> dict[str, New]:
         branches = [(self.typing.conjunction(guards, scope), self.assigned(updates, scope))
@@ -99,6 +102,13 @@ class Updates:
         """The variable that is assigned, the part of one, or several."""
         if isinstance(address, syntax.Group):
             items = tuple(self._addressed(item, scope) for item in address.items)
+            # Of variables that synthesis does not take there are no values to join.
+            known: set[str] = set()
+            for item, term in zip(address.items, items, strict=True):
+                if isinstance(item, syntax.Name) and term.problems:
+                    if str(item) in known:
+                        self._assigned_twice(str(item), item.at)
+                    known.add(str(item))
             if any(item.type.kind == "unknown" for item in items):
                 return ERROR
             return tuple_term(CifType("tuple", parts=tuple(item.type for item in items)), items)

@@ -288,9 +288,11 @@ class FixedPoint:
             yield steps
 
 
-def _way_of_less(
-    way: Callable[[FixedPoint, Problem, Any], GoodStates], problem: Problem, known: Any, place: int, solver: FixedPoint
-) -> tuple[GoodStates, int]:
+Way = Callable[[FixedPoint, Problem, Any], GoodStates]
+"""Function that finds the good states of a problem, given some that are known to be good."""
+
+
+def _way_of_less(way: Way, problem: Problem, known: Any, place: int, solver: FixedPoint) -> tuple[GoodStates, int]:
     """Return what one of several ways finds, with its place among them."""
     return way(solver, problem, known), place
 

@@ -51,7 +51,7 @@ def work_of(steps: int, nodes: int) -> int:
 
 
 def _grouped(levels: Mapping[str, int], steps: Sequence[Step]) -> list[tuple[int, list[Step]]]:
-    """Return the steps that begin at each level, topmost first; of these, those that reach down the farthest come first.
+    """Return the steps that begin at each level, topmost first; of these, those that reach farthest down come first.
 
     Then less depends on the order in which events are declared: those that join distant parts find these closed.
     """

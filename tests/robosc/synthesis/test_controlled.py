@@ -4,7 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import lru_cache, reduce
-from itertools import combinations
+from itertools import combinations, product
 from random import Random
 from typing import Any
 
@@ -29,9 +29,10 @@ from robosc.synthesis import (
     Restriction,
     SynthesisProgress,
     fixed_point,
+    race,
     synthesize,
 )
-from robosc.synthesis.fixed_point import FixedPoint, GoodStates, Problem
+from robosc.synthesis.fixed_point import FixedPoint, GoodStates, Problem, Way
 from robosc.verification import ExplicitSupervisor
 from support.effort import seeds
 from support.engines import needs_cudd
@@ -409,20 +410,20 @@ def test_of_two_alike_the_later_one_can_go(engine: str) -> None:
 
 
 def test_whichever_way_less_is_solved_the_answers_are_the_same(engine: str, monkeypatch: pytest.MonkeyPatch) -> None:
-    """With one step at first, from marked states alone and from the good ones are both given up, and begun again."""
-    begun: list[bool] = []
-    solution = FixedPoint.solution
+    """Without a head start all ways begin, with what is known and without."""
+    begun = set[tuple[str, bool]]()
 
-    def counted(solver: FixedPoint, problem: Problem, known: Any) -> GoodStates:
-        begun.append(known != known.bdd.false)
-        return solution(solver, problem, known)
+    def noted(way: Way, problem: Problem, known: Any, place: int, solver: FixedPoint) -> tuple[GoodStates, int]:
+        begun.add((way.__name__, known != known.bdd.false))
+        return way(solver, problem, known), place
 
-    monkeypatch.setattr(fixed_point, "_FIRST_STEPS_OF_LESS", 1)
-    monkeypatch.setattr(FixedPoint, "solution", counted)
+    monkeypatch.setattr(race, "HEAD_START", 0)
+    monkeypatch.setattr(race, "SHARE", 1)
+    monkeypatch.setattr(fixed_point, "_way_of_less", noted)
     test_of_two_alike_the_later_one_can_go(engine)
     test_a_condition_that_synthesis_looks_ahead_to_is_used(engine)
     test_causes_of_what_is_cut_by_invariants_and_by_synthesis(engine)
-    assert set(begun) == {False, True}
+    assert begun == set(product(("good_states", "reached_good_states"), (False, True)))
 
 
 def test_what_is_watched_counts(engine: str) -> None:

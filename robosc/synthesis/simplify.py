@@ -168,7 +168,7 @@ class Simplifier:
             return extract(self._encoding, simple)
         except UnsupportedModelError:
             tested = self._places(simple)
-            positive, _ = self._needed(tested, *self._over(tested, care & wanted, care & ~wanted))
+            positive, _ = self._needed(tested, *self._over(tested, wanted, care))
             return extract(self._encoding, positive)
 
     def _is_over(self) -> bool:

@@ -8,7 +8,7 @@ from itertools import combinations
 import pytest
 from hypothesis import given, settings
 
-from robosc.automata import DiscreteVariable, EventCondition, InputVariable, System
+from robosc.automata import DiscreteVariable, Edge, EventCondition, InputVariable, System
 from robosc.automata.state import Subject
 from robosc.errors import UnsupportedModelError
 from robosc.expressions import BooleanType, Call, Conditional, Expression, IntegerType, Unary
@@ -99,13 +99,16 @@ def counters(
     are_back: bool = False,
 ) -> System:
     """Integers of one automaton each that go up by one, or back as well, and relations between them."""
+
+    def edges(number: int) -> list[Edge]:
+        counter = read(f"C{number}.n")
+        up = edge(f"l -up{number}-> l", n=operation(counter, "+", 1))
+        return [up, edge(f"l -down{number}-> l", n=operation(counter, "-", 1))] if are_back else [up]
+
     automata = [
         automaton(
             f"C{number}",
-            [
-                edge(f"l -{way}{number}-> l", n=operation(read(f"C{number}.n"), operator, 1))
-                for way, operator in (("up", "+"), ("down", "-"))[: 1 + are_back]
-            ],
+            edges(number),
             variables=[DiscreteVariable("n", type_, (starts[number] if starts else 0,))],
         )
         for number in range(count)
@@ -124,7 +127,7 @@ def chained(count: int, type_: IntegerType = WIDE) -> System:
 
 def total(count: int) -> System:
     """Counters of which the sum is bounded."""
-    reads = [read(f"C{number}.n") for number in range(count)]
+    reads: list[Expression] = [read(f"C{number}.n") for number in range(count)]
     return counters(count, operation(reduce(lambda left, right: operation(left, "+", right), reads), "<", 500))
 
 
@@ -176,8 +179,7 @@ def test_three_places_of_a_thousand_values_have_conditions_on_two() -> None:
     added = {item.event: item.condition for item in synthesize(made).added}
     assert {node.automaton for node in added["up1"].nodes} == {"C1", "C2"}
     for values in ((0, 333, 666), (0, 665, 666), (997, 998, 999), (1, 2, 4)):
-        read_index = dict(zip(("C0", "C1", "C2"), values, strict=True))
-        assert evaluate(added["up1"], lambda name, _, found=read_index: found[name]) == (values[1] + 1 < values[2])
+        assert evaluate(added["up1"], lambda name, _: values[int(name[1:])]) == (values[1] + 1 < values[2])  # noqa: B023
 
 
 def test_narrow_integers_stay_as_they_are() -> None:

@@ -6,6 +6,7 @@ from hypothesis import strategies as st
 
 from robosc.targets.code.python.bundle import WIDTH
 from robosc.targets.code.python.folding import folded
+from robosc.targets.ros.middleware import _literal
 
 MARK = "  # noqa: E501"
 
@@ -168,3 +169,17 @@ def test_a_large_module_is_folded_as_a_small_one(size: int, monkeypatch: pytest.
     monkeypatch.setattr("robosc.targets.code.python.folding._PIECE", size)
     assert folded(text) == whole
     assert folded(whole) == whole
+
+
+def test_a_long_literal_is_the_same_on_several_lines(monkeypatch: pytest.MonkeyPatch) -> None:
+    states = [
+        {"name": f"state {n}", "initial": not n, "of": [1, {"a": [2] * 40}], "more": {"b": "'\u00e4"}} for n in range(9)
+    ]
+    value = {"name": "Large", "components": states, "none": []}
+    for size in (1, 100, 1000):
+        monkeypatch.setattr("robosc.targets.ros.middleware._LONG", size)
+        text = _literal(value)
+        assert "\n" in text
+        assert ast.literal_eval(text) == value
+    # The lines are those that one long line is broken into.
+    assert folded(f"DEFINITION = {text}\n") == folded(f"DEFINITION = {value!a}\n")

@@ -9,8 +9,8 @@ import io
 import textwrap
 import tokenize
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
 from token import COMMENT, DEDENT, ENDMARKER, FSTRING_END, FSTRING_START, INDENT, NEWLINE, NL, OP, STRING
+from typing import NamedTuple
 
 from robosc.errors import InternalError
 from robosc.targets.code.python.bundle import WIDTH
@@ -30,12 +30,11 @@ _WITHIN = frozenset(("", " ", "\t", ")", "]", "}", "#"))
 _GOING_ON = ("elif", "else", "except", "finally")
 """What the statement before goes on with."""
 
-_LARGE, _PIECE = 200_000, 20_000
+_LARGE, _PIECE = 200_000, 2_000
 """Characters from which a module is folded piece by piece, and characters that a piece has at least."""
 
 
-@dataclass(frozen=True, slots=True)
-class _Token:
+class _Token(NamedTuple):
     """Part of a line: a token of Python, or the blanks between two.
 
     Attributes:
@@ -116,7 +115,7 @@ def _is_whole(text: str) -> bool:
 def _folded_whole(text: str) -> str:
     # Not `splitlines`, which sees more ends of lines than Python does.
     lines = text.removesuffix("\n").split("\n")
-    if all(len(line) <= WIDTH for line in lines):
+    if all(len(line) <= WIDTH or line.endswith(_MARK) for line in lines):
         return text
     ends: dict[int, int] = {}
     depths: dict[int, int] = {}
@@ -218,18 +217,21 @@ def _stripped(tokens: Sequence[_Token]) -> list[_Token]:
     kept = tokens[solid[0] : solid[-1] + 1] if solid else []
     pairs: dict[int, int] = {}
     opened: list[int] = []
-    for number, token in enumerate(kept):
-        if token.opens:
-            opened.append(number)
-        elif token.closes and opened:
-            pairs[opened.pop()] = number
+    for number, (kind, text, _) in enumerate(kept):
+        if kind == OP:
+            if text in _OPEN:
+                opened.append(number)
+            elif text in _CLOSE and opened:
+                pairs[opened.pop()] = number
     closing = set(pairs.values())
     depth = 0
     found: list[_Token] = []
     for number, token in enumerate(kept):
-        depth -= number in closing
-        found.append(token if token.depth == depth else _Token(token.kind, token.text, depth))
-        depth += number in pairs
+        if number in closing:
+            depth -= 1
+        found.append(token if token[2] == depth else _Token(token[0], token[1], depth))
+        if number in pairs:
+            depth += 1
     return found
 
 

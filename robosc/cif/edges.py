@@ -206,7 +206,7 @@ class Edges:
     Args:
         usage: User of expressions.
         scope: The automaton.
-        channels: What sends over channels and receives from them.
+        channels: Senders and receivers of channels.
 
     Attributes:
         channels: Names of the channels of which the automaton is an end.
@@ -233,7 +233,7 @@ class Edges:
         for event, (entity, type_) in zip(item.events, uses, strict=True):
             if event.use == "?" and entity is not None and type_ is not None:
                 typing.received = self._channels.received(typing, entity, type_)
-            # What is never sent is never received, and has no value.
+            # A value that is never sent is never received, and there is none.
             is_used = event.use != "?" or entity is None or typing.received is None or (
                 typing.received.type.kind == "void" or bool(self._channels.sends(entity))
             )  # fmt: skip

@@ -49,7 +49,7 @@ class ExpressionTyping(ABC):
         scopes: The scopes.
 
     Attributes:
-        reads: What the expressions of now read, with places.
+        reads: Entities that the expressions of now read, with places.
         received: The value that an edge receives, in its updates.
         has_distributions: True in initial values of variables, which alone may be distributions.
     """
@@ -429,7 +429,7 @@ class ExpressionTyping(ABC):
 
 
 _KNOWN = syntax.Constant | syntax.Enum | syntax.Function
-"""What has the same value in every state."""
+"""Entities that have the same value in every state."""
 
 _HINTED = frozenset({"and", "or", "+", "-", "*", "div", "mod"})
 """Operators whose first operand is expected to be what the result is."""

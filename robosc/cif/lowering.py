@@ -54,7 +54,7 @@ class Lowering(Usage):
     """Parts of a system, gathered component by component.
 
     Attributes:
-        channels: What sends over channels and receives from them.
+        channels: Senders and receivers of channels.
         events: Events with their names.
         automata: Automata.
         places: Places of the automata, by their names.
@@ -164,7 +164,7 @@ class Lowering(Usage):
         if not is_event or not isinstance(found, Entity) or not isinstance(argument, syntax.Name):
             return
         assert isinstance(found.declaration, syntax.Event)  # noqa: S101 - asked above
-        # What is itself a parameter is known by its declaration alone.
+        # An argument that is a parameter itself is known by its declaration alone.
         given, _ = self.scopes.parameter(argument, alias.argument_scope)
         is_controllable = found.declaration.is_controllable if given is None else given.is_controllable
         if parameter.is_controllable not in (None, is_controllable):
@@ -375,7 +375,7 @@ class Lowering(Usage):
         with self.typing.depending(node) if word == "initial" else nullcontext():
             terms = [self.typing.conjunction(item.predicates, scope) for item in found]
         if node is not scope:
-            # How an automaton begins depends on which locations are initial.
+            # The beginning of an automaton depends on which locations are initial.
             self.typing.depends.setdefault(scope, {})[node] = found[0].at
         term = terms[0]
         for other in terms[1:]:

@@ -129,7 +129,7 @@ class Operators:
             return ERROR
         if operator in ("and", "or", "=>", "<=>"):
             if left.type.kind == right.type.kind == "bool":
-                # What follows is not evaluated then, and may have no value.
+                # The rest is not evaluated then, and may have no value.
                 if self.is_evaluating and left.is_static and (operator, left.value) in _DECIDED:
                     return truth(operator != "and")
                 return logic(operator, left, right)

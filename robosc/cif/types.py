@@ -88,7 +88,7 @@ def integer(low: int, high: int) -> CifType:
 
 
 Relation = Callable[[tuple[int, int], tuple[int, int]], bool]
-"""What is asked of two ranges of integers, or of lengths of lists."""
+"""Question about two ranges of integers, or about lengths of lists."""
 
 
 def _is_within(value: tuple[int, int], target: tuple[int, int]) -> bool:

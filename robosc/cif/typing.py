@@ -19,7 +19,7 @@ class Typing(ExpressionTyping):
         scopes: The scopes.
 
     Attributes:
-        depends: What the value of an algebraic variable reads, and what decides how a variable or an automaton begins
+        depends: Entities that the value of an algebraic variable reads, or that decide how something begins
             or whether a location is initial, with the places where that is read.
     """
 

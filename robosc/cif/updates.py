@@ -102,7 +102,7 @@ class Updates:
         """The variable that is assigned, the part of one, or several."""
         if isinstance(address, syntax.Group):
             items = tuple(self._addressed(item, scope) for item in address.items)
-            # Of variables that synthesis does not take there are no values to join.
+            # Variables that synthesis does not take have no values to join.
             known: set[str] = set()
             for item, term in zip(address.items, items, strict=True):
                 if isinstance(item, syntax.Name) and term.problems:

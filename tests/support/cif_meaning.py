@@ -26,7 +26,7 @@ class Instance:
 
     Attributes:
         path: Its absolute name; empty for the root, in which arguments are written.
-        component: What is written of it.
+        component: Text that is written of it.
         arguments: Argument of each parameter.
         fields: Fields of each variable that is a tuple.
     """
@@ -50,7 +50,7 @@ class Instance:
 
 @dataclass(frozen=True)
 class Step:
-    """What an event does in a state.
+    """Effect of an event in a state.
 
     Attributes:
         is_allowed: Every requirement automaton allows it.

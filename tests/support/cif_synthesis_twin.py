@@ -23,7 +23,7 @@ class Synthesis:
     ) -> None:
         self._twin, self._events, self._inputs = twin, events, inputs
         self._open: dict[Key, list[set[Key]]] = {}
-        """What may happen in a state, as the states that each event leads to: what nothing can prevent."""
+        """Return the states that each event leads to from a state, as far as nothing can prevent it."""
         self._allowed: dict[Key, list[set[Key]]] = {}
         """The same of what a supervisor may prevent, and requirements allow."""
         self._good: set[Key] = set()

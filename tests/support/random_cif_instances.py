@@ -46,7 +46,7 @@ def random_instances(random: Random) -> str:
 
 
 class _Body:
-    """What stands in one automaton."""
+    """Contents of one automaton."""
 
     def __init__(
         self, random: Random, own: str, other: str, extra: list[str], channel: str, events: list[str], *,
@@ -65,7 +65,7 @@ class _Body:
             for event in random.sample(self.events, random.randint(1, 2)):
                 lines.append(self._edge(event, place))
             if self.channel == "e!":
-                # What is sent must follow from the state.
+                # The value that is sent must follow from the state.
                 guards = random.choice([["b", "not b"], ["x = 0", "x = 1 and b", "x = 2"], ["true"]])
                 lines += [self._edge(f"e!{self._sent()}", place, guard) for guard in guards]
             elif self.channel:

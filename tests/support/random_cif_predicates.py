@@ -14,7 +14,7 @@ def random_predicates(random: Random, *, is_open: bool = False) -> str:
     """A model of two plants and a requirement, in which what begins later may depend on what begins earlier.
 
     Args:
-        random: Where its choices come from.
+        random: Source of its choices.
         is_open: It may have input variables, and its requirement has no variables.
     """
     names = [f"{name}.{part}" for name in "pqr" for part in ("l", "k")]
@@ -88,7 +88,7 @@ def _automaton(
 
 
 def _action(random: Random, reads: _Reads, has_variables: bool) -> str:
-    """What stands between an event and where it leads."""
+    """Text between an event and its target."""
     guard = random.choice(["", "", f" when {reads.truth()}"])
     updates = ["", f" do x := {reads.number()}", f" do x := x + {random.randint(1, 2)}", " do x := x - 1",
                f" do b := {reads.truth()}, t[a] := {reads.number()}",

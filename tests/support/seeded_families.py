@@ -345,7 +345,7 @@ def loads(size: int, seed: int) -> System:
     first = 0
     while first + 1 < size:
         last = min(size - 1, first + dice.randrange(3, 6))
-        total = read(f"B{first}.at")
+        total: Expression = read(f"B{first}.at")
         for number in range(first + 1, last + 1):
             total = operation(total, "+", read(f"B{number}.at"))
         bounds.append(operation(total, "<=", 12 * (last - first + 1)))

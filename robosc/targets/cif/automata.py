@@ -222,7 +222,7 @@ class _Writer:
                 low, high = self._bounds(operand)
                 return -high, -low
             case Conditional(condition=condition, then=then, otherwise=otherwise):
-                # What is never chosen is not written.
+                # A value that is never chosen is not written.
                 if (found := self._text(condition, ())) in (text.TRUE, text.FALSE):
                     return self._bounds(then if found == text.TRUE else otherwise)
                 (a, b), (c, d) = self._bounds(then), self._bounds(otherwise)

@@ -218,7 +218,7 @@ class _Saturation:
             )
         states = self.of(states, number + 1)
         while True:
-            # What comes of all of them is passed down at once: a part with many events is gone through a few times.
+            # The results of all of them are passed down at once: a part with many events is gone through a few times.
             grown = states
             for relation, lowest in relations:
                 led = self._variables.work.count_near(self._step(relation, self._variables, grown), lowest)

@@ -179,7 +179,7 @@ plant q: disc int[0..3] x; location: initial; marked; {r} end
          " disc int[0..3] x; disc bool b; location: initial; marked; edge e? do (x, b) := ?; end", 2),
         ("uncontrollable void e; plant p: location: initial; marked; edge e!; end plant q: disc int[0..3] x; location:"
          " initial; marked; edge e? do x := 1; end", 2),
-        # What is missing is missed only where it is evaluated.
+        # A missing value is missed only where it is evaluated.
         (counter("const int z = 0; const real r = if z = 0: 0 else 1 / z end; const bool b = z = 0 or 1 / z = 1;",
                  "when b do x := 1"), 2),
         (counter("disc bool b = switch self: case l: true case k: false end;", "when b do x := 1 goto k;"

@@ -39,7 +39,7 @@ def test_states_are_as_the_syntax_tree_says(seed: int) -> None:
         assert semantics.is_marked(state) is twin.is_marked(values), (text, values)
         required = all(_is_true(item, read) for item in system.invariants)
         assert required is twin.holds("requirement", values), (text, values)
-        # Where a plant invariant does not hold, there is no state.
+        # States against a plant invariant do not exist.
         for event, is_controllable in EVENTS.items() if twin.holds("plant", values) else ():
             allowed, targets = twin.meaning.targets(values, event, is_controllable=is_controllable)
             if not twin.allows("plant", event, values):

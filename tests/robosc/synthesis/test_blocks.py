@@ -138,7 +138,7 @@ def total(count: int) -> System:
         (chained(4), False),
         (chained(2, IntegerType(0, 50)), True),
         (chained(3, IntegerType(0, 50)), False),
-        # What a million values would take is more than a chain of six.
+        # A million values would take more than a chain of six.
         (chained(6, IntegerType(0, 10**6)), True),
         (total(4), True),
         (total(6), False),

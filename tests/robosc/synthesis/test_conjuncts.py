@@ -138,7 +138,7 @@ def unused_in(asked: System) -> tuple[int, ...]:
 @pytest.mark.parametrize("fall", ["fall", "u_fall"])
 @pytest.mark.usefixtures("smallest")
 def test_an_invariant_that_keeps_from_a_pit(fall: str) -> None:
-    """Where nothing leads out of the pit, synthesis keeps from it anyway: also by keeping from where it may fall."""
+    """Synthesis keeps from a pit that nothing leads out of anyway, also by keeping from where it may fall."""
     edges = ["home -go-> out", "out -back-> home", f"out -{fall}-> pit", "pit -stay-> pit"]
     for marked, unused in ((["home"], (0,)), (["home", "pit"], ())):
         fallible = automaton("A", edges, marked=marked)
@@ -161,7 +161,7 @@ def test_a_way_back_that_is_forbidden_is_none(allowed_in: str) -> None:
 
 @pytest.mark.usefixtures("smallest")
 def test_of_two_that_only_matter_together_the_later_one_can_go() -> None:
-    """There is a way back from `x` through `y` alone, and a way to `y` from `x` alone."""
+    """The only way back from `x` is through `y`, and the only way to `y` is from `x`."""
     first = automaton("A", ["home -go-> x", edge("x -next-> home", StateTest("B", "y"))], marked=["home"])
     second = automaton("B", [edge("idle -up-> y", StateTest("A", "x")), "y -down-> idle"], marked=["idle"])
     apart = tuple(Unary("not", StateTest(*place)) for place in (("B", "y"), ("A", "x")))
@@ -182,7 +182,7 @@ def row(size: int) -> System:
 
 
 def test_what_is_near_decides_about_a_large_system(monkeypatch: pytest.MonkeyPatch) -> None:
-    """To solve it anew without each invariant takes time that grows with the square of its size."""
+    """A new solution without each invariant would take time that grows with the square of the size."""
     size = 60
     solutions = 0
     solution = FixedPoint.solution_of_less
@@ -201,7 +201,7 @@ def test_what_is_near_decides_about_a_large_system(monkeypatch: pytest.MonkeyPat
 @settings(max_examples=examples(50))
 @given(seed=st.integers(0, 10_000), nodes=st.sampled_from([0, 100]))
 def test_values_of_variables(engine: str, seed: int, nodes: int) -> None:
-    """By the kernel, for small predicates, as by the engine."""
+    """The kernel, for small predicates, finds what the engine does."""
     dice = Random(seed)
     manager = make_manager(engine)
     names = [f"x{number}" for number in range(8)]

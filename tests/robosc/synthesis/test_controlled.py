@@ -236,7 +236,7 @@ def without_traces(answers: Answers) -> object:
 def test_random_systems(
     smallest: int, record_property: Callable[[str, object], None], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """By what is near each event, and by predicates of the whole."""
+    """Surroundings of each event give the answers that predicates of the whole give."""
     monkeypatch.setattr("robosc.synthesis.conjuncts.SMALLEST", smallest)
     met: Counter[str] = Counter()
 

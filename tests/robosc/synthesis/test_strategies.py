@@ -66,7 +66,7 @@ FAMILIES = [
 def test_a_race_costs_thrice_the_best_strategy_at_most(
     family: str, order: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """In nodes worked on: beyond it is the head start alone, and what strategies do at once."""
+    """The bound is in nodes worked on: beyond it is the head start alone, and what strategies do at once."""
     monkeypatch.setattr(race, "HEAD_START", HEAD_START)
     monkeypatch.setattr(race, "SHARE", SHARE)
     system = shuffled(SEEDED_FAMILIES[family](40, 1), order)
@@ -82,7 +82,7 @@ def test_a_race_costs_thrice_the_best_strategy_at_most(
     strategies = found.statistics.race
     costs = [sum(item.nodes for item in alone(system, way, monkeypatch).statistics.race) for way in WAYS]
     assert sum(item.nodes for item in strategies) <= 3 * (min(costs) + max(at_once) + SHARE) + HEAD_START
-    # Whoever comes to its end first has worked no more than the others would, but for the head start.
+    # The winner has worked no more than the others would, but for the head start.
     (won,) = (item for item in strategies if item.won)
     assert won.nodes <= min(costs) + max(at_once) + SHARE + HEAD_START
 
@@ -107,7 +107,7 @@ def test_small_systems_have_no_race() -> None:
 
 @needs_cudd
 def test_others_are_given_up_where_diagrams_become_too_large(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Whatever one strategy can do with so many nodes alone comes out although others began beside it."""
+    """A result that one strategy finds with so many nodes alone comes out although others began beside it."""
     monkeypatch.setattr(race, "HEAD_START", 1)
     monkeypatch.setattr(race, "SHARE", 5_000)
     system = cat_and_mouse(3, 2)

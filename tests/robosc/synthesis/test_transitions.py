@@ -119,7 +119,7 @@ def test_under_other_conditions_it_reads_what_they_read(engine: str) -> None:
 @settings(max_examples=examples(40))
 @given(st.one_of(any_systems(), any_wide_systems()))
 def test_states_before_an_event_are_found_by_a_relation_as_by_substitution(made: System) -> None:
-    """Whatever an event writes, both lead back to the same states."""
+    """Both lead back to the same states, whatever an event writes."""
     found = []
     for limit in (0, 10**9):
         with pytest.MonkeyPatch.context() as patch:

@@ -156,7 +156,7 @@ except ValueError:
 
 @pytest.mark.parametrize("size", [1, 60, 150, 400])
 def test_a_large_module_is_folded_as_a_small_one(size: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    """In pieces of any size, and with whatever looks like the beginning of a statement and is none."""
+    """Pieces of any size give the same, also with text that looks like the beginning of a statement and is none."""
     methods = [
         f"    def name_{name.replace(' ', '_')}(self):\n        {line.format(n='n')}\n"
         + "\n".join(BODY[line[-1] == ":"])

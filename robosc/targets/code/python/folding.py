@@ -25,10 +25,10 @@ _MARK = "  # noqa: E501"
 _INDENT = "    "
 _HEAD = "class _:\n"
 _WITHIN = frozenset(("", " ", "\t", ")", "]", "}", "#"))
-"""What no statement begins with."""
+"""Beginnings of lines that no statement has."""
 
 _GOING_ON = ("elif", "else", "except", "finally")
-"""What the statement before goes on with."""
+"""Beginnings of lines with which the statement before goes on."""
 
 _LARGE, _PIECE = 200_000, 2_000
 """Characters from which a module is folded piece by piece, and characters that a piece has at least."""
